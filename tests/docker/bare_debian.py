@@ -25,9 +25,9 @@ SKIPPED = 77  # what ctest knows as skipped
 # What makes Docker's images slim, as the two files in them have it.
 LEFT_OUT = ["usr/share/doc", "usr/share/info", "usr/share/locale", "usr/share/man"]
 SLIM = {"etc/dpkg/dpkg.cfg.d/docker": "".join(f"path-exclude /{folder}/*\n" for folder in LEFT_OUT) +
-                                      "path-include /usr/share/doc/*/copyright\n",
+        "path-include /usr/share/doc/*/copyright\n",
         "etc/apt/apt.conf.d/docker-clean": 'DPkg::Post-Invoke { "rm -f /var/cache/apt/archives/*.deb || true"; };\n'
-                                           'Dir::Cache::pkgcache "";\nDir::Cache::srcpkgcache "";\n'}
+        'Dir::Cache::pkgcache "";\nDir::Cache::srcpkgcache "";\n'}
 PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 PASSED_ON = ["JOBS", "http_proxy", "https_proxy", "no_proxy"]
 
@@ -67,7 +67,7 @@ class Tree:
             for name, text in SLIM.items():
                 self.at(name).write_text(text)
             call("sh", "-ec", f"cd $0; rm -rf {' '.join(LEFT_OUT)} var/lib/apt/lists/* var/cache/apt/*.bin "
-                              "var/cache/apt/archives/*.deb", self.root)
+                 "var/cache/apt/archives/*.deb", self.root)
         for name in ("hosts", "resolv.conf"):
             shutil.copy(f"/etc/{name}", self.at("etc", name))
         return self
@@ -116,7 +116,8 @@ def suite(top, release=None):
 
 
 class Dockerfile:
-    """docker/Dockerfile's stages, each made when it is needed. The instructions that are here are all that it may use."""
+    """docker/Dockerfile's stages, each made when it is needed. The instructions that are here are all that it may
+    use."""
 
     def __init__(self, top, release):
         self.top, self.release, self.stages, self.made = top, release, {}, {}

@@ -32,7 +32,8 @@ class Install(unittest.TestCase):
         cls.addClassCleanup(shutil.rmtree, cls.root)
         # As packagers do: into a folder that stands for the system's root.
         cls.prefix = cls.root / "opt" / "eventgan"
-        run("cmake", "--install", BUILD, "--prefix", "/opt/eventgan", env={**os.environ, "DESTDIR": str(cls.root)}, umask=0o022)
+        run("cmake", "--install", BUILD, "--prefix", "/opt/eventgan", env={**os.environ, "DESTDIR": str(cls.root)},
+            umask=0o022)
         cls.program = cls.prefix / "bin" / "eventgan"
         cls.help = run(cls.program, "--help")
         cls.commands = re.findall(r"(?m)^  ([a-z-]+) {2,}", cls.help.split("Subcommands:")[1])
@@ -66,7 +67,8 @@ class Install(unittest.TestCase):
         self.assertEqual(complete("eventgan help ver"), {"verify"})
         self.assertEqual(complete("eventgan convert --gr"), {"--grace"})
         self.assertEqual(complete("eventgan convert --progress l"), {"lines"})
-        self.assertEqual(complete("eventgan export --to "), {"yolo", "coco", "mpii", "davis", "webdataset", "events", "dsec", "rvt"})
+        self.assertEqual(complete("eventgan export --to "),
+                         {"yolo", "coco", "mpii", "davis", "webdataset", "events", "dsec", "rvt"})
         self.assertEqual(complete("eventgan convert he"), {"here.json"})
         for command in self.commands:
             options = set(re.findall(r"(?m)^  (?:-h,)?(--[a-z-]+)", run(self.program, command, "--help")))
@@ -74,9 +76,11 @@ class Install(unittest.TestCase):
 
     def test_pages_examples_and_schemas(self):
         pages = self.prefix / "share" / "eventgan"
-        for folder in ["manifests/examples", "manifests/schemas", "manifests/guides", "docker/slurm", "docker/kubernetes"]:
+        for folder in ["manifests/examples", "manifests/schemas", "manifests/guides", "docker/slurm",
+                       "docker/kubernetes"]:
             here, there = pages / folder, SOURCE / folder
-            installed, written = ({path.relative_to(top): path.read_bytes() for path in top.rglob("*") if path.is_file()}
+            installed, written = ({path.relative_to(top): path.read_bytes() for path in top.rglob("*")
+                                   if path.is_file()}
                                   for top in (here, there))
             self.assertEqual(installed, written)
         documents = list(pages.rglob("*.md"))
@@ -89,7 +93,8 @@ class Install(unittest.TestCase):
         self.assertIn("MIT License", (self.prefix / "share" / "doc" / "eventgan" / "copyright").read_text())
 
     def test_everybody_may_read_it(self):
-        installed = [path for folder in ("bin", "lib", "libexec", "share") for path in (self.prefix / folder).rglob("*")]
+        installed = [path for folder in ("bin", "lib", "libexec", "share")
+                     for path in (self.prefix / folder).rglob("*")]
         self.assertGreater(len(installed), 100)
         for path in installed:
             wanted = 0o055 if path.is_dir() or path.stat().st_mode & 0o100 else 0o044
@@ -99,14 +104,16 @@ class Install(unittest.TestCase):
         code = "import eventgan; print(eventgan.__file__, len(eventgan.Shards.__mro__))"
         if ENGINES:
             code += "; print(eventgan.Generator('untrained:2')([[0.0, 1.0]], [[1.0, 0.0]]).shape)"
-        said = run("/usr/bin/python3", "-B", "-c", code, cwd="/", env={"PYTHONPATH": str(self.prefix / "lib" / "python3" / "dist-packages")})
+        said = run("/usr/bin/python3", "-B", "-c", code, cwd="/",
+                   env={"PYTHONPATH": str(self.prefix / "lib" / "python3" / "dist-packages")})
         self.assertTrue(said.startswith(str(self.prefix)))
         self.assertEqual(said.splitlines()[1:], ["(18, 1, 2)"] * len(ENGINES))
 
     def test_nothing_else_is_installed(self):
         self.assertEqual([path.relative_to(self.root).as_posix() for path in self.root.glob("*/*")], ["opt/eventgan"])
         self.assertEqual({path.name for path in self.prefix.iterdir()} - {"files"}, {"bin", "libexec", "share", "lib"})
-        executables = [path for path in self.prefix.rglob("*") if path.is_file() and path.read_bytes()[:4] == b"\x7fELF"]
+        executables = [path for path in self.prefix.rglob("*") if path.is_file()
+                       and path.read_bytes()[:4] == b"\x7fELF"]
         self.assertEqual({path.relative_to(self.prefix).as_posix() for path in executables},
                          {"bin/eventgan", "libexec/eventgan/eventgan-torch", "libexec/eventgan/eventgan-video",
                           *(f"lib/python3/dist-packages/eventgan/{name}" for name in ENGINES)})
@@ -160,10 +167,12 @@ class Packages(unittest.TestCase):
             *(path.relative_to(package) for path in (package / "eventgan").glob("*.py*")),
             "eventgan/py.typed", *(f"eventgan/{name}" for name in ENGINES))})
         self.assertFalse([name for name in contents["eventgan"] if "dist-packages" in name])
-        self.assertFalse([name for name in contents["eventgan"] if "torch" in pathlib.PurePath(name).name and "libexec" in name])
+        self.assertFalse([name for name in contents["eventgan"] if "torch" in pathlib.PurePath(name).name
+                          and "libexec" in name])
 
     def test_dependencies_are_the_libraries_packages(self):
-        for package, executable in [("eventgan", "eventgan"), ("eventgan", "eventgan-video"), ("eventgan-torch", "eventgan-torch"),
+        for package, executable in [("eventgan", "eventgan"), ("eventgan", "eventgan-video"),
+                                    ("eventgan-torch", "eventgan-torch"),
                                     *(("python3-eventgan", f"python/eventgan/{name}") for name in ENGINES)]:
             self.assertLessEqual(loaded_packages(BUILD / executable), self.names(package, "Depends"))
         version = run(BUILD / "eventgan", "--version").split()[1]
@@ -192,7 +201,8 @@ class Packages(unittest.TestCase):
         self.assertEqual(self.field("python3-eventgan", "Replaces"), "eventgan")
 
     def test_only_one_needs_libtorch(self):
-        needing = [package for package in self.files if [name for name in self.names(package, "Depends") if name.startswith("libtorch")]]
+        needing = [package for package in self.files
+                   if [name for name in self.names(package, "Depends") if name.startswith("libtorch")]]
         self.assertEqual(needing, ["eventgan-torch"])
 
     def test_descriptions_are_well_formed(self):

@@ -86,7 +86,8 @@ class Kubernetes(unittest.TestCase):
     def test_disruptions_are_ignored_first(self):
         for job in self.jobs:
             first = job["spec"]["podFailurePolicy"]["rules"][0]
-            self.assertEqual(first, {"action": "Ignore", "onPodConditions": [{"type": "DisruptionTarget", "status": "True"}]})
+            self.assertEqual(first,
+                             {"action": "Ignore", "onPodConditions": [{"type": "DisruptionTarget", "status": "True"}]})
 
     def test_what_each_exit_code_does(self):
         codes = exit_codes()
@@ -119,7 +120,8 @@ class Kubernetes(unittest.TestCase):
     def test_arguments_are_the_programs(self):
         for job in self.jobs:
             command, *arguments = container(job)["args"]
-            self.assertTrue(all(isinstance(argument, str) for argument in arguments), "YAML must not make numbers of them")
+            self.assertTrue(all(isinstance(argument, str) for argument in arguments),
+                            "YAML must not make numbers of them")
             self.assertLessEqual({a for a in arguments if a.startswith("--")}, options_of(command))
         arguments = container(self.convert)["args"]
         folder = arguments[arguments.index("--output") + 1]
@@ -140,8 +142,10 @@ class Kubernetes(unittest.TestCase):
         self.assertEqual(self.volume["spec"]["accessModes"], ["ReadWriteMany"])
 
     def test_the_image_is_the_dockerfiles_and_has_no_rights(self):
-        user, group = re.search(r"^USER (\d+):(\d+)$", (SOURCE / "docker" / "Dockerfile").read_text(), re.MULTILINE).groups()
-        version = re.search(r'(?m)^version = "([\d.]+)"', (SOURCE / "manifests" / "python" / "pyproject.toml").read_text())[1]
+        user, group = re.search(r"^USER (\d+):(\d+)$",
+                                (SOURCE / "docker" / "Dockerfile").read_text(), re.MULTILINE).groups()
+        version = re.search(r'(?m)^version = "([\d.]+)"',
+                            (SOURCE / "manifests" / "python" / "pyproject.toml").read_text())[1]
         for job in self.jobs:
             security = pod(job)["securityContext"]
             self.assertEqual((security["runAsUser"], security["runAsGroup"]), (int(user), int(group)))

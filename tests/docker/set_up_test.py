@@ -54,7 +54,8 @@ class Script(unittest.TestCase):
             code, called, errors = self.run_on(system, "packages", "slurm", "package")
             self.assertEqual((code, errors), (0, ""))
             self.assertEqual([line.split()[1] for line in called], ["update", "install"])
-            self.assertTrue(called[1].endswith(" ".join(["--no-install-recommends", *listed("slurm"), *listed("package")])))
+            self.assertTrue(
+                called[1].endswith(" ".join(["--no-install-recommends", *listed("slurm"), *listed("package")])))
 
     def test_elsewhere_packages_says_what_to_do(self):
         names = {"ubuntu": "Ubuntu 24.04.2 LTS", "unstable": "Debian GNU/Linux forky/sid", None: os.uname().sysname}
@@ -62,7 +63,7 @@ class Script(unittest.TestCase):
             code, called, errors = self.run_on(system, "packages", "slurm")
             self.assertEqual((code, called), (1, []))
             self.assertRegex(errors, rf"\Aexpected Debian 12 or 13, got {re.escape(name)}: .* munge slurm-wlm, "
-                                     r".*docker build .*\n\Z")
+                             r".*docker build .*\n\Z")
 
     def test_elsewhere_what_is_there_is_built(self):
         code, called, errors = self.run_on("ubuntu", "package")
@@ -85,7 +86,8 @@ class Script(unittest.TestCase):
 
 
 def stages():
-    """The Dockerfile's stages by name, each a list of (instruction, rest), lines that go on joined; the last is None's."""
+    """The Dockerfile's stages by name, each a list of (instruction, rest), lines that go on joined;
+    the last is None's."""
     text = re.sub(r"\\\n\s*", "", (DOCKER / "Dockerfile").read_text())
     result = {}
     for line in text.splitlines():

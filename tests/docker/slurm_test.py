@@ -24,7 +24,8 @@ HEIGHT, WIDTH = 320, 480
 def slow_job(folder):
     """A manifest of SHARDS shards, seconds of work each: little data, compressed as hard as can be."""
     frames = SHARDS * SAMPLES_PER_SHARD + 1
-    moving_texture.write_images(folder / "frames" / "scene", [4 * index for index in range(frames)], HEIGHT, WIDTH, seed=3)
+    moving_texture.write_images(folder / "frames" / "scene", [4 * index for index in range(frames)], HEIGHT, WIDTH,
+                                seed=3)
     manifest = program.manifest(
         [{"dataset": "frames", "root": "frames", "pairs": program.pairs([1])}],
         image={"width": WIDTH, "height": HEIGHT, "preset": "mpii"}, generator={"kind": "difference"},
@@ -35,7 +36,8 @@ def slow_job(folder):
 
 
 def submit(*arguments):
-    """Sends a job through submit.sh; the ids of its arrays and of finalize. The line that it advises must run as it is."""
+    """Sends a job through submit.sh; the ids of its arrays and of finalize.
+    The line that it advises must run as it is."""
     out = command(SLURM / "submit.sh", *arguments, EVENTGAN=program.PROGRAM)
     advised = shlex.split(re.search(r"^look: (.+)$", out, re.MULTILINE)[1])
     assert advised[:2] == [program.PROGRAM, "status"] and len(advised) == 3, out
@@ -44,7 +46,8 @@ def submit(*arguments):
 
 
 def start_soon(task):
-    """Slurm lets a requeued job wait for two minutes. Not at once, since a node refuses a job that it ended in the same second."""
+    """Slurm lets a requeued job wait for two minutes. Not at once, since a node refuses a job that it ended in the same
+    second."""
     wait_until(f"{task} pending", lambda: state(task) == "PENDING")
     command("scontrol", "update", f"JobId={task}", "StartTime=now+3seconds")
 
@@ -84,7 +87,8 @@ class Slurm(unittest.TestCase):
         for task in range(SHARDS):
             self.finished(f"{array}_{task}")
             self.assertEqual(field(f"{array}_{task}", "Restarts"), str(int(task in (1, 2))))
-        log = {task: (self.folder / "manifest-logs" / f"convert-{array}_{task}.log").read_text() for task in range(SHARDS)}
+        log = {task: (self.folder / "manifest-logs" / f"convert-{array}_{task}.log").read_text()
+               for task in range(SHARDS)}
         for task, restarted in [(0, False), (1, True), (2, True), (3, False)]:
             self.assertEqual(re.findall(r"exit code (\d+)", log[task]), ["75", "0"] if restarted else ["0"], log[task])
         self.assertIn("forwards USR1", log[2])
@@ -118,8 +122,8 @@ class Slurm(unittest.TestCase):
 
     def fails_once(self, code, *arguments):
         log = self.folder / f"log-{code}"
-        job = command("sbatch", "--parsable", "--array=0", f"--output={log}".replace("%", "%%"), SLURM / "convert.sbatch",
-                      *arguments, EVENTGAN=program.PROGRAM).strip()
+        job = command("sbatch", "--parsable", "--array=0", f"--output={log}".replace("%", "%%"),
+                      SLURM / "convert.sbatch", *arguments, EVENTGAN=program.PROGRAM).strip()
         task = f"{job}_0"
         wait_until(f"{task} failed", lambda: state(task) == "FAILED")
         self.assertEqual(field(task, "ExitCode"), f"{code}:0", log.read_text())
@@ -128,8 +132,8 @@ class Slurm(unittest.TestCase):
     def test_finalize_says_what_is_missing(self):
         manifest = small_job.small_job(self.folder)
         command(program.PROGRAM, "convert", manifest, "--shards", "0/2")
-        job = command("sbatch", "--parsable", f"--output={self.folder}/log".replace("%", "%%"), SLURM / "finalize.sbatch",
-                      self.folder / "out", EVENTGAN=program.PROGRAM).strip()
+        job = command("sbatch", "--parsable", f"--output={self.folder}/log".replace("%", "%%"),
+                      SLURM / "finalize.sbatch", self.folder / "out", EVENTGAN=program.PROGRAM).strip()
         wait_until("finalize failed", lambda: state(job) == "FAILED")
         self.assertEqual(field(job, "ExitCode"), "1:0")
         self.assertIn("-00001-of-", (self.folder / "log").read_text())

@@ -23,7 +23,8 @@ def sections_of(page):
     """Title → rows of its tables, each a list of cells."""
     found = {}
     for title, body in re.findall(r"(?ms)^## (.+?)\n(.*?)(?=^## |\Z)", page):
-        rows = [line.strip("| ").split(" | ") for line in body.splitlines() if line.startswith("|") and not line.startswith("| ---")]
+        rows = [line.strip("| ").split(" | ") for line in body.splitlines() if line.startswith("|")
+                and not line.startswith("| ---")]
         found[title] = rows
     return found
 
@@ -31,7 +32,8 @@ def sections_of(page):
 class Benchmarks(program.InFolder):
     def run_all(self, *arguments, environment=None):
         build = pathlib.Path(program.PROGRAM).parent
-        done = subprocess.run([sys.executable, BENCHMARKS / "run.py", "--trial", "--build", build, "--out", self.folder, *arguments],
+        done = subprocess.run([sys.executable, BENCHMARKS / "run.py", "--trial", "--build", build, "--out", self.folder,
+                               *arguments],
                               capture_output=True, text=True, env=environment)
         self.assertEqual(done.returncode, 0, done.stderr)
         return (self.folder / "benchmarks.md").read_text()
@@ -39,8 +41,10 @@ class Benchmarks(program.InFolder):
     def test_every_part_fills_its_tables(self):
         page = self.run_all(environment=DATASET_FREE)
         sections = sections_of(page)
-        self.assertEqual(list(sections), ["Engines", "Generators against threads within one", "Layers", "Numbers at the extremes", "Stages",
-                                          "The whole conversion", "Against the image's size", "Against the number of pairs", "Against threads", "Storage", "Reading",
+        self.assertEqual(list(sections), ["Engines", "Generators against threads within one", "Layers",
+                                          "Numbers at the extremes", "Stages",
+                                          "The whole conversion", "Against the image's size",
+                                          "Against the number of pairs", "Against threads", "Storage", "Reading",
                                           "On the fly", "The call in Python", "Slow disk", "Scope", "Beside v2e"])
         self.assertEqual(sections.pop("Beside v2e"), [])
         if "Skipped: no compiled module" in page:
@@ -80,9 +84,11 @@ class Benchmarks(program.InFolder):
             self.assertIn("shipped:8 float32, by eventgan.Generator", times)
         scores = {row[0]: dict(zip(headings[-1], row)) for row in rows[rows.index(headings[-1]) + 1:]}
         self.assertEqual(scores["real"]["F1 over time"], "1")
-        self.assertEqual(scores["v2e, pair by pair"], scores["v2e, as one video"] | {"made by": "v2e, pair by pair"})  # one pair
+        # one pair
+        self.assertEqual(scores["v2e, pair by pair"], scores["v2e, as one video"] | {"made by": "v2e, pair by pair"})
         for contender in ("v2e, pair by pair", "difference", "shipped:8 float32"):
-            self.assertTrue(0.5 < float(scores[contender]["F1 over time"]) < 0.7, scores[contender])  # esim, of another motion, has 0.3
+            # esim, of another motion, has 0.3
+            self.assertTrue(0.5 < float(scores[contender]["F1 over time"]) < 0.7, scores[contender])
 
     @unittest.skipUnless(SHARED.is_dir(), "no ../shared/data")
     def test_the_baseline_is_the_published_network(self):
@@ -93,7 +99,8 @@ class Benchmarks(program.InFolder):
         with h5py.File(SHARED / "golden" / "golden.h5") as golden, torch.no_grad():
             group = golden["generator"]
             network = eager_baseline.Generator(int(group.attrs["base_channels"])).eval()
-            network.load_state_dict(folded({name: torch.from_numpy(data[...]) for name, data in group["state"].items()}))
+            network.load_state_dict(
+                folded({name: torch.from_numpy(data[...]) for name, data in group["state"].items()}))
             for case in (name for name in group if name != "state"):
                 volume = network(torch.from_numpy(group[case]["input"][:])[None])[0]
                 expected = torch.from_numpy(group[case]["volume"][:])

@@ -1,4 +1,5 @@
-"""A camera's own events as a source of `convert`: their volumes, labels and times as numpy has them, and what goes wrong with them."""
+"""A camera's own events as a source of `convert`: their volumes, labels and times as numpy has them,
+and what goes wrong with them."""
 
 import json
 import os
@@ -13,8 +14,8 @@ import h5py
 import numpy as np
 
 import program
-from camera_files import (BBOX, DHP19_JOINTS, DHP19_MATRICES, HEIGHT, WIDTH, random_events, volume_of, whole_microseconds, write_columns,
-                          write_dhp19, write_mvsec)
+from camera_files import (BBOX, DHP19_JOINTS, DHP19_MATRICES, HEIGHT, WIDTH, random_events, volume_of,
+                          whole_microseconds, write_columns, write_dhp19, write_mvsec)
 from program import PACKAGE, SHARED, run, shard_bytes, text
 
 sys.path.insert(0, str(PACKAGE))
@@ -46,9 +47,11 @@ def rows(out):
                 samples[text(name)] = {
                     "volume": shard["events/volume"][i], "flags": shard["events/statistics/flags"][i],
                     "times": [shard[f"pairs/{key}"][i] for key in ("prev_time_s", "next_time_s")],
-                    "gap": (shard["pairs/gap_frames"][i], shard["pairs/gap_s"][i]), "place": shard["pairs/label_position"][i],
+                    "gap": (shard["pairs/gap_frames"][i], shard["pairs/gap_s"][i]),
+                    "place": shard["pairs/label_position"][i],
                     "xyxy": boxes["xyxy"][own], "ignore": boxes["ignore"][own],
-                    "difficulty": boxes["difficulty"][own] if "difficulty" in boxes else np.full(own.stop - own.start, -1)}
+                    "difficulty": boxes["difficulty"][own] if "difficulty" in boxes
+                    else np.full(own.stop - own.start, -1)}
     return samples
 
 
@@ -61,7 +64,8 @@ class Recordings(program.InFolder):
         self.out = self.folder / "out"
 
     def manifest(self, source=(), **changes):
-        return self.write_manifest(events_manifest({"dataset": "recording", "root": "drive.hdf5", **dict(source)}, **changes))
+        return self.write_manifest(events_manifest({"dataset": "recording", "root": "drive.hdf5", **dict(source)},
+                                                   **changes))
 
     def between(self, begin, end):
         times = self.events[:, 2]
@@ -71,10 +75,12 @@ class Recordings(program.InFolder):
         stdout, stderr = run("convert", self.manifest())
         self.assertIn("4 of 4 pairs written, 0 quarantined", stdout)
         samples = rows(self.out)
-        self.assertEqual(list(samples), ["drive/0000000010.100000", "drive/0000000010.170000", "drive/0000000010.300000",
-                                         "drive/0000000010.350000"])
+        self.assertEqual(list(samples),
+                         ["drive/0000000010.100000", "drive/0000000010.170000", "drive/0000000010.300000",
+                          "drive/0000000010.350000"])
         first, between, silent, empty = samples.values()
-        for sample, begin, end in [(first, FRAMES[1], FRAMES[2]), (between, 10.12, 10.17), (silent, FRAMES[5], FRAMES[6])]:
+        for sample, begin, end in [(first, FRAMES[1], FRAMES[2]), (between, 10.12, 10.17),
+                                   (silent, FRAMES[5], FRAMES[6])]:
             np.testing.assert_allclose(sample["times"], [begin, end], rtol=0, atol=1e-9)
             np.testing.assert_allclose(sample["volume"], volume_of(self.between(begin, end)), rtol=0, atol=1e-5)
             self.assertEqual((sample["gap"][0], sample["place"]), (0, 1))
@@ -97,10 +103,12 @@ class Recordings(program.InFolder):
                  {"image_id": "drive/0000000010.100000", "category_id": "car", "bbox": [0, 15, 9, 9], "score": 0.8},
                  {"image_id": "drive/0000000010.300000", "category_id": "car", "bbox": [5, 5, 15, 15], "score": 0.7}]
         (self.folder / "found.json").write_text(json.dumps(found))
-        report, _, _ = evaluate.evaluate_detections(self.folder / "found.json", evaluate.Samples(self.out, None, None, None))
+        report, _, _ = evaluate.evaluate_detections(self.folder / "found.json",
+                                                    evaluate.Samples(self.out, None, None, None))
         car = report["classes"]["car"]
         self.assertEqual((car["truths"], car["easy"], car["hard"]), (4, 2, 2))
-        self.assertEqual((car["recall_easy"], car["recall_hard"], car["precision"]), (0.5, 0.5, 1.0))  # what is on "dont_care" counts nothing
+        # what is on "dont_care" counts nothing
+        self.assertEqual((car["recall_easy"], car["recall_hard"], car["precision"]), (0.5, 0.5, 1.0))
 
     def greys_shown(self, *where):
         """How many pixels of each image that preview draws of `where` have the one grey of some recordings."""
@@ -111,7 +119,8 @@ class Recordings(program.InFolder):
         return [[int((image == grey).all(-1).sum()) for grey in (91, 155, 203)] for image in drawn], warned
 
     def test_a_sample_leads_to_the_frames_of_its_own_source(self):
-        # Two cameras of one file; and a folder whose name begins as the file's, in which the time of each frame is another.
+        # Two cameras of one file; and a folder whose name begins as the file's, in which the time of each frame is
+        # another.
         (self.folder / "drive.csv").unlink()
         with h5py.File(self.folder / "drive.hdf5", "r+") as file:
             for camera, grey in {"left": 91, "right": 203}.items():
@@ -125,7 +134,8 @@ class Recordings(program.InFolder):
         for k in range(len(FRAMES)):
             cv2.imwrite(str(images / f"{k}.png"), np.full((HEIGHT, WIDTH), 155, np.uint8))
         (self.folder / "driv" / "images.txt").write_text("".join(f"{t} images/{k}.png\n" for k, t in enumerate(FRAMES)))
-        np.savetxt(self.folder / "driv" / "events.txt", self.events[:, [2, 0, 1, 3]].clip(0), fmt=["%.9f", "%d", "%d", "%d"])
+        np.savetxt(self.folder / "driv" / "events.txt", self.events[:, [2, 0, 1, 3]].clip(0),
+                   fmt=["%.9f", "%d", "%d", "%d"])
         sources = [{"dataset": "recording", "root": "driv"}] + [
             {"dataset": "recording", "root": "drive.hdf5", "camera": camera} for camera in ("left", "right")]
         run("convert", self.write_manifest({**events_manifest({}, output={"directory": "out", "samples_per_shard": 9}),
@@ -162,7 +172,8 @@ class Recordings(program.InFolder):
             np.testing.assert_allclose(sample["volume"], volume_of(window), rtol=0, atol=1e-5)
 
     def test_events_are_placed_and_normalised_as_frames_are(self):
-        run("convert", self.manifest(image={"width": 40, "height": 16, "fit": "letterbox"}, volume={"normalize": "eta98"}))
+        run("convert",
+            self.manifest(image={"width": 40, "height": 16, "fit": "letterbox"}, volume={"normalize": "eta98"}))
         sample = rows(self.out)["drive/0000000010.100000"]
         # 32x24 in 40x16: by 16/24 to 21x16, with 9 columns of border to the left.
         window = self.between(FRAMES[1], FRAMES[2]).copy()
@@ -179,7 +190,8 @@ class Recordings(program.InFolder):
         index = int(np.searchsorted(self.events[:, 2], 10.08))
         with h5py.File(self.folder / "drive.hdf5", "r+") as file:
             file["davis/left/events"][index, 0] = WIDTH
-        labels = LABELS.replace("10.170000,5,5,20,20", "10.170000,50,5,60,20") + "99,1,1,2,2,car,easy\n"  # outside, in place and time
+        # outside, in place and time
+        labels = LABELS.replace("10.170000,5,5,20,20", "10.170000,50,5,60,20") + "99,1,1,2,2,car,easy\n"
         (self.folder / "drive.csv").write_text(labels)
         run("convert", self.manifest(**lenient))
         reasons = {entry["sample_id"]: entry["reason"] for path in self.out.glob("job-*.json")
@@ -246,9 +258,11 @@ class Recordings(program.InFolder):
     def test_what_does_not_go_together_is_one_line(self):
         frames = {"dataset": "frames", "root": "clip", "pairs": program.pairs([1])}
         for manifest, expected in [(events_manifest(frames), 'since generator.kind is "events"'),
-                                   (events_manifest({"dataset": "recording", "root": "drive.hdf5"}, generator={"kind": "difference"}),
+                                   (events_manifest({"dataset": "recording", "root": "drive.hdf5"},
+                                                    generator={"kind": "difference"}),
                                     'since generator.kind is not "events"'),
-                                   (events_manifest({"dataset": "recording", "root": "drive.hdf5", "pairs": program.pairs([1])}),
+                                   (events_manifest({"dataset": "recording", "root": "drive.hdf5",
+                                                     "pairs": program.pairs([1])}),
                                     "whose samples are windows of events"),
                                    (events_manifest({"dataset": "recordings", "root": "drive.hdf5"}), '"recording"')]:
             self.assertIn(expected, run("plan", self.write_manifest(manifest), expect=64)[1])
@@ -267,8 +281,10 @@ class Recordings(program.InFolder):
         samples = list(rows(self.out).values())
         self.assertEqual([round(float(sample["volume"].sum())) for sample in samples], [7778, 11318])
         for sample in samples:
-            window = rows_of_file[(rows_of_file[:, 0] > sample["times"][0]) & (rows_of_file[:, 0] <= sample["times"][1])]
-            np.testing.assert_allclose(sample["volume"], volume_of(window[:, [1, 2, 0, 3]], height=180, width=240), rtol=0, atol=1e-5)
+            window = rows_of_file[(rows_of_file[:, 0] > sample["times"][0])
+                                  & (rows_of_file[:, 0] <= sample["times"][1])]
+            np.testing.assert_allclose(sample["volume"], volume_of(window[:, [1, 2, 0, 3]], height=180, width=240),
+                                       rtol=0, atol=1e-5)
 
 
 class WithoutFrames(program.InFolder):
@@ -293,7 +309,8 @@ class WithoutFrames(program.InFolder):
         self.assertEqual(len(samples), count)
         held = 0
         for k, sample in enumerate(samples.values()):
-            np.testing.assert_allclose(sample["times"], [begin + k * length, begin + (k + 1) * length], rtol=0, atol=1e-9)
+            np.testing.assert_allclose(sample["times"], [begin + k * length, begin + (k + 1) * length], rtol=0,
+                                       atol=1e-9)
             window = events[(events[:, 2] > begin + k * length) & (events[:, 2] <= begin + (k + 1) * length)]
             np.testing.assert_allclose(sample["volume"], volume_of(window), rtol=0, atol=1e-4)
             held += len(window)
@@ -301,7 +318,8 @@ class WithoutFrames(program.InFolder):
         self.assertIn("sound", run("verify", self.out, "--deep")[0])
 
     def test_dsec(self):
-        write_columns(self.folder / "seq/events/left/events.h5", self.events, offset=int(self.ticks[0]) - 700, compression="gzip")
+        write_columns(self.folder / "seq/events/left/events.h5", self.events, offset=int(self.ticks[0]) - 700,
+                      compression="gzip")
         told = self.convert("seq", sensor=self.SENSOR)[0]
         self.assertIn("7 of 7 pairs written, 0 quarantined", told)
         self.check_windows(self.events)
@@ -351,8 +369,8 @@ class WithoutFrames(program.InFolder):
         if not plugins:
             self.skipTest("no hdf5-filter-plugin-blosc-serial")
         file = self.folder / "seq/events/left/events.h5"
-        write = ("import pickle, sys; from camera_files import *; "
-                 "write_columns(*pickle.load(sys.stdin.buffer), offset=0, compression=32001, compression_opts=(0, 0, 0, 0, 5, 1, 5))")
+        write = ("import pickle, sys; from camera_files import *; write_columns(*pickle.load(sys.stdin.buffer), "
+                 "offset=0, compression=32001, compression_opts=(0, 0, 0, 0, 5, 1, 5))")
         subprocess.run([sys.executable, "-c", write], check=True, input=pickle.dumps((file, self.events)),
                        cwd=pathlib.Path(__file__).parent, env={**os.environ, "HDF5_PLUGIN_PATH": str(plugins[0])})
         self.convert("seq", sensor=self.SENSOR)
@@ -360,12 +378,14 @@ class WithoutFrames(program.InFolder):
         empty = self.folder / "empty"
         empty.mkdir()
         error = run("plan", self.folder / "manifest.json", expect=66, environment={"HDF5_PLUGIN_PATH": str(empty)})[1]
-        self.assertIn("expected HDF5's filter Blosc to be installed, got none (apt-get install hdf5-filter-plugin-blosc-serial)", error)
+        self.assertIn("expected HDF5's filter Blosc to be installed, got none (apt-get install "
+                      "hdf5-filter-plugin-blosc-serial)", error)
 
     def test_m3ed(self):
         late = self.events[self.events[:, 2] > 20.1]
         for camera, events in {"left": self.events, "right": late}.items():
-            write_columns(self.folder / f"{camera}.h5", events - [0, 0, 20, 0], f"prophesee/{camera}", f"prophesee/{camera}/ms_map_idx")
+            write_columns(self.folder / f"{camera}.h5", events - [0, 0, 20, 0], f"prophesee/{camera}",
+                          f"prophesee/{camera}/ms_map_idx")
         with h5py.File(self.folder / "left.h5", "a") as file, h5py.File(self.folder / "right.h5") as right:
             right.copy("prophesee/right", file["prophesee"])
             for camera in ("left", "right"):
@@ -378,15 +398,16 @@ class WithoutFrames(program.InFolder):
             self.check_windows(whole_microseconds(events - [0, 0, 20, 0])[0])
 
     def test_tables(self):
-        columns = {"t_us": self.ticks, "x": self.events[:, 0].astype(np.uint16), "y": self.events[:, 1].astype(np.uint16),
-                   "p": (self.events[:, 3] > 0).astype(np.uint8)}
+        columns = {"t_us": self.ticks, "x": self.events[:, 0].astype(np.uint16),
+                   "y": self.events[:, 1].astype(np.uint16), "p": (self.events[:, 3] > 0).astype(np.uint8)}
         structured = np.zeros(len(self.ticks), [(name, values.dtype) for name, values in columns.items()])
         for name, values in columns.items():
             structured[name] = values
         np.save(self.folder / "a.npy", structured)
         np.savez(self.folder / "b.npz", **columns)
         np.savez_compressed(self.folder / "c.npz", **columns)
-        np.savetxt(self.folder / "d.csv", np.stack(list(columns.values()), 1), fmt="%d", delimiter=",", header=",".join(columns), comments="")
+        np.savetxt(self.folder / "d.csv", np.stack(list(columns.values()), 1), fmt="%d", delimiter=",",
+                   header=",".join(columns), comments="")
         for name in ("a.npy", "b.npz", "c.npz", "d.csv"):
             self.convert(name, sensor=self.SENSOR, columns={"t": "t_us"})
             self.check_windows(self.events)
@@ -394,7 +415,8 @@ class WithoutFrames(program.InFolder):
         self.convert("e.npy", sensor=self.SENSOR, columns={"unit": "s"})
         self.check_windows(self.events)
         self.assertIn("expected the sensor's size", self.convert("e.npy", expect=66)[1])
-        self.assertIn("expected window_s, or labels, since the recording has no frames", self.refused({"root": "e.npy", "sensor": self.SENSOR}))
+        self.assertIn("expected window_s, or labels, since the recording has no frames",
+                      self.refused({"root": "e.npy", "sensor": self.SENSOR}))
 
     def refused(self, source):
         return run("plan", self.write_manifest(events_manifest({"dataset": "recording", **source})), expect=66)[1]
@@ -405,7 +427,8 @@ class WithoutFrames(program.InFolder):
         halves = [self.events[:2000], self.events[2000:]]
         for name, half in zip("ab", halves):
             t, x, y, p = half[:, 2], half[:, 0], half[:, 1], half[:, 3] > 0
-            np.savez(folder / f"{name}.npz", t_us=np.round(t * 1e6).astype(np.int64), x=x.astype(np.int16), y=y.astype(np.int16), p=p)
+            np.savez(folder / f"{name}.npz", t_us=np.round(t * 1e6).astype(np.int64), x=x.astype(np.int16),
+                     y=y.astype(np.int16), p=p)
             (folder / f"{name}.csv").write_text(HEADER + f"{t[-1]:.6f},2,3,12,13,person,easy\n")
         self.convert("windows", sensor=self.SENSOR, columns={"t": "t_us"}, window_s=1)
         samples = rows(self.out)
@@ -417,7 +440,8 @@ class WithoutFrames(program.InFolder):
     def test_prophesees_boxes(self):
         write_columns(self.folder / "drive_td.h5", self.events, size=(HEIGHT, WIDTH), compression="gzip")
         boxes = np.zeros(3, BBOX)
-        boxes[:] = [(20_100_000, 2, 3, 10.5, 7, 0, 5, 1), (20_100_000, 4, 4, 4, 4, 2, 6, 0.5), (20_300_000, 0, 0, 32, 24, 2, 6, 1)]
+        boxes[:] = [(20_100_000, 2, 3, 10.5, 7, 0, 5, 1), (20_100_000, 4, 4, 4, 4, 2, 6, 0.5),
+                    (20_300_000, 0, 0, 32, 24, 2, 6, 1)]
         np.save(self.folder / "drive_bbox.npy", boxes)
         (self.folder / "label_map_dictionary.json").write_text('{"0": "pedestrian", "1": "two wheeler", "2": "car"}')
         self.convert("drive_td.h5")
@@ -461,8 +485,10 @@ class WithoutFrames(program.InFolder):
         self.assertIn(expected, run("tradeoff", manifest, "--real", self.folder / "seq", expect=66)[1])
 
     def test_prophesees_events(self):
-        x, y, positive = (self.events[:, 0].astype(int), self.events[:, 1].astype(int), (self.events[:, 3] > 0).astype(int))
-        header = f"% Data file containing CD events\n% Version 2\n% Height {HEIGHT}\n% Width {WIDTH}\n".encode() + b"\x0c\x08"
+        x, y, positive = (self.events[:, 0].astype(int), self.events[:, 1].astype(int),
+                          (self.events[:, 3] > 0).astype(int))
+        header = (f"% Data file containing CD events\n% Version 2\n% Height {HEIGHT}\n% Width {WIDTH}\n".encode()
+                  + b"\x0c\x08")
         words = np.stack([self.ticks, x | y << 14 | positive << 28], 1).astype("<u4")
         (self.folder / "gen1_td.dat").write_bytes(header + words.tobytes())
         self.convert("gen1_td.dat")
@@ -496,14 +522,17 @@ class Dhp19(program.InFolder):
                     first = 7500 * int(number)
                     with h5py.File(self.folder / "dhp19/DVS_movies/S1/session1/mov1.h5") as file:
                         group = file[f"cam{camera}"]
-                        x, y, t, p = (group[key][0, first:first + 7500].astype(float) for key in ("x", "y", "timeStamp", "polarity"))
+                        x, y, t, p = (group[key][0, first:first + 7500].astype(float)
+                                      for key in ("x", "y", "timeStamp", "polarity"))
                     expected = volume_of(np.stack([x, y, t * 1e-6, 2 * p - 1], 1), height=260, width=346)
                     np.testing.assert_allclose(shard["events/volume"][i], expected, rtol=0, atol=1e-4)
-                    np.testing.assert_allclose([shard["pairs/prev_time_s"][i], shard["pairs/next_time_s"][i]], t[[0, -1]] * 1e-6)
+                    np.testing.assert_allclose([shard["pairs/prev_time_s"][i], shard["pairs/next_time_s"][i]],
+                                               t[[0, -1]] * 1e-6)
                     begin, end = (int(time // 10000) for time in t[[0, -1]])
                     mean = np.array([poses[joint][begin:end + 1].mean(0) for joint in DHP19_JOINTS])
                     u, v, w = DHP19_MATRICES[int(camera)] @ np.c_[mean, np.ones(13)].T
-                    np.testing.assert_allclose(shard["labels/poses/joints"][i], np.stack([u / w, 260 - v / w], 1), atol=1e-9)
+                    np.testing.assert_allclose(shard["labels/poses/joints"][i], np.stack([u / w, 260 - v / w], 1),
+                                               atol=1e-9)
                     self.assertEqual(text(shard["pairs/camera"][i]), camera)
                     count += 1
         self.assertEqual(count, 4)  # two whole windows of two cameras of S1, which alone is for training

@@ -10,7 +10,8 @@ HEIGHT, WIDTH = 24, 32
 def random_events(count, begin, end, seed, height=HEIGHT, width=WIDTH):
     """[count, 4] float64: x, y, t in seconds, p = -1 or +1; times ascend."""
     random = np.random.default_rng(seed)
-    return np.stack([random.integers(0, width, count), random.integers(0, height, count), np.sort(random.uniform(begin, end, count)),
+    return np.stack([random.integers(0, width, count), random.integers(0, height, count),
+                     np.sort(random.uniform(begin, end, count)),
                      random.choice([-1, 1], count)], axis=1).astype(np.float64)
 
 
@@ -38,7 +39,8 @@ def write_columns(path, events, group="events", index="ms_to_idx", offset=None, 
     ticks = whole_microseconds(events)[1] - (offset or 0)
     with h5py.File(path, "w") as file:
         for name, values in {"x": events[:, 0].astype(np.uint16), "y": events[:, 1].astype(np.uint16),
-                             "t": ticks.astype(np.int64 if size or group != "events" else np.uint32), "p": (events[:, 3] > 0).astype(np.uint8)}.items():
+                             "t": ticks.astype(np.int64 if size or group != "events" else np.uint32),
+                             "p": (events[:, 3] > 0).astype(np.uint8)}.items():
             file.create_dataset(f"{group}/{name}", data=values, chunks=(1000,), **filters)
         if size:
             file["events/height"], file["events/width"] = size
@@ -49,10 +51,13 @@ def write_columns(path, events, group="events", index="ms_to_idx", offset=None, 
             file["t_offset"] = np.int64(offset)
 
 
-BBOX = [("t", "<u8"), ("x", "<f4"), ("y", "<f4"), ("w", "<f4"), ("h", "<f4"), ("class_id", "u1"), ("track_id", "<u4"), ("class_confidence", "<f4")]
+BBOX = [("t", "<u8"), ("x", "<f4"), ("y", "<f4"), ("w", "<f4"), ("h", "<f4"), ("class_id", "u1"), ("track_id", "<u4"),
+        ("class_confidence", "<f4")]
 
-DHP19_JOINTS = ["head", "shoulderR", "shoulderL", "elbowR", "elbowL", "hipR", "hipL", "handR", "handL", "kneeR", "kneeL", "footR", "footL"]
-DHP19_MATRICES = {camera: np.array([[200.0 + camera, 0, 173, 346000], [0, 200, 130, 260000], [0, 0, 1, 2000]]) for camera in range(4)}
+DHP19_JOINTS = ["head", "shoulderR", "shoulderL", "elbowR", "elbowL", "hipR", "hipL", "handR", "handL", "kneeR",
+                "kneeL", "footR", "footL"]
+DHP19_MATRICES = {camera: np.array([[200.0 + camera, 0, 173, 346000], [0, 200, 130, 260000], [0, 0, 1, 2000]])
+                  for camera in range(4)}
 
 
 def write_dhp19(root, recordings=("S1_1_1", "S13_2_3"), events=20000, seconds=1.0):
@@ -75,7 +80,8 @@ def write_dhp19(root, recordings=("S1_1_1", "S13_2_3"), events=20000, seconds=1.
                 file[f"cam{camera}/polarity"] = (rows[None, :, 3] > 0).astype(np.uint8)
         random = np.random.default_rng(100 + number)
         steps = int(seconds * 100)
-        poses[recording] = {joint: random.uniform(-600, 600, 3) + random.normal(0, 5, (steps, 3)).cumsum(0) for joint in DHP19_JOINTS}
+        poses[recording] = {joint: random.uniform(-600, 600, 3) + random.normal(0, 5, (steps, 3)).cumsum(0)
+                            for joint in DHP19_JOINTS}
         (root / "Vicon_data").mkdir(exist_ok=True)
         scipy.io.savemat(root / "Vicon_data" / f"{recording}.mat", {"XYZPOS": poses[recording]})
     return poses

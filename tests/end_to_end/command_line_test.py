@@ -43,9 +43,9 @@ def folded_network():
 class CommandLine(program.InFolder):
     def test_every_command_has_help(self):
         out, _ = run("--help")
-        for command in ["init", "convert", "plan", "status", "retry", "finalize", "verify", "inspect", "preview", "make-demo",
-                        "import-weights", "calibrate", "simulate", "train", "realism", "fit", "tradeoff", "export",
-                        "report"]:
+        for command in ["init", "convert", "plan", "status", "retry", "finalize", "verify", "inspect", "preview",
+                        "make-demo", "import-weights", "calibrate", "simulate", "train", "realism", "fit", "tradeoff",
+                        "export", "report"]:
             self.assertIn(command, out)
             self.assertIn("Usage", run(command, "--help")[0])
 
@@ -64,22 +64,26 @@ class CommandLine(program.InFolder):
     def test_what_loads_slowly_is_in_programs_of_their_own(self):
         """LibTorch takes twenty times as long as all that `eventgan` loads, FFmpeg as long."""
         libraries = subprocess.run(["ldd", program.PROGRAM], check=True, capture_output=True, text=True).stdout
-        self.assertEqual(re.findall(r"(?m)^\s*(lib(?:torch|avcodec|opencv_imgcodecs|opencv_videoio)\w*)", libraries), [])
-        version = subprocess.run([program.PROGRAM + "-torch", "--version"], check=True, capture_output=True, text=True).stdout
+        self.assertEqual(re.findall(r"(?m)^\s*(lib(?:torch|avcodec|opencv_imgcodecs|opencv_videoio)\w*)", libraries),
+                         [])
+        version = subprocess.run([program.PROGRAM + "-torch", "--version"], check=True,
+                                 capture_output=True, text=True).stdout
         self.assertRegex(version, r"libtorch_cpu\.so\.\d+\.\d+")
 
     def test_what_needs_libtorch_is_handed_over(self):
-        """Where a package has it, with the same arguments and messages; without the package one line says which it is."""
+        """Where a package has it, with the same arguments and messages;
+        without the package one line says which it is."""
         installed = self.folder / "bin" / "eventgan"
         installed.parent.mkdir()
         shutil.copy(program.PROGRAM, installed)
-        jobs = [["convert", small_job(self.folder, generator={"weights": "untrained:2", "engine": "torch"}), "--progress", "none"],
+        jobs = [["convert", small_job(self.folder, generator={"weights": "untrained:2", "engine": "torch"}),
+                 "--progress", "none"],
                 ["train", program.SOURCE / "manifests" / "examples" / "train.json"]]
         for arguments in jobs:
             done = subprocess.run([installed, *arguments], capture_output=True, text=True)
             self.assertEqual(done.returncode, 1, done.stderr)
             self.assertEqual(done.stderr, "error: expected eventgan-torch, got none in "
-                                          f"{self.folder}/libexec/eventgan: install the package eventgan-torch\n")
+                             f"{self.folder}/libexec/eventgan: install the package eventgan-torch\n")
             self.assertEqual(done.stdout, "")
         self.assertFalse((self.folder / "out").exists())
         with_torch = self.folder / "libexec" / "eventgan" / "eventgan-torch"
@@ -93,14 +97,17 @@ class CommandLine(program.InFolder):
         with_torch.unlink()
         with_torch.write_text("no program")
         done = subprocess.run([linked, *jobs[0]], capture_output=True, text=True)
-        self.assertEqual((done.returncode, done.stderr), (1, f"error: expected to run {with_torch}, got 'Permission denied'\n"))
+        self.assertEqual((done.returncode, done.stderr),
+                         (1, f"error: expected to run {with_torch}, got 'Permission denied'\n"))
 
     def test_videos_are_handed_over_and_everything_is_told_once(self):
         write_video(self.folder / "clip.mp4", 4)
         run("init", self.folder / "clip.mp4", "--out", self.folder / "m.json")
         out, err = run("convert", self.folder / "m.json", "--output", self.folder / "out")
-        self.assertEqual((err.count("generator: "), err.count("warning: "), out.count("3 of 3 pairs written")), (1, 1, 1), err)
-        self.assertIn(", FFmpeg ", json.loads((self.folder / "out" / "plan.json").read_text())["fingerprint"]["libraries"])
+        self.assertEqual((err.count("generator: "), err.count("warning: "), out.count("3 of 3 pairs written")),
+                         (1, 1, 1), err)
+        self.assertIn(", FFmpeg ",
+                      json.loads((self.folder / "out" / "plan.json").read_text())["fingerprint"]["libraries"])
         alone = self.folder / "eventgan"
         shutil.copy(program.PROGRAM, alone)
         done = subprocess.run([alone, "plan", self.folder / "m.json"], capture_output=True, text=True)
@@ -109,7 +116,8 @@ class CommandLine(program.InFolder):
 
     def test_mistyped_words_get_the_nearest(self):
         for arguments, got, meant in [
-                (["conver"], "conver", "convert"), (["stauts"], "stauts", "status"), (["help", "inspct"], "inspct", "inspect"),
+                (["conver"], "conver", "convert"), (["stauts"], "stauts", "status"),
+                (["help", "inspct"], "inspct", "inspect"),
                 (["convert", "a.json", "--thread", "3"], "--thread", "--threads"),
                 (["convert", "a.json", "--thraeds=3"], "--thraeds", "--threads"),
                 (["export", "out", "--too", "coco", "--out", "x"], "--too", "--to"),
@@ -118,7 +126,8 @@ class CommandLine(program.InFolder):
             with self.subTest(arguments=arguments):
                 _, err = run(*arguments, expect=64)
                 self.assertRegex(err, rf"^error: .*got {got}; did you mean {meant}\? \(eventgan[a-z ]* --help\)\n$")
-        for arguments in [["frobnicate"], ["convert", "a.json", "--frobnicate"], ["convert", "a.json", "--progress", "frobnicate"]]:
+        for arguments in [["frobnicate"], ["convert", "a.json", "--frobnicate"],
+                          ["convert", "a.json", "--progress", "frobnicate"]]:
             _, err = run(*arguments, expect=64)
             self.assertIn("frobnicate", err)
             self.assertNotIn("did you mean", err)
@@ -149,8 +158,8 @@ class CommandLine(program.InFolder):
         out = folder / "out"
         run("convert", path)
         shards = sorted(out.glob("*.h5"))
-        shown = [*run("convert", path), *run("status", out), *run("verify", out), *run("finalize", out), *run("report", out),
-                 *run("plan", path), *run("preview", out, "--out", folder / "p", "--count", 1),
+        shown = [*run("convert", path), *run("status", out), *run("verify", out), *run("finalize", out),
+                 *run("report", out), *run("plan", path), *run("preview", out, "--out", folder / "p", "--count", 1),
                  *run("init", folder / "cars\x1b[31m", "--out", folder / "new.json"),
                  *run("init", folder / "none", expect=66), *run("inspect", shards[0], "--sample", 0)]
         shards[0].unlink()
@@ -169,7 +178,8 @@ class CommandLine(program.InFolder):
         told = [line for line in lines if line.startswith("small-train-")]
         self.assertEqual([line.split(":")[0] for line in told], [shard.name for shard in shards])
         self.assertEqual(sum(" 1 quarantined, " in line for line in told), 1)
-        self.assertEqual(sum(int(line.split("labels of ")[1].split()[0]) for line in told), 8)  # 9 samples, 1 quarantined
+        # 9 samples, 1 quarantined
+        self.assertEqual(sum(int(line.split("labels of ")[1].split()[0]) for line in told), 8)
 
         shards[1].write_bytes(shards[1].read_bytes()[:-1])
         shards[2].unlink()
@@ -200,7 +210,8 @@ class CommandLine(program.InFolder):
         for command in ["verify", "status", "retry", "finalize"]:
             _, err = run(command, self.folder, expect=66)
             self.assertIn(str(self.folder), err)
-        path = self.write_manifest(program.manifest([{"dataset": "mpii", "root": "nowhere", "pairs": program.pairs([2])}]))
+        path = self.write_manifest(
+            program.manifest([{"dataset": "mpii", "root": "nowhere", "pairs": program.pairs([2])}]))
         _, err = run("convert", path, expect=66)
         self.assertIn("nowhere", err)
         run("inspect", self.folder / "none.h5", expect=66)
@@ -350,7 +361,8 @@ class CommandLine(program.InFolder):
         for redirection in [">/dev/full", ">&-"]:
             for arguments in [["--help"], ["--version"], ["plan", "--help"], ["plan", path], ["plan", path, "--json"],
                               ["convert", path], ["retry", folder], ["status", folder], ["verify", folder],
-                              ["inspect", shard], ["finalize", folder], ["report", folder], ["preview", shard, "--out", self.folder / "p"]]:
+                              ["inspect", shard], ["finalize", folder], ["report", folder],
+                              ["preview", shard, "--out", self.folder / "p"]]:
                 with self.subTest(redirection=redirection, arguments=arguments):
                     done = self.run_with_output_to(redirection, *arguments)
                     self.assertEqual(done.returncode, 1, done.stderr)

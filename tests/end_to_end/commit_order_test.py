@@ -1,5 +1,6 @@
-"""In which order a file is published: whole and fsynced under its temporary name, renamed, its folder fsynced, and a commit record only
-after its shard. A kill shows nothing of this, since the system keeps what it was given; a power cut does."""
+"""In which order a file is published: whole and fsynced under its temporary name, renamed, its folder fsynced, and a
+commit record only after its shard. A kill shows nothing of this, since the system keeps what it was given; a power cut
+does."""
 
 import re
 

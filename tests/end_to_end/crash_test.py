@@ -167,7 +167,8 @@ class Crash(program.InFolder):
             shutil.copytree(broken, out)
             killed = failing_files.run(out, f"kill-before any {n}", "retry", out, "--threads", "1")
             self.assertEqual(killed.code, -9, killed.err)
-            if n % 2 and (out / "amendments.json").exists():  # before that, it would refuse the inputs that have changed
+            # before that, it would refuse the inputs that have changed
+            if n % 2 and (out / "amendments.json").exists():
                 self.convert(out)
             run("retry", out, "--threads", "1")
             same_content(content(out), expected, out)

@@ -1,4 +1,5 @@
-"""Damage in an output folder is found and named by `verify` and mended by the next `convert`, never trusted, never deleted."""
+"""Damage in an output folder is found and named by `verify` and mended by the next `convert`, never trusted,
+never deleted."""
 
 import hashlib
 import json
@@ -124,7 +125,8 @@ class Damage(program.InFolder):
         self.found_and_mended(self.record)
 
     def test_commit_record_with_plausible_counts_that_are_not_the_shards(self):
-        """Shard 2 holds one car; a commit record with two would give the next sample's labels to this one in dataset.h5."""
+        """Shard 2 holds one car; a commit record with two would give the next sample's labels to this one in
+        dataset.h5."""
         record = json.loads(self.record.read_text())
         self.assertEqual((record["boxes"], record["classes"]), ([1], {"Car": 1}))
         self.record.write_text(json.dumps({**record, "boxes": [2], "classes": {"Car": 2}}))
@@ -162,7 +164,8 @@ class Damage(program.InFolder):
 
     def test_plan_of_another_manifest_is_refused_field_by_field(self):
         manifest = job / "other.json"
-        manifest.write_text(json.dumps({**json.loads((job / "manifest.json").read_text()), "seed": 8, "volume": {"bins": 5}}))
+        manifest.write_text(json.dumps({**json.loads((job / "manifest.json").read_text()), "seed": 8,
+                                        "volume": {"bins": 5}}))
         before = {path: stamp(path) for path in self.out.iterdir()}
         _, err = run("convert", manifest, "--output", self.out, "--progress", "none", expect=64)
         self.assertIn("manifest", err)
@@ -224,8 +227,8 @@ class Damage(program.InFolder):
         """It parses, and its fingerprint is the manifest's; still it is not the plan that was frozen."""
         plan = self.out / "plan.json"
         original = plan.read_bytes()
-        for was, altered in [(b"prev_2/000004_03.png", b"prev_2/000004_02.png"), (b"small-train-00003", b"small-train-00007"),
-                             (b'"gap":2', b'"gap":3')]:
+        for was, altered in [(b"prev_2/000004_03.png", b"prev_2/000004_02.png"),
+                             (b"small-train-00003", b"small-train-00007"), (b'"gap":2', b'"gap":3')]:
             with self.subTest(altered=altered):
                 altered = original.replace(was, altered, 1)
                 self.assertTrue(altered != original)
@@ -255,8 +258,8 @@ class Damage(program.InFolder):
 
 
 class Flips(program.InFolder):
-    """libhdf5 crashes or loops on some flipped bits, here among others at KNOWN; what has a hash is compared before it is
-    opened, and the rest is read where a crash harms nobody."""
+    """libhdf5 crashes or loops on some flipped bits, here among others at KNOWN; what has a hash is compared before it
+    is opened, and the rest is read where a crash harms nobody."""
 
     # Of this shard of four samples with HDF5 1.10.8; the last one is a loop without end.
     KNOWN = [3152, 3624, 3616, 3904, 3952, 4496, 4544, 4624, 4816]
@@ -308,8 +311,8 @@ class Flips(program.InFolder):
         for place in self.KNOWN[2:5]:
             lone = self.folder / f"lone-{place}.h5"
             lone.write_bytes(self.flipped(place))
-            done = subprocess.run([program.PROGRAM, "preview", str(lone), "--out", str(self.folder / "images"), "--frames",
-                                   str(self.folder / "job")], capture_output=True, text=True)
+            done = subprocess.run([program.PROGRAM, "preview", str(lone), "--out", str(self.folder / "images"),
+                                   "--frames", str(self.folder / "job")], capture_output=True, text=True)
             self.assertIn(done.returncode, (0, 1), f"{place}: {done.stderr}")
 
     def test_a_sound_lone_shard_reads_as_ever(self):
@@ -320,13 +323,16 @@ class Flips(program.InFolder):
         run("inspect", lone, "--sample", "7", expect=64)
         run("inspect", self.folder / "none.h5", expect=66)
         with open("/dev/full", "w", encoding="utf-8") as full:
-            self.assertEqual(subprocess.run([program.PROGRAM, "inspect", str(lone)], stdout=full, stderr=subprocess.PIPE).returncode, 1)
-        images, _ = run("preview", lone, "--out", self.folder / "images", "--frames", self.folder / "job", "--count", "2")
+            self.assertEqual(subprocess.run([program.PROGRAM, "inspect", str(lone)], stdout=full,
+                                            stderr=subprocess.PIPE).returncode, 1)
+        images, _ = run("preview", lone, "--out", self.folder / "images", "--frames", self.folder / "job", "--count",
+                        "2")
         self.assertEqual([pathlib.Path(line).exists() for line in images.splitlines()], [True, True])
 
 
 class EveryColumn(program.InFolder):
-    """A value is changed, and the commit record made to agree, as a faulty program or a careless hand would: the hash tells nothing then."""
+    """A value is changed, and the commit record made to agree, as a faulty program or a careless hand would:
+    the hash tells nothing then."""
 
     def setUp(self):
         super().setUp()
@@ -344,12 +350,14 @@ class EveryColumn(program.InFolder):
         sources = [{"dataset": "kitti_object", "root": "cars", "pairs": program.pairs([1])},
                    {"dataset": "kitti_tracking", "root": "drive", "pairs": program.pairs([1])},
                    {"dataset": "human36m", "layout": "extracted", "root": "walk", "pairs": program.pairs([1])},
-                   {"dataset": "mpii_list", "root": "people", "annotations": "people/people.json", "sequences": "people/sequences",
-                    "pairs": program.pairs([2], side="around")},
+                   {"dataset": "mpii_list", "root": "people", "annotations": "people/people.json",
+                    "sequences": "people/sequences", "pairs": program.pairs([2], side="around")},
                    {"dataset": "kitti_object", "root": "cars", "split": "stills",
-                    "pairs": {"from": "stills", "motion": {"translation_px": [1, 1], "rotation_deg": 1, "scale": 0.01}}}]
-        path = self.write_manifest(program.manifest(sources, image={"width": 24, "height": 16, "fit": "letterbox", "preset": "mpii"},
-                                                    generator={"kind": "difference", "sensor": {"threshold": [0.15, 0.3]}}))
+                    "pairs": {"from": "stills",
+                              "motion": {"translation_px": [1, 1], "rotation_deg": 1, "scale": 0.01}}}]
+        path = self.write_manifest(
+            program.manifest(sources, image={"width": 24, "height": 16, "fit": "letterbox", "preset": "mpii"},
+                             generator={"kind": "difference", "sensor": {"threshold": [0.15, 0.3]}}))
         run("convert", path, "--progress", "none")
         self.out = self.folder / "out"
 
@@ -369,10 +377,13 @@ class EveryColumn(program.InFolder):
         names = [f"S1_Walking_1.54138969_{5 * k + 1:06d}.jpg" for k in range(3)]
         for name in names:
             save_image(root / "S1" / "S1_Walking_1.54138969" / name, random)
-        place = np.concatenate([random.uniform(-0.3, 0.3, (3, 17, 2)), np.full((3, 17, 1), 4.0), np.ones((3, 17, 1))], -1)
+        place = np.concatenate([random.uniform(-0.3, 0.3, (3, 17, 2)), np.full((3, 17, 1), 4.0), np.ones((3, 17, 1))],
+                               -1)
         part = np.concatenate([place[..., :2] / 4 * 100 + [16, 12], np.ones((3, 17, 1))], -1)
-        np.savez(root / "a.npz", imgname=names, center=np.full((3, 2), [16.0, 12.0]), scale=np.full(3, 0.1), part=part, S=place)
-        camera = {"f": np.array([100.0, 100.0]), "c": np.array([16.0, 12.0]), "k": np.array([-0.2, 0.2, 0.01]), "p": np.array([0.001, 0.002])}
+        np.savez(root / "a.npz", imgname=names, center=np.full((3, 2), [16.0, 12.0]), scale=np.full(3, 0.1), part=part,
+                 S=place)
+        camera = {"f": np.array([100.0, 100.0]), "c": np.array([16.0, 12.0]), "k": np.array([-0.2, 0.2, 0.01]),
+                  "p": np.array([0.001, 0.002])}
         (root / "cameras.pkl").write_bytes(pickle.dumps({("S1", "54138969"): camera}, protocol=2))
 
     def test_a_changed_value_is_named_by_its_column(self):
@@ -418,8 +429,9 @@ class EveryColumn(program.InFolder):
 
     def assert_named(self, column, faults):
         name = column.split("/")[-1]
-        also = {"offsets": "number of (boxes|persons)", "original": "other bytes", "sample_id": "the planned sample", "joints": "joint 0",
-                "source_size": "source size", "valid": "valid samples", "class_id": "boxes by class", "gap_frames": "samples by gap"}
+        also = {"offsets": "number of (boxes|persons)", "original": "other bytes", "sample_id": "the planned sample",
+                "joints": "joint 0", "source_size": "source size", "valid": "valid samples",
+                "class_id": "boxes by class", "gap_frames": "samples by gap"}
         frames = "frames of the plan" if re.match("(prev|next)_(path|index|video_frame)", name) else name
         with self.subTest(column, faults=faults):
             self.assertRegex("\n".join(faults), rf"\b({name}|{also.get(name, frames)})\b")

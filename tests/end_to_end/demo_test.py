@@ -4,11 +4,9 @@ import json
 import pathlib
 import shutil
 import signal
-import struct
 import subprocess
 import tempfile
 import time
-import unittest
 
 import h5py
 import numpy as np
@@ -67,7 +65,8 @@ class Demo(program.InFolder):
 
     def test_made_in_part_nothing_of_it_is_left(self):
         folder = self.folder / "stopped"
-        making = subprocess.Popen([program.PROGRAM, "make-demo", folder, "--scenes", "100000"], stderr=subprocess.PIPE, text=True)
+        making = subprocess.Popen([program.PROGRAM, "make-demo", folder, "--scenes", "100000"], stderr=subprocess.PIPE,
+                                  text=True)
         while not (folder / "kitti" / "training" / "calib" / "000000.txt").exists():
             time.sleep(0.01)
         making.send_signal(signal.SIGINT)

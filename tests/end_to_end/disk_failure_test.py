@@ -1,4 +1,5 @@
-"""A disk that is full or broken: a message with the path and the reason, nothing half-written, and the next run goes on."""
+"""A disk that is full or broken: a message with the path and the reason, nothing half-written,
+and the next run goes on."""
 
 import json
 import os
@@ -66,10 +67,12 @@ class DiskFailure(program.InFolder):
                                self.rules("ENOSPC", ["create", "write", "truncate", "rename", "mkdir"], step=8))
 
     def test_error_at_every_sync_close_and_rename_and_at_some_writes(self):
-        failing_files.for_each(self.fails_then_resumes, self.rules("EIO", ["sync", "close", "rename", "create", "write"], step=20))
+        failing_files.for_each(self.fails_then_resumes,
+                               self.rules("EIO", ["sync", "close", "rename", "create", "write"], step=20))
 
     def test_other_reasons(self):
-        failing_files.for_each(self.fails_then_resumes, ["EDQUOT write 9", "EDQUOT create 3", "EROFS mkdir 1", "EROFS create 1"])
+        failing_files.for_each(self.fails_then_resumes,
+                               ["EDQUOT write 9", "EDQUOT create 3", "EROFS mkdir 1", "EROFS create 1"])
 
     def test_disk_that_stays_full(self):
         last = max(n for n, call in enumerate(self.calls, 1) if self.is_told(call))
@@ -102,7 +105,8 @@ class DiskFailure(program.InFolder):
             self.assertTrue(outcome.struck)
             self.assertIn(outcome.code, (0, FAILED), outcome.err)
             if reads[number - 1].path.name != "run.json":  # which is no more than a convenience
-                self.assertNotEqual(outcome.err, "", f"expected a warning or an error, got nothing, of {reads[number - 1]}")
+                self.assertNotEqual(outcome.err, "",
+                                    f"expected a warning or an error, got nothing, of {reads[number - 1]}")
             self.assertEqual(temporaries(out), [])
             self.convert(out)
             same_folder(out, self.expected)
@@ -146,7 +150,8 @@ class DiskFailure(program.InFolder):
         command = ("retry", "--threads", "1")
         calls = failing_files.changes(failing_files.run(after, "", "retry", after, "--threads", "1").calls)
         # Between shard and commit record the shard is not done: the next retry makes it again.
-        failing_files.for_each(lambda rule: self.fails_then_again("retry", before, after, rule, *command), self.rules_for(calls))
+        failing_files.for_each(lambda rule: self.fails_then_again("retry", before, after, rule, *command),
+                               self.rules_for(calls))
 
     def test_really_small_disk(self):
         """Runs the test below where it may mount."""
@@ -171,7 +176,8 @@ class SizeLimit(program.InFolder):
         done = subprocess.run([program.PROGRAM, *map(str, arguments)], capture_output=True, text=True,
                               preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)))
         self.assertEqual(done.returncode, FAILED, f"{arguments}\n{done.stderr}")
-        self.assertRegex(done.stderr, re.escape(str(written_to)) + r".*ulimit -f allows files of " + str(size) + " bytes", arguments)
+        self.assertRegex(done.stderr,
+                         re.escape(str(written_to)) + r".*ulimit -f allows files of " + str(size) + " bytes", arguments)
         self.assertNotIn("damaged", done.stderr)
         folder = written_to if written_to.is_dir() else written_to.parent
         self.assertEqual(list(folder.rglob(".*.tmp")), [], arguments)

@@ -1,4 +1,5 @@
-"""The pages against the program: commands, options, paths, exit codes, links, Python, and the tests that the pages of guarantees and of numbers name."""
+"""The pages against the program: commands, options, paths, exit codes, links, Python,
+and the tests that the pages of guarantees and of numbers name."""
 
 import functools
 import itertools
@@ -15,7 +16,8 @@ import unittest
 import program
 from program import PACKAGE, SOURCE, run
 
-PAGES = [*(SOURCE / page for page in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docker/running.md", "manifests/weights/README.md")),
+PAGES = [*(SOURCE / page for page in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docker/running.md",
+                                      "manifests/weights/README.md")),
          *sorted((SOURCE / "manifests" / "guides").glob("*.md"))]
 MEASURED = sorted((SOURCE / "tests" / "benchmarks" / "measured").glob("*.md"))  # written by tests/benchmarks
 GUARANTEES = SOURCE / "manifests" / "guides" / "guarantees.md"
@@ -44,7 +46,8 @@ def commands_of(code):
             words = list(lexer)
         except ValueError:  # a text of several lines begins or ends
             words = line.split()
-        yield from (list(group) for divides, group in itertools.groupby(words, lambda word: set(word) <= set(";&|<>()")) if not divides)
+        yield from (list(group) for divides, group in itertools.groupby(words, lambda word: set(word) <= set(";&|<>()"))
+                    if not divides)
 
 
 @functools.cache
@@ -58,7 +61,8 @@ def options_of(*command):
     if command[0] in commands():
         text = run(command[0], "--help")[0]
     else:
-        done = subprocess.run([sys.executable, *command, "--help"], cwd=SOURCE, env=PYTHON_PATH, capture_output=True, text=True)
+        done = subprocess.run([sys.executable, *command, "--help"], cwd=SOURCE, env=PYTHON_PATH, capture_output=True,
+                              text=True)
         if "ModuleNotFoundError" in done.stderr:
             raise unittest.SkipTest(done.stderr.splitlines()[-1])
         text = done.stdout
@@ -74,7 +78,8 @@ def unknown_words(words):
     """Those that the program which is called does not know; None if it is none of this repository, nor CMake."""
     if words[0] in ("from", "import"):  # Python
         return None
-    if len(words) > 1 and words[0] in commands() and words[1].startswith("--"):  # in a line of text, without the program's name
+    # in a line of text, without the program's name
+    if len(words) > 1 and words[0] in commands() and words[1].startswith("--"):
         words = ["eventgan", *words]
     for i, word in enumerate(words):
         name, rest = pathlib.PurePath(word).name, words[i + 1:]
@@ -89,7 +94,8 @@ def unknown_words(words):
         if name in ("cmake", "ctest") and "--preset" in rest:
             kind = "testPresets" if name == "ctest" else "buildPresets" if "--build" in rest else "configurePresets"
             presets = json.loads((SOURCE / "CMakePresets.json").read_text())[kind]
-            return {rest[rest.index("--preset") + 1]} - {preset["name"] for preset in presets if not preset.get("hidden")}
+            return {rest[rest.index("--preset") + 1]} - {preset["name"] for preset in presets
+                                                         if not preset.get("hidden")}
         if word == "-m" and rest and rest[0].startswith("eventgan."):
             return unknown_options(rest, "-m", *rest[:2])
         for script in (word, f"manifests/python/examples/{word}"):
@@ -107,13 +113,16 @@ class Documentation(unittest.TestCase):
                 with self.subTest(page=page.name, command=" ".join(words)):
                     unknown = unknown_words(words)
                     self.assertFalse(unknown)
-                    self.assertEqual([word for word in words if OWN_PATH.fullmatch(word) and not any(SOURCE.glob(word))], [])
+                    self.assertEqual([word for word in words if OWN_PATH.fullmatch(word)
+                                      and not any(SOURCE.glob(word))], [])
                     seen.update(() if unknown is None else words)
-        self.assertLessEqual({"plan", "convert", "status", "retry", "finalize", "verify", "docker/bootstrap.sh", "ctest", "submit.sh",
-                              "eventgan.evaluate", "train_pose.py"}, {pathlib.PurePath(word).name for word in seen} | seen)
+        self.assertLessEqual({"plan", "convert", "status", "retry", "finalize", "verify", "docker/bootstrap.sh",
+                              "ctest", "submit.sh", "eventgan.evaluate", "train_pose.py"},
+                             {pathlib.PurePath(word).name for word in seen} | seen)
 
     def test_shell_blocks_parse(self):
-        shell = [(page, block) for page in PAGES for block in blocks_of(page) if any(unknown_words(words) is not None for words in commands_of(block))]
+        shell = [(page, block) for page in PAGES for block in blocks_of(page)
+                 if any(unknown_words(words) is not None for words in commands_of(block))]
         self.assertGreater(len(shell), 30)
         for page, block in shell:
             done = subprocess.run(["bash", "-n"], input=block, capture_output=True, text=True)
@@ -123,7 +132,8 @@ class Documentation(unittest.TestCase):
         codes = exit_codes()
         self.assertEqual(len(codes), 6)
         for command in ["convert", "status", "retry", "finalize", "verify"]:
-            self.assertEqual(set(re.findall(r"\b(\d+) [a-z]", run(command, "--help")[0].split("Exit codes:")[1])), codes)
+            self.assertEqual(set(re.findall(r"\b(\d+) [a-z]", run(command, "--help")[0].split("Exit codes:")[1])),
+                             codes)
         for page in (GUARANTEES, SOURCE / "docker" / "running.md"):
             rows = set(re.findall(r"(?m)^\| (\d+) \|", page.read_text(encoding="utf-8")))
             self.assertEqual(rows - {"137"}, codes, page)  # 128 + SIGKILL, the shell's own
@@ -137,17 +147,19 @@ class Documentation(unittest.TestCase):
                     self.assertLessEqual(len(line), 120, f"{page}:{number}")
 
     def test_the_python_page_runs(self):
-        """All its Python blocks one after the other in one process, as somebody who pastes them, where its `eventgan make-demo` was run; what a line
-        prints is the comment beside it."""
+        """All its Python blocks one after the other in one process, as somebody who pastes them, where its `eventgan
+        make-demo` was run; what a line prints is the comment beside it."""
         page = SOURCE / "manifests" / "guides" / "python.md"
         shell = {"docker/bootstrap.sh", "eventgan", "export", "python3"}  # any other first word is Python's
-        of_shell = {is_shell: [block for block in blocks_of(page) if (block.split()[0] in shell) == is_shell] for is_shell in (True, False)}
+        of_shell = {is_shell: [block for block in blocks_of(page) if (block.split()[0] in shell) == is_shell]
+                    for is_shell in (True, False)}
         code = "\n".join(of_shell[False])
         told = re.findall(r"(?m)^ *print\(.*\) {2,}# (.*)$", code)
         self.assertGreater(code.count("import"), 8)
         self.assertEqual(len(told), code.count("print("))
         for module in ("eventgan._engine", "matplotlib", "torch", "PIL"):
-            if subprocess.run([sys.executable, "-c", f"import {module}"], env=PYTHON_PATH, capture_output=True).returncode:
+            if subprocess.run([sys.executable, "-c", f"import {module}"], env=PYTHON_PATH,
+                              capture_output=True).returncode:
                 self.skipTest(f"no {module}")
         with tempfile.TemporaryDirectory(prefix="eventgan-") as folder:
             for words in (words for block in of_shell[True] for words in commands_of(block) if words[0] == "eventgan"):

@@ -1,4 +1,5 @@
-"""What computes the network: engines and precisions by the manifest, calibration for int8, processors that lack instructions."""
+"""What computes the network: engines and precisions by the manifest, calibration for int8,
+processors that lack instructions."""
 
 import hashlib
 import json
@@ -7,7 +8,6 @@ import re
 import shutil
 import subprocess
 import sys
-import unittest
 from unittest import mock
 
 import h5py
@@ -21,7 +21,7 @@ from small_job import LENIENT, broken_cars, small_job
 PAIRS = 30
 SHIPPED = sorted((SOURCE / "manifests" / "weights").glob("eventgan-*.safetensors"))[0]
 FLAGS = set(re.findall(r"[a-z]\w*", next((line for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines()
-                                         if line.startswith("flags")), "")))
+                                          if line.startswith("flags")), "")))
 # A still network says nothing of its arithmetic: random frames make it speak, and int8's error is then some per cent.
 MOST_INT8_ERROR = 0.25
 TOLERANCE = 1e-4  # of the largest value, between float32 volumes
@@ -43,8 +43,8 @@ def pytorch():
 
 
 def write_persons(root, count=12):
-    """Sources of persons at random places in images of 200 x 160, a person an image: MPII's with centre and scale, with one of these or
-    none, and Human3.6M's."""
+    """Sources of persons at random places in images of 200 x 160, a person an image: MPII's with centre and scale, with
+    one of these or none, and Human3.6M's."""
     random = np.random.default_rng(7)
     (root / "images").mkdir(parents=True)
 
@@ -61,14 +61,16 @@ def write_persons(root, count=12):
         shutil.copy(frames / "00000005.jpg", root / "images" / f"{name}.jpg")
         joints = middle[k] + random.uniform(-30, 30, (16, 2))
         people.append({"image": f"{name}.jpg", "joints": np.clip(joints, 1, 160).tolist(), "joints_vis": [1] * 16,
-                       "center": [-1, -1] if name[0] in "js" else middle[k].tolist(), "scale": -1 if name[0] in "jc" else scale[k]})
+                       "center": [-1, -1] if name[0] in "js" else middle[k].tolist(),
+                       "scale": -1 if name[0] in "jc" else scale[k]})
     (root / "people.json").write_text(json.dumps(people))
 
     names = [f"S1_Walking.54138969_{5 * k + 1:06d}.jpg" for k in range(6)]
     for name in names:
         save(root / "h36m" / "S1" / "S1_Walking.54138969" / name)
     part = np.concatenate([middle[:6, None] + random.uniform(-20, 20, (6, 17, 2)), np.ones((6, 17, 1))], -1)
-    np.savez(root / "h36m" / "a.npz", imgname=names, center=middle[:6], scale=scale[:6], part=part, S=np.ones((6, 17, 4)))
+    np.savez(root / "h36m" / "a.npz", imgname=names, center=middle[:6], scale=scale[:6], part=part,
+             S=np.ones((6, 17, 4)))
     return [{"dataset": "mpii_list", "root": str(root), "annotations": str(root / "people.json"),
              "sequences": str(root / "sequences"), "pairs": program.pairs([2], side="around")},
             {"dataset": "human36m", "layout": "extracted", "root": str(root / "h36m"), "pairs": program.pairs([1])}]
@@ -117,7 +119,8 @@ class Engines(program.InFolder):
             whole, _ = self.convert("whole", engine=engine)
             for scope, is_any in (("motion", False), ("labels", True), ("labels_only", True)):
                 # Nothing differs by more than 255 grey levels.
-                volumes, _ = self.convert(scope, engine=engine, scope=scope, motion_threshold=255, label_margin_px=0, tile_px=8)
+                volumes, _ = self.convert(scope, engine=engine, scope=scope, motion_threshold=255, label_margin_px=0,
+                                          tile_px=8)
                 with h5py.File(next((self.job / scope).glob("*.h5"))) as shard:
                     tiles = shard["events/tiles"]
                     self.assertEqual((tiles.attrs["scope"], tiles.attrs["tile_px"]), (scope, 8))
@@ -133,8 +136,9 @@ class Engines(program.InFolder):
         if torch is None:
             self.skipTest("there is no PyTorch")
         sources = write_persons(self.folder / "persons")
-        manifest = program.manifest(sources, generator={"weights": "untrained:2", "scope": "labels_only", "label_margin_px": 0,
-                                                        "tile_px": 8})
+        manifest = program.manifest(sources,
+                                    generator={"weights": "untrained:2", "scope": "labels_only", "label_margin_px": 0,
+                                               "tile_px": 8})
         run("convert", self.write_manifest(manifest), "--progress", "none")
         defaults = cut_out.PoseAugmentation()
         # The largest crop, turned so that its corners reach farthest: the default angles go beyond that.
@@ -153,13 +157,15 @@ class Engines(program.InFolder):
                 for number in range(len(persons)):
                     crops = [persons[number][3] for _ in range(4)]
                     for drawn in farthest:
-                        with mock.patch.object(torch, "randn", return_value=drawn), mock.patch.object(torch, "rand", torch.zeros):
+                        with mock.patch.object(torch, "randn",
+                                               return_value=drawn), mock.patch.object(torch, "rand", torch.zeros):
                             crops.append(persons[number][3])
                     name, wanted = crops[0]["image"], tiles[crops[0]["image"]]
                     with self.subTest(name, joints=joints, augmentation=augmentation):
                         seen = np.any([tiles_of(crop["to_volume"], 256, wanted.shape) for crop in crops], 0)
                         self.assertEqual((seen & ~wanted).sum(), 0)
-                        # MPII's crop is no larger than that: what is sampled ends half an input pixel before its last edges.
+                        # MPII's crop is no larger than that: what is sampled ends half an input pixel before its last
+                        # edges.
                         if name.startswith("annotated") and joints is None and augmentation:
                             rows, columns = (np.flatnonzero(seen.any(axis)) for axis in (1, 0))
                             reached = np.zeros_like(wanted)
@@ -199,7 +205,8 @@ class Engines(program.InFolder):
         self.assertEqual(engines["auto"], engines["onednn"])
 
     def test_threads_change_no_byte_of_any_engine(self):
-        run("calibrate", self.manifest(), "--pairs", "4", "--out", self.job / "calibrated.safetensors", "--progress", "none")
+        run("calibrate", self.manifest(), "--pairs", "4", "--out", self.job / "calibrated.safetensors", "--progress",
+            "none")
         for generator in [{"engine": "torch"}, {"engine": "onednn"}, {"engine": "torch", "precision": "bfloat16"},
                           {"engine": "onednn", "precision": "bfloat16"},
                           {"weights": "calibrated.safetensors", "precision": "int8"}]:
@@ -234,7 +241,8 @@ class Engines(program.InFolder):
         self.assertEqual(run("retry", self.job / "out", "--progress", "none")[1], "")
 
     def test_the_weights_warning_is_one_short_line_of_convert(self):
-        for weights, warning in [("shipped", r"shipped:\d+ are stand-in weights; .*"), ("untrained:2", r".* UNTRAINED \(untrained:2\).*")]:
+        for weights, warning in [("shipped", r"shipped:\d+ are stand-in weights; .*"),
+                                 ("untrained:2", r".* UNTRAINED \(untrained:2\).*")]:
             path = self.manifest("warned.json", weights=weights)
             self.assertEqual(run("plan", path, "--progress", "none")[1], "")
             _, err = run("convert", path, "--overwrite", "--progress", "none")
@@ -260,7 +268,7 @@ class Engines(program.InFolder):
                 out, err = run(command, path, "--progress", "none", expect=64)
                 self.assertEqual(out, "")
                 self.assertRegex(err, r'\A\S+ \$\.generator\.device: expected "cpu", got "cuda": '
-                                      r"LibTorch (was built without CUDA|finds no CUDA device)\n\Z")
+                                 r"LibTorch (was built without CUDA|finds no CUDA device)\n\Z")
             self.assertFalse((self.job / "cuda").exists())
             return
         volumes, err = self.convert("cuda", device="cuda")
@@ -359,7 +367,8 @@ class Engines(program.InFolder):
         reference, _ = self.convert("torch", engine="torch")
         for engine in ["torch", "onednn"]:
             with self.subTest(engine):
-                volumes, err = self.convert("half", {"ONEDNN_MAX_CPU_ISA": "AVX512_CORE"}, engine=engine, precision="bfloat16")
+                volumes, err = self.convert("half", {"ONEDNN_MAX_CPU_ISA": "AVX512_CORE"}, engine=engine,
+                                            precision="bfloat16")
                 self.assertIn("warning: precision bfloat16: this processor (avx512_core) has no instructions for it; "
                               "float32 is both faster and exact here", err)
                 self.assertLess(relative_distance(volumes, reference), 0.05)

@@ -70,7 +70,8 @@ class RvtSequence:
 class Recordings(Export):
     @classmethod
     def setUpClass(cls):
-        """A KITTI tracking sequence of 12 frames of 0.1 s each, and one of 3 frames: windows of 1 to 3 frames, all of them."""
+        """A KITTI tracking sequence of 12 frames of 0.1 s each, and one of 3 frames: windows of 1 to 3 frames,
+        all of them."""
         cls.drive = pathlib.Path(tempfile.mkdtemp(dir=demo.folder)) / "drive"
         random = np.random.default_rng(11)
         (cls.drive / "label_02").mkdir(parents=True)
@@ -80,14 +81,16 @@ class Recordings(Export):
                 small_job.save_image(cls.drive / "image_02" / name / f"{k:06d}.png", random)
                 boxes = [(5, "Car", 2 + k, 3, 12 + k, 9), (-1, "DontCare", 0, 0, 4, 4)] if k != 4 else []
                 if k % 2:
-                    boxes += [(7, "Pedestrian", 25, 10, 40, 30), (9, "Car", 31.25, 2, 32, 9)]  # cut, and within the last pixel
+                    # cut, and within the last pixel
+                    boxes += [(7, "Pedestrian", 25, 10, 40, 30), (9, "Car", 31.25, 2, 32, 9)]
                 lines += [f"{k} {track} {kind} 0 0 -10 {left} {top} {right} {bottom} -1 -1 -1 -1000 -1000 -1000 -10"
                           for track, kind, left, top, right, bottom in boxes if name == "0000"]
             (cls.drive / "label_02" / f"{name}.txt").write_text("".join(line + "\n" for line in lines))
         (cls.drive / "image_02" / "0000" / "000008.png").write_bytes(b"broken")
         manifest = cls.drive.parent / "manifest.json"
         source = {"dataset": "kitti_tracking", "root": str(cls.drive), "pairs": program.pairs([1, 2, 3], choose="all")}
-        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"}, errors=small_job.LENIENT)))
+        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"},
+                                                        errors=small_job.LENIENT)))
         cls.source = manifest.parent / "out"
         run("convert", manifest, "--progress", "none")
         run("finalize", cls.source)
@@ -126,7 +129,8 @@ class Recordings(Export):
             times = np.genfromtxt(path / "images" / "timestamps.txt", dtype="int64")
             self.assertEqual(list(times), sorted({time for window in windows for time in window[:3]}))
             with h5py.File(path / "events" / "left" / "events.h5") as file:
-                self.assertEqual([file[name].dtype for name in ("events/x", "events/y", "events/t", "events/p", "ms_to_idx", "t_offset")],
+                self.assertEqual([file[name].dtype for name in ("events/x", "events/y", "events/t", "events/p",
+                                                                "ms_to_idx", "t_offset")],
                                  ["u2", "u2", "u4", "u1", "u8", "i8"])
                 t, index = file["events/t"][:], file["ms_to_idx"][:]
                 np.testing.assert_array_equal(index, np.searchsorted(t, np.arange(len(index)) * 1000))
@@ -157,10 +161,12 @@ class Recordings(Export):
         for path in (self.out / "dsec" / "train").glob("human36m*"):
             self.assertFalse((path / "object_detections").exists())
         # Human3.6M's times are known: a frame takes 20 ms there.
-        of_video = [window for path in (self.out / "dsec" / "train").glob("human36m*") for window in read_windows(path / "windows.txt")]
+        of_video = [window for path in (self.out / "dsec" / "train").glob("human36m*")
+                    for window in read_windows(path / "windows.txt")]
         for begin, end, label, _, sample_id in of_video:
             sample = known["train", sample_id]
-            self.assertEqual([begin, end], [round(sample["pairs"][name] * 1e6) for name in ("prev_time_s", "next_time_s")])
+            self.assertEqual([begin, end],
+                             [round(sample["pairs"][name] * 1e6) for name in ("prev_time_s", "next_time_s")])
         names = json.loads((self.out / "label_map_dictionary.json").read_text())
         self.assertEqual(names["0"], "Car")
 
@@ -173,7 +179,8 @@ class Recordings(Export):
         for name, windows in recordings.items():
             for begin, end, label, _, sample_id in windows:
                 pairs = self.samples[sample_id]["pairs"]
-                self.assertEqual((begin, end, label), tuple(int(pairs[key]) * 10 ** 5 for key in ("prev_index", "next_index", "label_index")))
+                self.assertEqual((begin, end, label), tuple(int(pairs[key]) * 10 ** 5
+                                                            for key in ("prev_index", "next_index", "label_index")))
         # There are no more recordings than windows at one time.
         most = max(sum(begin < time < end for name, windows in recordings.items() if name.startswith("0000")
                        for begin, end, *_ in windows)
@@ -182,7 +189,8 @@ class Recordings(Export):
         tracks = np.concatenate([np.load(path) for path in self.out.rglob("tracks.npy")])
         self.assertEqual(set(tracks["track_id"]), {5, 7, 9})
         left_out = self.described()["left_out"]
-        self.assertEqual(left_out["boxes to ignore"], sum((s["boxes"]["ignore"] == 1).sum() for s in self.samples.values()))
+        self.assertEqual(left_out["boxes to ignore"],
+                         sum((s["boxes"]["ignore"] == 1).sum() for s in self.samples.values()))
         self.assertEqual(len(self.described()["quarantined"]), 6)
 
     def test_frames_without_times_are_a_second_each(self):
@@ -190,8 +198,9 @@ class Recordings(Export):
         for k in (3, 4, 5, 6):
             small_job.save_image(root / "a b" / f"{k:04d}.png", np.random.default_rng(k))
         manifest = self.out.parent / "manifest.json"
-        manifest.write_text(json.dumps(program.manifest([{"dataset": "frames", "root": str(root), "pairs": program.pairs([1])}],
-                                                        generator={"kind": "difference"})))
+        manifest.write_text(
+            json.dumps(program.manifest([{"dataset": "frames", "root": str(root), "pairs": program.pairs([1])}],
+                                        generator={"kind": "difference"})))
         run("convert", manifest, "--progress", "none")
         run("finalize", manifest.parent / "out")
         self.export("dsec", source=manifest.parent / "out")
@@ -272,19 +281,21 @@ class Recordings(Export):
         self.assertEqual(sorted(seen), sorted(known))
         left_out = self.described()["left_out"]
         kept = sum((sample["boxes"]["ignore"] == 0).sum() for sample in known.values())
-        self.assertEqual(left_out.get("boxes within the last pixel, where RVT's frame ends (in raw alone)", 0), kept - in_frame)
+        self.assertEqual(left_out.get("boxes within the last pixel, where RVT's frame ends (in raw alone)", 0),
+                         kept - in_frame)
         self.assertEqual(left_out.get("samples of recordings without boxes (in raw alone)", 0), unlabelled)
 
     def test_rvt_names_files_of_gen1_as_its_preprocessing_does_and_leaves_no_bbox_in_a_name(self):
         manifest = self.out.parent / "manifest.json"
         source = {"dataset": "kitti_tracking", "root": str(self.drive), "pairs": program.pairs([2])}
-        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"}, errors=small_job.LENIENT,
+        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"},
+                                                        errors=small_job.LENIENT,
                                                         image={"width": 304, "height": 240, "preset": "mpii"})))
         run("convert", manifest, "--progress", "none")
         run("finalize", manifest.parent / "out")
         self.export("rvt", source=manifest.parent / "out")
-        self.assertEqual({path.name.split("_")[0] for path in (self.out / "raw" / "train").glob("*_td.dat.h5")} - {"0000", "0000~2"},
-                         {"%62box"})
+        self.assertEqual({path.name.split("_")[0] for path in (self.out / "raw" / "train").glob("*_td.dat.h5")}
+                         - {"0000", "0000~2"}, {"%62box"})
 
     def test_a_class_map_and_no_events(self):
         classes = demo.folder / "dsec.json"
@@ -300,7 +311,8 @@ class Recordings(Export):
         run("finalize", manifest.parent / "out")
         for to in ("dsec", "rvt"):
             self.export(to, "--classes", classes, source=manifest.parent / "out", out=self.out / to)
-            self.assertEqual(json.loads((self.out / to / "label_map_dictionary.json").read_text()), {"0": "Pedestrian", "2": "Car"})
+            self.assertEqual(json.loads((self.out / to / "label_map_dictionary.json").read_text()),
+                             {"0": "Pedestrian", "2": "Car"})
         with h5py.File(self.out / "dsec/dsec/train/0000/events/left/events.h5") as file:
             self.assertEqual(file["events/t"].shape, (0,))
             np.testing.assert_array_equal(file["ms_to_idx"][:], np.zeros(1101))

@@ -1,4 +1,5 @@
-"""Exports of a finalized folder, each read from outside: with numpy, h5py, scipy and tarfile, and by the trainers that it is for."""
+"""Exports of a finalized folder, each read from outside: with numpy, h5py, scipy and tarfile,
+and by the trainers that it is for."""
 
 import collections
 import io
@@ -32,9 +33,10 @@ PIXELS = 0.01  # the largest error of a label that is mapped back
 FORMATS = ["yolo", "coco", "mpii", "davis", "webdataset", "events", "dsec", "rvt"]
 BY_POINT = ("joints", "joints_source", "joints3d_mm", "visible")  # null is said of each joint
 PAIR_UNKNOWN = {"prev_video_frame": -1, "next_video_frame": -1}
-LABEL_UNKNOWN = {"truncation": -1, "occlusion": -1, "alpha": -10, "box3d": [-1, -1, -1, -1000, -1000, -1000, -10], "track_id": -1,
-                 "difficulty": -1, "visible": -1, **{name + source: -1 for source in ("", "_source")
-                                                     for name in ("joints", "center", "head_box")}, "scale": -1, "scale_volume": -1}
+LABEL_UNKNOWN = {"truncation": -1, "occlusion": -1, "alpha": -10, "box3d": [-1, -1, -1, -1000, -1000, -1000, -10],
+                 "track_id": -1, "difficulty": -1, "visible": -1, **{name + source: -1 for source in ("", "_source")
+                                                     for name in ("joints", "center", "head_box")}, "scale": -1,
+                 "scale_volume": -1}
 
 setUpModule, tearDownModule = demo.set_up, demo.tear_down
 
@@ -133,12 +135,14 @@ class Formats(Export):
                 stem = f"train/{name_of(key)}"
                 codes = np.load(self.out / folder_ / "images" / f"{stem}.npy")
                 size = np.array([codes.shape[1], codes.shape[0]])
-                np.testing.assert_array_equal(codes, np.round(np.minimum(sample["volume"].astype(float), 1) * 255).transpose(1, 2, 0))
+                np.testing.assert_array_equal(
+                    codes, np.round(np.minimum(sample["volume"].astype(float), 1) * 255).transpose(1, 2, 0))
                 rows = np.loadtxt(self.out / folder_ / "labels" / f"{stem}.txt", ndmin=2)
                 poses, chosen = sample["poses"], sample["joints"]
                 self.assertEqual(rows.shape, (len(poses["joints"]), 5 + 3 * len(names)))
                 joints = rows[:, 5:].reshape(len(rows), -1, 3)
-                self.assertTrue((rows[:, 0] == 0).all() and (rows[:, 1:5] <= 1).all() and (joints[..., :2] <= 1).all() and (rows >= 0).all())
+                self.assertTrue((rows[:, 0] == 0).all() and (rows[:, 1:5] <= 1).all() and (joints[..., :2] <= 1).all()
+                                and (rows >= 0).all())
                 for found, box, all_joints, visible in zip(joints, rows[:, 1:5], poses["joints"], poses["visible"]):
                     at, seen = all_joints[chosen], visible[chosen]
                     annotated = (at != -1).any(axis=1)
@@ -147,8 +151,10 @@ class Formats(Export):
                     np.testing.assert_array_equal(found[:, 2], np.where(there, np.where(seen == 0, 1, 2), 0))
                     np.testing.assert_allclose(found[:, :2] * size, np.where(there[:, None], at + 0.5, 0), atol=1e-6)
                     corners = np.concatenate([box[:2] - box[2:] / 2, box[:2] + box[2:] / 2]) * np.tile(size, 2)
-                    self.assertTrue((corners[:2] <= (at[there] + 0.5).min(axis=0) + 1e-6).all() or dataset == "human36m")
-                    self.assertTrue((corners[2:] >= (at[there] + 0.5).max(axis=0) - 1e-6).all() or dataset == "human36m")
+                    self.assertTrue((corners[:2] <= (at[there] + 0.5).min(axis=0) + 1e-6).all()
+                                    or dataset == "human36m")
+                    self.assertTrue((corners[2:] >= (at[there] + 0.5).max(axis=0) - 1e-6).all()
+                                    or dataset == "human36m")
         self.assertEqual(self.described()["left_out"].get("joints outside the volume (as not annotated)", 0), outside)
         alone = self.out.parent / "alone"
         self.export("yolo", "--split", "val", out=alone)
@@ -191,7 +197,8 @@ class Formats(Export):
             coco = json.loads((self.out / f"instances_{split}.json").read_text())
             names = {category["id"]: category["name"] for category in coco["categories"]}
             self.assertEqual(sorted(names), list(range(1, 9)))
-            self.assertEqual([image["sample_id"] for image in coco["images"]], [key[2] for key in of(split, "kitti_object")])
+            self.assertEqual([image["sample_id"] for image in coco["images"]],
+                             [key[2] for key in of(split, "kitti_object")])
             self.assertEqual([one["id"] for one in coco["annotations"]], list(range(1, len(coco["annotations"]) + 1)))
             of_image = collections.defaultdict(list)
             for one in coco["annotations"]:
@@ -206,7 +213,8 @@ class Formats(Export):
                 self.assertEqual([names[one["category_id"]] for one in found],
                                  [sample["classes"][i] for i in boxes["class_id"][kept]])
                 xywh = np.array([one["bbox"] for one in found]).reshape(-1, 4)
-                np.testing.assert_allclose(np.hstack([xywh[:, :2], xywh[:, :2] + xywh[:, 2:]]), boxes["xyxy"][kept], atol=1e-9)
+                np.testing.assert_allclose(np.hstack([xywh[:, :2], xywh[:, :2] + xywh[:, 2:]]), boxes["xyxy"][kept],
+                                           atol=1e-9)
                 np.testing.assert_allclose([one["area"] for one in found], xywh[:, 2] * xywh[:, 3])
                 # A region to ignore is a crowd of each class.
                 self.assertEqual(len(of_image[image["id"]]) - len(found), 8 * (boxes["ignore"] == 1).sum())
@@ -233,18 +241,22 @@ class Formats(Export):
                 there = (joints[chosen] != -1).any(axis=1)
                 np.testing.assert_array_equal(keypoints[:, 2] > 0, there)
                 np.testing.assert_array_equal(keypoints[there, 2] == 1, visible[chosen][there] == 0)
-                np.testing.assert_allclose(points_to_source(sample, keypoints[there, :2] - 0.5), source[chosen][there], atol=PIXELS)
+                np.testing.assert_allclose(points_to_source(sample, keypoints[there, :2] - 0.5), source[chosen][there],
+                                           atol=PIXELS)
                 self.assertEqual(one["num_keypoints"], there.sum())
 
     def test_coco_categories_of_persons_are_the_same_in_all_splits(self):
         sources = [{"dataset": "mpii", "root": "mpii", "pairs": program.pairs([2], side="around"), "split": "val"},
-                   {"dataset": "human36m", "root": "h36m", "layout": "fetch", "pairs": program.pairs([1], side="after")}]
+                   {"dataset": "human36m", "root": "h36m", "layout": "fetch",
+                    "pairs": program.pairs([1], side="after")}]
         manifest = demo.folder / "demo" / "persons.json"
-        manifest.write_text(json.dumps(program.manifest(sources, generator={"kind": "difference"}, output={"directory": "persons", "samples_per_shard": 8})))
+        manifest.write_text(json.dumps(program.manifest(sources, generator={"kind": "difference"},
+                                                        output={"directory": "persons", "samples_per_shard": 8})))
         run("convert", manifest, "--progress", "none")
         run("finalize", demo.folder / "demo" / "persons")
         self.export("coco", source=demo.folder / "demo" / "persons")
-        found = {split: json.loads((self.out / f"person_keypoints_{split}.json").read_text()) for split in ("val", "train")}
+        found = {split: json.loads((self.out / f"person_keypoints_{split}.json").read_text())
+                 for split in ("val", "train")}
         self.assertEqual(found["val"]["categories"], found["train"]["categories"])
         self.assertEqual([len(category["keypoints"]) for category in found["val"]["categories"]], [16, 17])
         for split, category in (("val", 1), ("train", 2)):
@@ -273,8 +285,8 @@ class Formats(Export):
                 there = np.array(entry["joints_vis"]) == 1
                 np.testing.assert_array_equal(there, (poses["joints"][row][chosen] != -1).any(axis=1))
                 in_volume = np.array(entry["joints"]) - 1
-                np.testing.assert_allclose(points_to_source(sample, in_volume[there]), poses["joints_source"][row][chosen][there],
-                                           atol=PIXELS)
+                np.testing.assert_allclose(points_to_source(sample, in_volume[there]),
+                                           poses["joints_source"][row][chosen][there], atol=PIXELS)
                 np.testing.assert_allclose(np.array(entry["center"]) - 1, poses["center"][row])
                 self.assertAlmostEqual(entry["scale"], poses["scale_volume"][row])
                 np.testing.assert_array_equal(truth["jnt_missing"][:, n], ~there)
@@ -333,7 +345,8 @@ class Formats(Export):
         for path in [cars / "image_2" / "000002.png", *(cars / "prev_2").glob("000002_*.png")]:
             with PIL.Image.open(path) as image:
                 image.resize((40, 30)).save(path)
-        sources = [{"dataset": "kitti_object", "root": str(cars), "pairs": program.pairs(gaps, choose=choose), "split": split}
+        sources = [{"dataset": "kitti_object", "root": str(cars), "pairs": program.pairs(gaps, choose=choose),
+                    "split": split}
                    for split, gaps, choose in (("one", [1, 2], "one"), ("all", [1, 2], "all"), ("two", [2], "all"))]
         manifest = self.out.parent / "manifest.json"
         manifest.write_text(json.dumps(program.manifest(sources, generator={"kind": "difference"})))
@@ -349,9 +362,11 @@ class Formats(Export):
         self.assertEqual((self.out / "one-kitti_object-24x32.txt").read_text(), "000000\n000001\n000003\n")
         two = self.out.parent / "two"
         self.export("davis", "--split", "two", source=self.out.parent / "out", out=two)
-        self.assertEqual((two / "two-kitti_object-24x32.txt").read_text(), "000000\n000001\n000003\n")  # no 000000@before2
+        # no 000000@before2
+        self.assertEqual((two / "two-kitti_object-24x32.txt").read_text(), "000000\n000001\n000003\n")
         for splits in (["--split", "all"], []):
-            _, err = self.export("davis", *splits, source=self.out.parent / "out", out=self.out.parent / "yolo", expect=64)
+            _, err = self.export("davis", *splits, source=self.out.parent / "out", out=self.out.parent / "yolo",
+                                 expect=64)
             self.assertIn("000000@before1 and 000000@before2", err)
             self.assertFalse((self.out.parent / "yolo").exists())
         self.export("yolo", "--split", "all", source=self.out.parent / "out", out=self.out.parent / "yolo")
@@ -381,7 +396,8 @@ class Formats(Export):
                 for key, kind in (("boxes", "boxes"), ("persons", "poses")):
                     self.assertEqual(len(labels.get(key, [])), len(next(iter(sample[kind].values()))))
                     for row, entry in enumerate(labels.get(key, [])):
-                        self.check_columns(entry, {name: column[row] for name, column in sample[kind].items()}, LABEL_UNKNOWN)
+                        self.check_columns(entry, {name: column[row] for name, column in sample[kind].items()},
+                                           LABEL_UNKNOWN)
                 np.testing.assert_allclose(np.array([box["xyxy"] for box in labels.get("boxes", [])]).reshape(-1, 4),
                                            sample["boxes"]["xyxy"])
                 for person, joints in zip(labels.get("persons", []), sample["poses"]["joints"]):
@@ -399,7 +415,8 @@ class Formats(Export):
         listed = {entry["split"]: entry["path"] for entry in card["configs"][0]["data_files"]}
         self.assertEqual(list(listed), ["train", "val"])
         self.assertEqual(sorted(sum(listed.values(), [])), sorted(path.name for path in self.out.glob("*.tar")))
-        rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in body.splitlines() if line.startswith("|")]
+        rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in body.splitlines()
+                if line.startswith("|")]
         for split in ("train", "val"):
             self.assertIn([split, "samples", str(len(of(split)))], rows)
             boxes = collections.Counter("boxes to ignore" if ignore else f"boxes of class {sample['classes'][i]}"
@@ -494,8 +511,8 @@ class Trainers(Export):
             import numpy as np
             from easydict import EasyDict
             from dataset.mpii import MPIIDataset
-            cfg = EasyDict(OUTPUT_DIR="", DATASET=dict(ROOT=".", TEST_SET="train-mpii", DATA_FORMAT="png", SCALE_FACTOR=0.25,
-                           ROT_FACTOR=30, FLIP=False, SELECT_DATA=False),
+            cfg = EasyDict(OUTPUT_DIR="", DATASET=dict(ROOT=".", TEST_SET="train-mpii", DATA_FORMAT="png",
+                           SCALE_FACTOR=0.25, ROT_FACTOR=30, FLIP=False, SELECT_DATA=False),
                            MODEL=dict(IMAGE_SIZE=np.array([256, 256]),
                                       EXTRA=dict(TARGET_TYPE="gaussian", HEATMAP_SIZE=np.array([64, 64]), SIGMA=2)))
             data = MPIIDataset(cfg, ".", "train-mpii", False)
@@ -515,21 +532,23 @@ class Trainers(Export):
     def test_pose_resnet_changed_as_the_guide_says_reads_human36m(self):
         guide = (program.SOURCE / "manifests" / "guides" / "exports.md").read_text()
         self.export("mpii")
-        score = self.python([TRAINERS / "pose_resnet" / "lib", TRAINERS / "stubs"], f"guide = {guide!r}\n" + textwrap.dedent("""
+        folders = [TRAINERS / "pose_resnet" / "lib", TRAINERS / "stubs"]
+        score = self.python(folders, f"guide = {guide!r}\n" + textwrap.dedent("""
             import importlib
             import inspect
             import numpy as np
             from easydict import EasyDict
             mpii = importlib.import_module("dataset.mpii")
             code = inspect.getsource(mpii)
-            for start in ("self.num_joints =", "self.flip_pairs =", "self.parent_ids =", "pckAll = np.zeros", "PCKh.mask[", "jnt_count.mask["):
+            for start in ("self.num_joints =", "self.flip_pairs =", "self.parent_ids =", "pckAll = np.zeros",
+                          "PCKh.mask[", "jnt_count.mask["):
                 old, new = ([line.split("#")[0].strip() for line in text.splitlines() if line.strip().startswith(start)]
                             for text in (code, guide))
                 assert len(old) == len(new) == 1, (old, new)
                 code = code.replace(old[0], new[0])
             exec(code, mpii.__dict__)
-            cfg = EasyDict(OUTPUT_DIR="", DATASET=dict(ROOT=".", TEST_SET="train-human36m", DATA_FORMAT="png", SCALE_FACTOR=0.25,
-                           ROT_FACTOR=30, FLIP=True, SELECT_DATA=False),
+            cfg = EasyDict(OUTPUT_DIR="", DATASET=dict(ROOT=".", TEST_SET="train-human36m", DATA_FORMAT="png",
+                           SCALE_FACTOR=0.25, ROT_FACTOR=30, FLIP=True, SELECT_DATA=False),
                            MODEL=dict(IMAGE_SIZE=np.array([256, 256]),
                                       EXTRA=dict(TARGET_TYPE="gaussian", HEATMAP_SIZE=np.array([64, 64]), SIGMA=2)))
             data = mpii.MPIIDataset(cfg, ".", "train-human36m", True)
@@ -598,7 +617,8 @@ class AgainAndAgain(Export):
             with self.subTest(rule=rule):
                 out = self.out.parent / rule.replace(" ", "-")
                 out.mkdir()
-                done = failing_files.run(out, rule, "export", demo.finalized, "--to", "yolo", "--out", out, "--progress", "none")
+                done = failing_files.run(out, rule, "export", demo.finalized, "--to", "yolo", "--out", out,
+                                         "--progress", "none")
                 self.assertEqual(done.code, -9)
                 (out / "a.txt").write_text("mine")
                 self.export("coco", "--split", "val", "--overwrite", out=out, expect=64)
@@ -606,7 +626,8 @@ class AgainAndAgain(Export):
                 (out / "a.txt").unlink()
                 self.export("coco", "--split", "val", "--overwrite", out=out)
                 same_folder(out, expected)
-                done = failing_files.run(out, rule, "export", demo.finalized, "--to", "yolo", "--overwrite", "--out", out)
+                done = failing_files.run(out, rule, "export", demo.finalized, "--to", "yolo", "--overwrite", "--out",
+                                         out)
                 self.assertEqual(done.code, -9)
                 self.export("yolo", "--split", "train", "--overwrite", out=out)
 
@@ -614,8 +635,8 @@ class AgainAndAgain(Export):
         expected = self.out / "expected"
         self.export("coco", out=expected)
         out = self.out / "stopped"
-        running = subprocess.Popen([program.PROGRAM, "export", demo.finalized, "--to", "coco", "--out", out, "--threads", "1",
-                                    "--progress", "none"], stderr=subprocess.PIPE, text=True)
+        running = subprocess.Popen([program.PROGRAM, "export", demo.finalized, "--to", "coco", "--out", out,
+                                    "--threads", "1", "--progress", "none"], stderr=subprocess.PIPE, text=True)
         while running.poll() is None and not list(out.glob("volumes/*/*.npy")):
             time.sleep(0.001)
         running.send_signal(signal.SIGTERM)
@@ -634,7 +655,8 @@ class AgainAndAgain(Export):
                 self.export(to, "--split", split_for(to), out=expected)
                 out = self.out.parent / f"{to}-full"
                 out.mkdir()
-                arguments = ["export", demo.finalized, "--to", to, "--split", split_for(to), "--progress", "none", "--out", out]
+                arguments = ["export", demo.finalized, "--to", to, "--split", split_for(to), "--progress", "none",
+                             "--out", out]
                 done = failing_files.run(out, "ENOSPC write 5+", *arguments)
                 self.assertEqual(done.code, 1)
                 self.assertIn("No space left on device", done.err)
@@ -658,10 +680,12 @@ class AgainAndAgain(Export):
 
 
 class ForeignNames(Export):
-    """Names and links in a folder of an export that lead out of it: nothing there is touched, and the record is named."""
+    """Names and links in a folder of an export that lead out of it: nothing there is touched,
+    and the record is named."""
 
-    NAMES = ["../victim.txt", "volumes/../../victim.txt", "{victim}", "./victim.txt", "volumes//a.npy", "volumes/", "", "/", ".export/export.txt",
-             "volumes/val/.hidden.npy", "mine/a.npy", "volumes/val/below/a.npy", "notes.md", "volumes/a\0.npy", "a\n.txt", "\u00e4.txt"]
+    NAMES = ["../victim.txt", "volumes/../../victim.txt", "{victim}", "./victim.txt", "volumes//a.npy", "volumes/", "",
+             "/", ".export/export.txt", "volumes/val/.hidden.npy", "mine/a.npy", "volumes/val/below/a.npy", "notes.md",
+             "volumes/a\0.npy", "a\n.txt", "\u00e4.txt"]
 
     def setUp(self):
         super().setUp()
@@ -673,7 +697,8 @@ class ForeignNames(Export):
     def refused(self, *named, to="coco", arguments=()):
         """The export must fail and change nothing; what is in its message."""
         before, outside = content(self.out), content(self.elsewhere)
-        done = subprocess.run([program.PROGRAM, "export", demo.finalized, "--to", to, "--split", "val", "--out", self.out, "--progress", "none", *arguments],
+        done = subprocess.run([program.PROGRAM, "export", demo.finalized, "--to", to, "--split", "val", "--out",
+                               self.out, "--progress", "none", *arguments],
                               capture_output=True, text=True, timeout=100)
         self.assertEqual(done.returncode, 1, done.stderr)
         for part in named:
@@ -811,8 +836,9 @@ class BadInput(Export):
         _, err = self.export("yolo", "--split", "test", expect=64)
         self.assertIn("train, val", err)
         self.export("voc", expect=64)
-        for to, option, value in [("coco", "--dtype", "float32"), ("yolo", "--counts", "rounded"), ("davis", "--seed", "1"),
-                                  ("mpii", "--classes", "x"), ("dsec", "--ignored", "keep"), ("rvt", "--full-scale", "2"), ("webdataset", "--full-scale", "2")]:
+        for to, option, value in [("coco", "--dtype", "float32"), ("yolo", "--counts", "rounded"),
+                                  ("davis", "--seed", "1"), ("mpii", "--classes", "x"), ("dsec", "--ignored", "keep"),
+                                  ("rvt", "--full-scale", "2"), ("webdataset", "--full-scale", "2")]:
             _, err = self.export(to, option, value, expect=64)
             self.assertRegex(err, rf"{option}: expected --to [a-z ,]+, got --to {to}\n")
         _, err = self.export("mpii", "--split", "val", expect=64)
@@ -821,8 +847,8 @@ class BadInput(Export):
 
     def test_a_wrong_class_map(self):
         classes = demo.folder / "wrong.json"
-        for content_, what in [('{"Car": 0, "Cat": 1}', "DontCare"), ('{"Car": 1}', "no 0"), ('{"Car": "a"}', "whole number"),
-                               ('{"DontCare": 0, "Car": 1}', "--ignored keep"),
+        for content_, what in [('{"Car": 0, "Cat": 1}', "DontCare"), ('{"Car": 1}', "no 0"),
+                               ('{"Car": "a"}', "whole number"), ('{"DontCare": 0, "Car": 1}', "--ignored keep"),
                                ('[1]', "class names"), ('{"Car": 0', "JSON"), ('{"Car": null}', "one class")]:
             with self.subTest(classes=content_):
                 classes.write_text(content_)

@@ -52,7 +52,8 @@ def read_samples(out):
             aliases = [text(name) for name in shard["labels/poses"].attrs.get("joint_aliases", joints)]
             for i in np.flatnonzero(shard["valid"][:]):
                 sample = {"shard": name, "slot": i, "volume": shard["events/volume"][i], "classes": classes,
-                          "joints": [j for j, alias in enumerate(aliases) if alias], "joint_names": [a for a in aliases if a]}
+                          "joints": [j for j, alias in enumerate(aliases) if alias],
+                          "joint_names": [a for a in aliases if a]}
                 for kind in ("boxes", "poses"):
                     group = shard["labels"][kind]
                     rows = slice(*group["offsets"][i:i + 2])
@@ -83,8 +84,8 @@ class Export(unittest.TestCase):
         self.out = pathlib.Path(tempfile.mkdtemp(dir=folder)) / "export"
 
     def export(self, to, *arguments, out=None, source=None, expect=0):
-        return run("export", source or finalized, "--to", to, "--out", out or self.out, "--progress", "none", *arguments,
-                   expect=expect)
+        return run("export", source or finalized, "--to", to, "--out", out or self.out, "--progress", "none",
+                   *arguments, expect=expect)
 
     def described(self, out=None):
         return json.loads(((out or self.out) / "export.json").read_text())

@@ -19,8 +19,8 @@ Outcome = collections.namedtuple("Outcome", "code out err calls struck")
 
 
 def run(folder, rule, *arguments):
-    """Runs the program, watched as it changes `folder`: exit code (-9: killed), what it printed, the calls in their order,
-    and whether the rule came to strike."""
+    """Runs the program, watched as it changes `folder`: exit code (-9: killed), what it printed, the calls in their
+    order, and whether the rule came to strike."""
     with tempfile.NamedTemporaryFile(prefix="eventgan-calls-") as log:
         # By its name alone: LD_PRELOAD takes no path with a space.
         folders = ":".join([str(LAYER.parent), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])])
@@ -45,8 +45,9 @@ def for_each(work, items):
 
 
 def thinned(calls, step=8):
-    """Numbers (from 1) of the calls to try: of the many small writes by which HDF5 makes a file every `step`-th, the last one of
-    each file, and every other call. A file under its temporary name is as unfinished after one such write as after the next."""
+    """Numbers (from 1) of the calls to try: of the many small writes by which HDF5 makes a file every `step`-th, the
+    last one of each file, and every other call. A file under its temporary name is as unfinished after one such write
+    as after the next."""
     last = {call.path: n for n, call in enumerate(calls, 1) if call.kind == "write"}
     return [n for n, call in enumerate(calls, 1)
             if call.kind != "write" or ".h5" not in call.path.name or n % step == 0 or last[call.path] == n]

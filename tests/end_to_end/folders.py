@@ -24,7 +24,8 @@ def records(folder):
 
 
 def content(folder):
-    """Each file by name: a commit record as JSON without what differs from run to run, any other as SHA-256 of its bytes."""
+    """Each file by name: a commit record as JSON without what differs from run to run,
+    any other as SHA-256 of its bytes."""
     files = {}
     for path in sorted(pathlib.Path(folder).rglob("*")):
         if path.is_dir():

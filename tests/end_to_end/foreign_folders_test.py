@@ -1,4 +1,5 @@
-"""Every command on a folder that is absent, empty, foreign, broken or of a newer version: one line says so, and nothing is changed."""
+"""Every command on a folder that is absent, empty, foreign, broken or of a newer version: one line says so,
+and nothing is changed."""
 
 import hashlib
 import json
@@ -7,7 +8,6 @@ import shutil
 import subprocess
 
 import h5py
-import unittest
 
 import program
 from program import run
@@ -23,8 +23,8 @@ ON_FOLDERS = {
 }
 ON_SHARDS = {"inspect": [], "preview": ["--out", "{scratch}/images"]}
 # Those that are given a document.
-ON_DOCUMENTS = {"convert": [], "plan": [], "train": [], "simulate": [], "calibrate": ["--out", "{scratch}/w.safetensors"],
-                "tradeoff": ["--out", "{scratch}/tradeoff"]}
+ON_DOCUMENTS = {"convert": [], "plan": [], "train": [], "simulate": [],
+                "calibrate": ["--out", "{scratch}/w.safetensors"], "tradeoff": ["--out", "{scratch}/tradeoff"]}
 OTHERS = {"init": ["--out", "{scratch}/manifest.json"], "realism": [], "fit": ["--out", "{scratch}/sensor.json"],
           "import-weights": ["{scratch}/weights.safetensors"]}
 NOT_OF_FOLDERS = {"make-demo", "help"}
@@ -106,7 +106,8 @@ class ForeignFolders(program.InFolder):
 
     def test_a_plan_that_is_broken_or_newer(self):
         on_plans = [[command, self.out, *rest] for command, rest in ON_FOLDERS.items()]
-        on_plans += [["convert", self.folder / "job" / "manifest.json"], ["plan", "--freeze", self.folder / "job" / "manifest.json"]]
+        on_plans += [["convert", self.folder / "job" / "manifest.json"],
+                     ["plan", "--freeze", self.folder / "job" / "manifest.json"]]
         plan = self.out / "plan.json"
         whole = plan.read_bytes()
         for name, data in {**DAMAGED, "half": whole[:len(whole) // 2], "newer": None}.items():
@@ -147,7 +148,8 @@ class ForeignFolders(program.InFolder):
         for command, rest in ON_SHARDS.items():
             self.assertRegex(self.one_line(command, shard, *rest), r'this program reads versions 1.x\), got "99.0"')
         for command in ["verify", "finalize"]:
-            self.assertIn('this program reads versions 1.x), got "99.0"', self.reports(shard, command, self.out, code=1))
+            self.assertIn('this program reads versions 1.x), got "99.0"',
+                          self.reports(shard, command, self.out, code=1))
 
     def test_a_shard_that_no_commit_record_vouches_for(self):
         shard = self.folder / "alone.h5"
@@ -169,7 +171,8 @@ class ForeignFolders(program.InFolder):
         amendments = self.out / "amendments.json"
         amendments.write_text(json.dumps({"format": "eventgan-amendments", "version": NEWER}))
         manifest = self.folder / "job" / "manifest.json"
-        for arguments in [["retry", self.out], ["finalize", self.out], ["convert", manifest], ["plan", "--freeze", manifest]]:
+        for arguments in [["retry", self.out], ["finalize", self.out], ["convert", manifest],
+                          ["plan", "--freeze", manifest]]:
             with self.subTest(command=arguments[0]):
                 self.assertIn(f"{amendments}: $.version", self.one_line(*arguments, codes=(1,)))
 
@@ -198,7 +201,8 @@ class ForeignFolders(program.InFolder):
                           ["export", self.out, "--to", "coco", "--out", self.scratch]]:
             with self.subTest(command=arguments[0]):
                 self.assertIn(str(self.scratch), self.one_line(*arguments))
-        self.assertEqual(snapshot(self.scratch), {mine.relative_to(self.scratch): b"mine", taken.relative_to(self.scratch): b"a file"})
+        self.assertEqual(snapshot(self.scratch),
+                         {mine.relative_to(self.scratch): b"mine", taken.relative_to(self.scratch): b"a file"})
 
 
 if __name__ == "__main__":

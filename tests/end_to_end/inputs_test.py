@@ -1,5 +1,5 @@
-"""Inputs that are there and cannot be read, or are not what they seem: each ends in a quarantined sample or one clear line, in no
-time and never in a crash."""
+"""Inputs that are there and cannot be read, or are not what they seem: each ends in a quarantined sample or one clear
+line, in no time and never in a crash."""
 
 import json
 import os
@@ -19,8 +19,8 @@ NOBODY = 65534
 
 
 def run_without_rights(test, *arguments):
-    """Permissions mean nothing to root, so as somebody else, to whom all of the test's folder is given, with a copy of the program:
-    the build may lie where only root may enter."""
+    """Permissions mean nothing to root, so as somebody else, to whom all of the test's folder is given, with a copy of
+    the program: the build may lie where only root may enter."""
     if os.geteuid() != 0:
         run(*arguments)
         return
@@ -40,7 +40,8 @@ def in_time(*arguments, expect):
     """Both outputs; fails if the program waits for a writer or a device's end."""
     done = subprocess.run([program.PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=120)
     if done.returncode != expect:
-        raise AssertionError(f"expected exit code {expect}, got {done.returncode} of {arguments}\n{done.stdout}\n{done.stderr}")
+        raise AssertionError(f"expected exit code {expect}, got {done.returncode} of "
+                             f"{arguments}\n{done.stdout}\n{done.stderr}")
     return done.stdout + done.stderr
 
 
@@ -91,7 +92,8 @@ class Labels(program.InFolder):
 
     def test_one_with_an_io_error_is_quarantined(self):
         manifest = small_job(self.folder / "job", people=0, errors=LENIENT)
-        done = failing_files.run(self.folder / "job" / "cars" / "label_2" / "000003.txt", "EIO open 1+", "convert", manifest)
+        done = failing_files.run(self.folder / "job" / "cars" / "label_2" / "000003.txt", "EIO open 1+", "convert",
+                                 manifest)
         self.assertEqual((done.code, done.struck), (0, True), done.err)
         quarantined = self.quarantined(self.folder / "job" / "out")
         self.assertEqual(list(quarantined), ["000003"])
@@ -119,8 +121,10 @@ class Labels(program.InFolder):
         manifest = small_job(self.folder / "job", cars=0)
         people = self.folder / "job" / "people" / "people.json"
         rows = people.read_text()
-        for bad, told in [(rows.replace('"scale": 0.1', '"scale": ' + "[" * 100_000 + "]" * 100_000), "at most 32 levels"),
-                          (rows.replace('"scale": 0.1', '"scale": 0.1, "scale": 0.2'), "[0].scale: expected the key once")]:
+        for bad, told in [(rows.replace('"scale": 0.1', '"scale": ' + "[" * 100_000 + "]" * 100_000),
+                           "at most 32 levels"),
+                          (rows.replace('"scale": 0.1', '"scale": 0.1, "scale": 0.2'),
+                           "[0].scale: expected the key once")]:
             people.write_text(bad)
             for command in ["plan", "convert"]:
                 err = in_time(command, manifest, expect=66)
@@ -138,7 +142,8 @@ class Files(program.InFolder):
         self.assertIn(path.name, in_time(*arguments, expect=66))
 
     def of_source(self, **source):
-        return self.write_manifest(program.manifest([{"pairs": program.pairs([1]), **source}], generator={"kind": "difference"}))
+        return self.write_manifest(program.manifest([{"pairs": program.pairs([1]), **source}],
+                                                    generator={"kind": "difference"}))
 
     def test_a_fifo_is_never_waited_for(self):
         self.refused(self.folder / "job.json", "plan", self.folder / "job.json")
@@ -155,8 +160,9 @@ class Files(program.InFolder):
         (videos / "Walking.7.mp4").write_bytes(b"")
         self.refused(self.folder / "o" / "S1" / "MyPoseFeatures" / "D2_Positions" / "Walking.7.cdf",
                      "plan", self.of_source(dataset="human36m", layout="official", root="o"))
-        weights = self.write_manifest(program.manifest([{"dataset": "frames", "root": "m", "pairs": program.pairs([1])}],
-                                                       generator={"weights": "w.safetensors"}))
+        weights = self.write_manifest(
+            program.manifest([{"dataset": "frames", "root": "m", "pairs": program.pairs([1])}],
+                             generator={"weights": "w.safetensors"}))
         save_image(self.folder / "m" / "0.png", np.random.default_rng(0))
         save_image(self.folder / "m" / "1.png", np.random.default_rng(1))
         self.refused(self.folder / "w.safetensors", "plan", weights)
@@ -166,7 +172,8 @@ class Files(program.InFolder):
         root = self.folder / "m"
         root.mkdir()
         os.mkfifo(root / "mpii_human_pose_v1_u12_1.mat")
-        self.refused(root / "mpii_human_pose_v1_sequences_keyframes.mat", "plan", self.of_source(dataset="mpii", root="m"))
+        self.refused(root / "mpii_human_pose_v1_sequences_keyframes.mat", "plan",
+                     self.of_source(dataset="mpii", root="m"))
 
     def test_a_truncated_npz_that_was_found_is_a_missing_input(self):
         root = self.folder / "x"
@@ -176,7 +183,8 @@ class Files(program.InFolder):
                 archive.writestr(name + ".npy", b"x" * 1000)
         path = root / "list.npz"
         path.write_bytes(path.read_bytes()[:-40])
-        self.assertIn("list.npz", in_time("plan", self.of_source(dataset="human36m", layout="extracted", root="x"), expect=66))
+        self.assertIn("list.npz",
+                      in_time("plan", self.of_source(dataset="human36m", layout="extracted", root="x"), expect=66))
 
 
 class Names(program.InFolder):
@@ -203,7 +211,8 @@ class Names(program.InFolder):
         for command in ("plan", "convert"):
             check(command, manifest)
         shard = next(out.glob("*.h5"))
-        for command in [("status", out), ("retry", out), ("verify", out, "--deep"), ("inspect", shard), ("inspect", shard, "--sample", 0),
+        for command in [("status", out), ("retry", out), ("verify", out, "--deep"), ("inspect", shard),
+                        ("inspect", shard, "--sample", 0),
                         ("finalize", out), ("report", out), ("preview", out, "--out", self.folder / "images"),
                         ("preview", out, "--out", self.folder / "more", "--sample", evil)]:
             check(*command)
@@ -212,7 +221,8 @@ class Names(program.InFolder):
         folder = os.fsencode(self.folder / "job") + b"-\xff\xe9"
         manifest = small_job(pathlib.Path(os.fsdecode(folder)), people=0)
         out = os.path.join(folder, b"out")
-        for arguments in [["convert", manifest], ["retry", out], ["finalize", out], ["verify", out, "--deep"], ["status", out]]:
+        for arguments in [["convert", manifest], ["retry", out], ["finalize", out], ["verify", out, "--deep"],
+                          ["status", out]]:
             done = subprocess.run([program.PROGRAM, *arguments], capture_output=True, timeout=120)
             self.assertEqual(done.returncode, 0, (arguments, done.stdout, done.stderr))
             self.assertNotIn(b"json.exception", done.stderr)

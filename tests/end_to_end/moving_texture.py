@@ -15,7 +15,8 @@ def texture(height, width, seed):
     patch_px = COARSEST_PX
     while patch_px >= FINEST_PX:
         cells = random.standard_normal((height // patch_px + 2, width // patch_px + 2)).astype(np.float32)
-        smooth = PIL.Image.fromarray(cells).resize((cells.shape[1] * patch_px, cells.shape[0] * patch_px), PIL.Image.BICUBIC)
+        smooth = PIL.Image.fromarray(cells).resize((cells.shape[1] * patch_px, cells.shape[0] * patch_px),
+                                                   PIL.Image.BICUBIC)
         total += np.asarray(smooth)[:height, :width]
         patch_px //= 2
     total = (total - total.min()) / (total.max() - total.min())

@@ -1,4 +1,5 @@
-"""Photographs as telephones write them: stored lying, with an orientation in EXIF. Labels are of the image as tools show it."""
+"""Photographs as telephones write them: stored lying, with an orientation in EXIF.
+Labels are of the image as tools show it."""
 
 import json
 
@@ -12,7 +13,8 @@ from program import run
 from small_job import LENIENT
 
 HEIGHT, WIDTH = 48, 32  # of the image held upright
-BOX = (8, 16, 24, 40)  # left, top, right, bottom of what is bright; on JPEG's blocks, so that its edges stay where they are
+# left, top, right, bottom of what is bright; on JPEG's blocks, so that its edges stay where they are
+BOX = (8, 16, 24, 40)
 # How an upright image is stored, by the tag (EXIF 2.32): 6 is shown turned by 90 degrees clockwise, and so on.
 STORED = {1: lambda upright: upright, 3: lambda upright: np.rot90(upright, 2), 6: lambda upright: np.rot90(upright, 1),
           8: lambda upright: np.rot90(upright, -1), 2: np.fliplr}
@@ -27,10 +29,12 @@ class Orientation(program.InFolder):
         stored = np.ascontiguousarray(STORED[orientation](upright))
         PIL.Image.fromarray(stored).save(path, exif=exif, quality=95, lossless=True)
         shown = np.asarray(PIL.ImageOps.exif_transpose(PIL.Image.open(path)).convert("L"), dtype=int)
-        self.assertLess(np.abs(shown - upright).max(), 3, "another program must show it upright, else this tests nothing")
+        self.assertLess(np.abs(shown - upright).max(), 3,
+                        "another program must show it upright, else this tests nothing")
 
     def convert(self, orientations, image_format="jpg"):
-        """A sequence of each orientation: an even image, then one with a bright place that has a box. The shard, opened."""
+        """A sequence of each orientation: an even image, then one with a bright place that has a box. The shard,
+        opened."""
         dark = np.full((HEIGHT, WIDTH), 60, np.uint8)
         bright = dark.copy()
         left, top, right, bottom = BOX
@@ -38,11 +42,13 @@ class Orientation(program.InFolder):
         rows = ["image,class,left,top,right,bottom"]
         for orientation in orientations:
             for number, image in enumerate((dark, bright)):
-                self.write_photograph(f"{image_format}/photos/seq{orientation}/{number}.{image_format}", image, orientation)
+                self.write_photograph(f"{image_format}/photos/seq{orientation}/{number}.{image_format}", image,
+                                      orientation)
             rows.append(f"seq{orientation}/1.{image_format},lamp,{left},{top},{right},{bottom}")
         (self.folder / image_format / "labels.csv").write_text("\n".join(rows) + "\n")
         manifest = program.manifest(
-            [{"dataset": "frames", "root": "photos", "labels": {"format": "csv", "path": "labels.csv"}, "pairs": program.pairs([1])}],
+            [{"dataset": "frames", "root": "photos", "labels": {"format": "csv", "path": "labels.csv"},
+              "pairs": program.pairs([1])}],
             generator={"kind": "difference"}, errors=LENIENT)
         path = self.write_manifest(manifest, f"{image_format}/manifest.json")
         run("convert", path)

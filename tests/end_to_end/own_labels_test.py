@@ -1,12 +1,11 @@
-"""Labels of one's own from file to shard and out again: the same boxes and ids, of synthetic images and of real ones; and 100,000 images
-of COCO, planned in linear time."""
+"""Labels of one's own from file to shard and out again: the same boxes and ids, of synthetic images and of real ones;
+and 100,000 images of COCO, planned in linear time."""
 
 import csv
 import json
 import os
 import subprocess
 import sys
-import unittest
 import xml.etree.ElementTree as ElementTree
 
 import cv2
@@ -29,10 +28,13 @@ PLAN_LIMIT_S = 120
 
 class OwnLabels(program.InFolder):
     def job(self, labels, root="images", name="out", **image):
-        """Converts the source; every sample of its shards by id: class and box of each object, and of each person the joints."""
+        """Converts the source; every sample of its shards by id: class and box of each object,
+        and of each person the joints."""
         source = {"dataset": "frames", "root": str(root), "labels": labels, "pairs": pairs([1])}
-        path = self.write_manifest(manifest([source], image={"preset": "mpii", **image}, generator={"kind": "difference"},
-                                            output={"directory": name, "samples_per_shard": 64, "dtype": "uint8"}), f"{name}.json")
+        path = self.write_manifest(manifest([source], image={"preset": "mpii", **image},
+                                            generator={"kind": "difference"},
+                                            output={"directory": name, "samples_per_shard": 64, "dtype": "uint8"}),
+                                   f"{name}.json")
         out, _ = run("convert", path, "--progress", "none")
         deep, _ = run("verify", "--deep", self.folder / name)
         self.samples = {}
@@ -49,12 +51,14 @@ class OwnLabels(program.InFolder):
             rows = range(*boxes["offsets"][i:i + 2])
             matrix = file["pairs/source_to_volume"][i]
             self.samples[text(sample_id)] = {
-                "boxes": [(text(classes[boxes["class_id"][row]]), boxes["xyxy_unclipped"][row], bool(boxes["ignore"][row])) for row in rows],
+                "boxes": [(text(classes[boxes["class_id"][row]]), boxes["xyxy_unclipped"][row],
+                           bool(boxes["ignore"][row])) for row in rows],
                 "tracks": [int(boxes["track_id"][row]) for row in rows],
                 "original": bytes(file["labels/original"][i]), "matrix": matrix}
 
     def assert_boxes(self, expected, tolerance=PIXELS):
-        """`expected`: of each sample the class, left, top, right, bottom in pixels of the image, in the labels' order."""
+        """`expected`: of each sample the class, left, top, right, bottom in pixels of the image,
+        in the labels' order."""
         for sample_id, sample in self.samples.items():
             self.assertEqual([box[0] for box in sample["boxes"]], [box[0] for box in expected[sample_id]], sample_id)
             scale = np.array([sample["matrix"][0, 0], sample["matrix"][1, 1]] * 2)
@@ -83,14 +87,17 @@ class OwnLabels(program.InFolder):
         """A COCO file: ids are neither dense nor in order. `boxes`: name and class, left, top, right, bottom."""
         numbers = {name: number for number, name in CATEGORIES.items()}
         ids = {name: 1_000_003 - 7 * i for i, name in enumerate(sorted(sizes))}
-        images = [{"id": ids[name], "file_name": name, "width": size[0], "height": size[1]} for name, size in sizes.items()]
+        images = [{"id": ids[name], "file_name": name, "width": size[0], "height": size[1]}
+                  for name, size in sizes.items()]
         annotations = []
         for i, (name, label, left, top, right, bottom) in enumerate(boxes):
             annotations.append({"id": 90_001 + 11 * i, "image_id": ids[name], "category_id": numbers[label],
-                                "bbox": [left, top, right - left, bottom - top], "area": (right - left) * (bottom - top), "iscrowd": 0,
-                                **more(i)})
-        categories = [{"id": number, "name": name, **((category or {}) if name == "person" else {})} for number, name in CATEGORIES.items()]
-        document = {"info": {"year": 2026}, "licenses": [], "images": images, "annotations": annotations, "categories": categories}
+                                "bbox": [left, top, right - left, bottom - top],
+                                "area": (right - left) * (bottom - top), "iscrowd": 0, **more(i)})
+        categories = [{"id": number, "name": name, **((category or {}) if name == "person" else {})}
+                      for number, name in CATEGORIES.items()]
+        document = {"info": {"year": 2026}, "licenses": [], "images": images, "annotations": annotations,
+                    "categories": categories}
         (self.folder / "instances.json").write_text(json.dumps(document))
         return document
 
@@ -99,7 +106,8 @@ class OwnLabels(program.InFolder):
         boxes = [(f"{name}.png", label, *edges) for name, edges in squares.items() for label in ("person", "car")]
         keypoints = [7, 12, 2, 0, 0, 0, 13.5, 19, 1]
         given = self.coco({f"{name}.png": (64, 48) for name in squares}, boxes,
-                          lambda i: {"iscrowd": int(i == 3), **({"keypoints": keypoints, "num_keypoints": 2} if i % 2 == 0 else {})},
+                          lambda i: {"iscrowd": int(i == 3),
+                                     **({"keypoints": keypoints, "num_keypoints": 2} if i % 2 == 0 else {})},
                           {"keypoints": JOINTS, "skeleton": [[1, 2]]})
         self.job({"format": "coco", "path": "instances.json"})
         self.assertEqual(len(self.samples), 5)  # the first has no frame before it
@@ -107,7 +115,9 @@ class OwnLabels(program.InFolder):
         for name, sample in self.samples.items():
             original = json.loads(sample["original"])
             image, = [entry for entry in given["images"] if entry["file_name"] == f"{name}.png"]
-            self.assertEqual(original, {"image": image, "annotations": [a for a in given["annotations"] if a["image_id"] == image["id"]]})
+            self.assertEqual(original,
+                             {"image": image,
+                              "annotations": [a for a in given["annotations"] if a["image_id"] == image["id"]]})
         folder = self.export("coco")
         instances = json.loads((folder / "instances_train.json").read_text())
         self.assert_same_coco(given, instances)
@@ -141,7 +151,8 @@ class OwnLabels(program.InFolder):
 
     def test_coco_through_a_letterbox(self):
         squares = self.make_images()
-        given = self.coco({f"{name}.png": (64, 48) for name in squares}, [(f"{name}.png", "car", *edges) for name, edges in squares.items()])
+        given = self.coco({f"{name}.png": (64, 48) for name in squares},
+                          [(f"{name}.png", "car", *edges) for name, edges in squares.items()])
         self.job({"format": "coco", "path": "instances.json"}, width=128, height=112, fit="letterbox")
         self.assert_boxes({name: [("car", *edges)] for name, edges in squares.items()})
         exported = json.loads((self.export("coco") / "instances_train.json").read_text())
@@ -158,7 +169,8 @@ class OwnLabels(program.InFolder):
         given["images"][4]["width"] = 48
         del given["annotations"][5]["category_id"]
         (self.folder / "instances.json").write_text(json.dumps(given))
-        source = {"dataset": "frames", "root": "images", "labels": {"format": "coco", "path": "instances.json"}, "pairs": pairs([1])}
+        source = {"dataset": "frames", "root": "images", "labels": {"format": "coco", "path": "instances.json"},
+                  "pairs": pairs([1])}
         path = self.write_manifest(manifest([source], generator={"kind": "difference"},
                                             errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1}))
         run("convert", path, "--progress", "none")
@@ -167,8 +179,8 @@ class OwnLabels(program.InFolder):
         for record in (self.folder / "out").glob("*-of-*.json"):
             reasons.update((q["sample_id"], q["reason"]) for q in json.loads(record.read_text())["quarantined"])
         self.assertEqual(sorted(reasons), ["000002", "000004", "000005", "gone"])
-        self.assertIn("expected a box within the image of 64x48, got one from (70, 10) to (75, 15), in instances.json (annotation 90023)",
-                      reasons["000002"])
+        self.assertIn("expected a box within the image of 64x48, got one from (70, 10) to (75, 15), in instances.json "
+                      "(annotation 90023)", reasons["000002"])
         self.assertIn("expected an image of 48x48", reasons["000004"])
         self.assertIn("(annotation 90056): $.category_id", reasons["000005"])
         self.assertIn("expected a frame, got no file, in images/gone.png", reasons["gone"])
@@ -179,27 +191,33 @@ class OwnLabels(program.InFolder):
         for shard in sorted(folder.glob("*-of-*.h5")):
             with h5py.File(shard) as file:
                 groups = {name: file[name] for name in ("events", "pairs")}
-                columns = {f"{name}/{key}": item for name, group in groups.items() for key, item in group.items() if isinstance(item, h5py.Dataset)}
+                columns = {f"{name}/{key}": item for name, group in groups.items() for key, item in group.items()
+                           if isinstance(item, h5py.Dataset)}
                 columns["original"] = file["labels/original"]
                 for i, sample_id in enumerate(file["pairs/sample_id"]):
-                    found[text(sample_id)] = {key: item[i].tobytes() if isinstance(item[i], (np.generic, np.ndarray)) else item[i]
-                                              for key, item in columns.items() if len(item) == len(file["pairs/sample_id"])}
+                    found[text(sample_id)] = {key: item[i].tobytes() if isinstance(item[i], (np.generic, np.ndarray))
+                                              else item[i]
+                                              for key, item in columns.items()
+                                              if len(item) == len(file["pairs/sample_id"])}
         return found
 
     def test_retry_redoes_what_was_mended_and_nothing_else(self):
         squares = self.make_images(8)
         images = {name: self.folder / "images" / f"{name}.png" for name in squares}
-        self.coco({f"{name}.png": (64, 48) for name in squares}, [(f"{name}.png", "car", *edges) for name, edges in squares.items()])
+        self.coco({f"{name}.png": (64, 48) for name in squares},
+                  [(f"{name}.png", "car", *edges) for name, edges in squares.items()])
         whole = {name: path.read_bytes() for name, path in images.items()}
         images["000003"].write_bytes(whole["000003"][:100])
         images["000007"].unlink()  # the labels name it
-        source = {"dataset": "frames", "root": "images", "labels": {"format": "coco", "path": "instances.json"}, "pairs": pairs([1])}
+        source = {"dataset": "frames", "root": "images", "labels": {"format": "coco", "path": "instances.json"},
+                  "pairs": pairs([1])}
         path = self.write_manifest(manifest([source], generator={"kind": "difference"},
                                             errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1}))
         out = self.folder / "out"
         run("convert", path, "--progress", "none")
         spoiled = {"000003", "000004", "000007"}
-        self.assertEqual({q["sample_id"] for record in out.glob("*-of-*.json") for q in json.loads(record.read_text())["quarantined"]}, spoiled)
+        self.assertEqual({q["sample_id"] for record in out.glob("*-of-*.json")
+                          for q in json.loads(record.read_text())["quarantined"]}, spoiled)
         before = self.rows(out)
         for name, path_of_image in images.items():
             path_of_image.write_bytes(whole[name])
@@ -223,18 +241,20 @@ class OwnLabels(program.InFolder):
             for kind in ("images", "labels"):
                 (drive / kind / split).mkdir(parents=True, exist_ok=True)
             (self.folder / "images" / f"{name}.png").rename(drive / "images" / split / f"{name}.png")
-            (drive / "labels" / split / f"{name}.txt").write_text(f"0 {(left + right) / 128} {(top + bottom) / 96} {(right - left) / 64} "
-                                                                  f"{(bottom - top) / 48}\n")
+            (drive / "labels" / split / f"{name}.txt").write_text(f"0 {(left + right) / 128} {(top + bottom) / 96} "
+                                                                  f"{(right - left) / 64} {(bottom - top) / 48}\n")
         (drive / "data.yaml").write_text("names: [car]\n")
         out, _ = run("init", drive, "--out", self.folder / "drive.json")
         self.assertNotIn("warning", out)
         planned = json.loads(run("plan", "--json", self.folder / "drive.json")[0])
-        self.assertEqual([(source["split"], source["labelled_frames"]) for source in planned["sources"]], [("train", 5), ("val", 3)])
+        self.assertEqual([(source["split"], source["labelled_frames"]) for source in planned["sources"]],
+                         [("train", 5), ("val", 3)])
         for _ in range(2):  # the second time by the manifest that was kept
             run("convert", drive, "--output", self.folder / "out", "--progress", "none")
         deep, _ = run("verify", "--deep", self.folder / "out")
         self.assertIn("labels of 6 samples compared with their sources", deep)
-        self.assertEqual({shard.name.split("-")[-4] for shard in (self.folder / "out").glob("*-of-*.h5")}, {"train", "val"})
+        self.assertEqual({shard.name.split("-")[-4] for shard in (self.folder / "out").glob("*-of-*.h5")},
+                         {"train", "val"})
 
     def test_the_labels_themselves_score_1(self):
         squares = self.make_images()
@@ -242,7 +262,8 @@ class OwnLabels(program.InFolder):
         self.coco({f"{name}.png": (64, 48) for name in squares}, boxes, lambda i: {"iscrowd": i == 3})
         self.job({"format": "coco", "path": "instances.json"}, width=128, height=112, fit="letterbox")
         found = [{"image_id": name, "category_id": label, "bbox": [left, top, right - left, bottom - top], "score": 0.9}
-                 for name, sample in self.samples.items() for label, (left, top, right, bottom), ignore in sample["boxes"] if not ignore]
+                 for name, sample in self.samples.items()
+                 for label, (left, top, right, bottom), ignore in sample["boxes"] if not ignore]
         self.assertEqual(len(found), 9)  # 5 samples of 2 boxes, one of them a crowd
         self.assertEqual(self.average_precisions(found), {"car": "1.000", "person": "1.000", "all": "1.000"})
         wrong = [{**one, "bbox": [0, 100, 9, 9]} if one["category_id"] == "car" else one for one in found]
@@ -250,9 +271,12 @@ class OwnLabels(program.InFolder):
 
     def average_precisions(self, found):
         """COCO's AP@[.5:.95] of each class, as eventgan.evaluate prints it."""
-        (self.folder / "found.json").write_text(json.dumps([{**one, "bbox": [float(edge) for edge in one["bbox"]]} for one in found]))
-        done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", "detections", self.folder / "found.json", "--truth", self.folder / "out"],
-                              capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": str(program.SOURCE / "manifests" / "python")})
+        (self.folder / "found.json").write_text(
+            json.dumps([{**one, "bbox": [float(edge) for edge in one["bbox"]]} for one in found]))
+        done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", "detections", self.folder / "found.json",
+                               "--truth", self.folder / "out"],
+                              capture_output=True, text=True, check=True,
+                              env={**os.environ, "PYTHONPATH": str(program.SOURCE / "manifests" / "python")})
         lines = [line.split() for line in done.stdout.partition("average precision ")[2].splitlines()[1:]]
         return {line[0]: line[-1] for line in lines if line}
 
@@ -264,13 +288,16 @@ class OwnLabels(program.InFolder):
         for i, (name, (left, top, right, bottom)) in enumerate(squares.items()):
             box = [(left + right) / 128, (top + bottom) / 96, (right - left) / 64, (bottom - top) / 48]
             lines[name] = [[i % 2, *box, 0.25, 0.5, 2, 0, 0, 0, 0.125, 0.75, 1]]
-            (self.folder / "labels" / f"{name}.txt").write_text("".join(" ".join(f"{value:.9g}" for value in line) + "\n" for line in lines[name]))
+            (self.folder / "labels" / f"{name}.txt").write_text(
+                "".join(" ".join(f"{value:.9g}" for value in line) + "\n" for line in lines[name]))
         self.job({"format": "yolo", "path": "."})
-        self.assert_boxes({name: [(["car", "person"][i % 2], *edges)] for i, (name, edges) in enumerate(squares.items())})
+        self.assert_boxes({name: [(["car", "person"][i % 2], *edges)]
+                           for i, (name, edges) in enumerate(squares.items())})
         folder = self.export("yolo")
         self.assertEqual(list(dict(enumerate(yaml.safe_load((folder / "data.yaml").read_text())["names"]))), [0, 1])
         for name in self.samples:
-            got = [[float(value) for value in line.split()] for line in (folder / "labels" / "train" / f"{name}.txt").read_text().splitlines()]
+            got = [[float(value) for value in line.split()]
+                   for line in (folder / "labels" / "train" / f"{name}.txt").read_text().splitlines()]
             np.testing.assert_allclose(np.array(got)[:, :5], np.array(lines[name])[:, :5], atol=PIXELS / 64)
         for annotation in json.loads((self.export("coco") / "person_keypoints_train.json").read_text())["annotations"]:
             np.testing.assert_allclose(annotation["keypoints"], [16, 24, 2, 0, 0, 0, 8, 36, 1], atol=PIXELS)
@@ -285,7 +312,8 @@ class OwnLabels(program.InFolder):
         with open(folder / "frames.csv", newline="") as file:
             sizes = {row["image"]: (int(row["width"]), int(row["height"])) for row in csv.DictReader(file)}
         with open(folder / "boxes.csv", newline="") as file:
-            boxes = [(row["image"], row["class"], *(float(row[edge]) for edge in ("x1", "y1", "x2", "y2"))) for row in csv.DictReader(file)]
+            boxes = [(row["image"], row["class"], *(float(row[edge]) for edge in ("x1", "y1", "x2", "y2")))
+                     for row in csv.DictReader(file)]
         expected = {image.rsplit(".", 1)[0]: [] for image in sizes}
         for image, *box in boxes:
             expected[image.rsplit(".", 1)[0]].append(tuple(box))
@@ -299,7 +327,8 @@ class OwnLabels(program.InFolder):
                 self.job({"format": "coco", "path": "instances.json"}, root, name)
                 self.assertGreaterEqual(len(self.samples), least)
                 self.assert_boxes(expected, 1e-3)  # float32 of a thousand pixels
-                self.assert_same_coco(given, json.loads((self.export("coco", name) / "instances_train.json").read_text()))
+                self.assert_same_coco(given,
+                                      json.loads((self.export("coco", name) / "instances_train.json").read_text()))
 
     def test_real_frames_with_yolo(self):
         root, sizes, boxes, expected = self.real("sot_person")
@@ -308,8 +337,8 @@ class OwnLabels(program.InFolder):
             path = self.folder / "labels" / f"{image.rsplit('.', 1)[0]}.txt"
             path.parent.mkdir(parents=True, exist_ok=True)
             with open(path, "a") as file:
-                file.write(f"0 {(left + right) / 2 / width:.9f} {(top + bottom) / 2 / height:.9f} {(right - left) / width:.9f} "
-                           f"{(bottom - top) / height:.9f}\n")
+                file.write(f"0 {(left + right) / 2 / width:.9f} {(top + bottom) / 2 / height:.9f} "
+                           f"{(right - left) / width:.9f} {(bottom - top) / height:.9f}\n")
         (self.folder / "labels" / "classes.txt").write_text("person\n")
         self.job({"format": "yolo", "path": "labels"}, root)
         self.assert_boxes(expected, 1e-3)
@@ -356,7 +385,8 @@ class OwnLabels(program.InFolder):
             table = np.loadtxt(root.parent / sequence / "gt.txt", delimiter=",")
             table = table[table[:, 0] == int(frame)]
             corner = table[:, 2:4] - 1
-            np.testing.assert_allclose([box for _, box, _ in sample["boxes"]], np.hstack([corner, corner + table[:, 4:6]]), atol=1e-3)
+            np.testing.assert_allclose([box for _, box, _ in sample["boxes"]],
+                                       np.hstack([corner, corner + table[:, 4:6]]), atol=1e-3)
             self.assertEqual(sample["tracks"], list(table[:, 1].astype(int)))
             self.assertEqual([ignore for _, _, ignore in sample["boxes"]],
                              [bool(row[6] == 0 or row[7] in (2, 7, 8, 12, 13)) for row in table])
@@ -364,7 +394,8 @@ class OwnLabels(program.InFolder):
     # ---- Scale
 
     def assert_linear(self, seconds):
-        """`seconds` by the number of inputs, of two numbers of which one is eight times the other: a square would be 64 times as long."""
+        """`seconds` by the number of inputs, of two numbers of which one is eight times the other:
+        a square would be 64 times as long."""
         few, many = sorted(seconds)
         self.assertEqual(many, 8 * few)
         self.assertLess(seconds[many], 20 * max(seconds[few], 0.3))
@@ -393,7 +424,8 @@ class OwnLabels(program.InFolder):
             writer.release()
             for i in range(count):
                 (folder / f"clip_{i:06d}.txt").write_text("0 0.5 0.5 0.25 0.25\n")
-            source = {"dataset": "frames", "root": folder.name, "labels": {"format": "yolo", "path": folder.name}, "pairs": pairs([1])}
+            source = {"dataset": "frames", "root": folder.name, "labels": {"format": "yolo", "path": folder.name},
+                      "pairs": pairs([1])}
             path = self.write_manifest(manifest([source], generator={"kind": "difference"}), f"{count}.json")
             done = Measured("plan", "--json", path)
             self.assertEqual(json.loads(done.out)["pairs"], count - 1)  # most of frames that the video does not have
@@ -414,15 +446,18 @@ class OwnLabels(program.InFolder):
             with open(self.folder / f"{count}.json", "w") as file:
                 file.write('{"images": [')
                 for i in range(count):
-                    file.write(("," if i else "") + json.dumps({"id": 17 * i + 3, "width": 16, "height": 16, "file_name": f"{i:012d}.jpg"}))
+                    file.write(("," if i else "") + json.dumps({"id": 17 * i + 3, "width": 16, "height": 16,
+                                                                "file_name": f"{i:012d}.jpg"}))
                 file.write('], "annotations": [')
                 for i in range(8 * count):
-                    entry = {"id": i, "image_id": 17 * (i * 7919 % count) + 3, "category_id": 1, "iscrowd": 0, "area": 4,
-                             "bbox": [1, 2, 2, 2], "segmentation": [polygon]}
+                    entry = {"id": i, "image_id": 17 * (i * 7919 % count) + 3, "category_id": 1, "iscrowd": 0,
+                             "area": 4, "bbox": [1, 2, 2, 2], "segmentation": [polygon]}
                     file.write(("," if i else "") + json.dumps(entry))
                 file.write('], "categories": [{"id": 1, "name": "person"}]}')
-            source = {"dataset": "frames", "root": folder.name, "labels": {"format": "coco", "path": f"{count}.json"}, "pairs": pairs([1])}
-            path = self.write_manifest(manifest([source], image={"preset": "mpii", "height": 16, "width": 16}, generator={"kind": "difference"},
+            source = {"dataset": "frames", "root": folder.name, "labels": {"format": "coco", "path": f"{count}.json"},
+                      "pairs": pairs([1])}
+            path = self.write_manifest(manifest([source], image={"preset": "mpii", "height": 16, "width": 16},
+                                                generator={"kind": "difference"},
                                                 output={"directory": f"out{count}", "samples_per_shard": 250}))
             done = Measured("plan", "--freeze", "--json", path)
             self.assertEqual(json.loads(done.out)["samples"], count - 1)

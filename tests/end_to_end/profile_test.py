@@ -1,4 +1,5 @@
-"""`convert --profile` and `retry --profile`: a trace of every stage and thread, whatever ends the run, and the same shards."""
+"""`convert --profile` and `retry --profile`: a trace of every stage and thread, whatever ends the run,
+and the same shards."""
 
 import collections
 import json
@@ -73,7 +74,8 @@ class Profile(program.InFolder):
                 self.assertTrue(all(event["args"]["pixels"] == 24 * 32 for event in work))
             for event in events(trace, "X", "finish"):
                 self.assertGreater(event["args"]["bytes"], 0)
-            self.assertEqual(sorted(event["args"]["shard"] for event in events(trace, "X", "commit shard")), shards(self.out))
+            self.assertEqual(sorted(event["args"]["shard"] for event in events(trace, "X", "commit shard")),
+                             shards(self.out))
             self.assertEqual(len(events(trace, "X", "write commit record")), 5)
             for once in ("load generator", "make plan", "fingerprint", "freeze plan", "make shards"):
                 self.assertEqual(len(events(trace, "X", once)), 1, once)
@@ -124,8 +126,8 @@ class Profile(program.InFolder):
         self.assertFalse(any(record["quarantined"] for record in records(self.out).values()))
 
     def test_of_a_stopped_run_up_to_there(self):
-        outcome = failing_files.run(self.out, "SIGTERM write 3", "convert", self.manifest, "--output", self.out, "--threads", "1",
-                                    "--profile", self.file)
+        outcome = failing_files.run(self.out, "SIGTERM write 3", "convert", self.manifest, "--output", self.out,
+                                    "--threads", "1", "--profile", self.file)
         self.assertEqual(outcome.code, STOPPED, outcome.err)
         self.assertIn(str(self.file), outcome.err)
         self.assertTrue(events(self.trace(), "X", "read"))
@@ -134,8 +136,8 @@ class Profile(program.InFolder):
         same_folder(self.out, self.plain)
 
     def test_of_a_run_that_fails_up_to_there(self):
-        outcome = failing_files.run(self.out, "ENOSPC write 5+", "convert", self.manifest, "--output", self.out, "--threads", "1",
-                                    "--profile", self.file)
+        outcome = failing_files.run(self.out, "ENOSPC write 5+", "convert", self.manifest, "--output", self.out,
+                                    "--threads", "1", "--profile", self.file)
         self.assertEqual(outcome.code, 1, outcome.err)
         self.assertTrue(events(self.trace(), "X", "read"))
 

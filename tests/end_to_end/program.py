@@ -17,7 +17,8 @@ SKIPPED = 77  # what ctest knows as skipped
 
 
 def run(*arguments, expect=0, environment=None):
-    """Runs the program, with changes to its environment; its output as (stdout, stderr). Fails the test on another exit code."""
+    """Runs the program, with changes to its environment; its output as (stdout, stderr).
+    Fails the test on another exit code."""
     done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True,
                           env={**os.environ, **(environment or {})})
     if done.returncode != expect:

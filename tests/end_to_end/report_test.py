@@ -1,4 +1,5 @@
-"""The report of a folder in a real browser: its numbers against the shards as h5py reads them; and `preview` of folders."""
+"""The report of a folder in a real browser: its numbers against the shards as h5py reads them;
+and `preview` of folders."""
 
 import contextlib
 import html.parser
@@ -8,7 +9,6 @@ import pathlib
 import re
 import shutil
 import subprocess
-import unittest
 
 import h5py
 import numpy as np
@@ -59,7 +59,8 @@ class Report(program.InFolder):
         if CHROMIUM is None:
             self.skipTest("no chromium")
         done = subprocess.run(
-            [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--no-first-run", "--proxy-server=127.0.0.1:9",
+            [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--no-first-run",
+             "--proxy-server=127.0.0.1:9",
              f"--user-data-dir={self.folder / 'browser'}", *options, (page or self.out / "report.html").as_uri()],
             capture_output=True, text=True, timeout=300)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -241,7 +242,8 @@ class Report(program.InFolder):
         planless = self.folder / "planless"
         shutil.copytree(self.out, planless)
         (planless / "plan.json").write_text('{"format":"eventgan-plan","version":99}\n')
-        for command in (["report"], ["preview", "--out", self.folder / "p"], ["preview", "--out", self.folder / "p", "--worst", "2"]):
+        for command in (["report"], ["preview", "--out", self.folder / "p"],
+                        ["preview", "--out", self.folder / "p", "--worst", "2"]):
             for where, code in [(empty, 66), (self.folder / "none", 66), (torn, 1), (planless, 1)]:
                 with self.subTest(command=command[0], where=where.name):
                     _, err = run(command[0], where, *command[1:], expect=code)

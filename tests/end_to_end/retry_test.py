@@ -225,14 +225,16 @@ class ChangedInputs(program.InFolder):
         run("convert", self.manifest, "--output", self.out)
 
     def test_what_changes_the_plan_but_none_of_its_files(self):
-        """A second folder, whose only image has no paired frame: counted, and in no pair. A file that is no UTF-8 is noted."""
+        """A second folder, whose only image has no paired frame: counted, and in no pair.
+        A file that is no UTF-8 is noted."""
         random = np.random.default_rng(9)
         for k in range(4):
             save_image(self.folder / "clips" / "a" / f"{k:03d}.png", random)
         foreign = self.folder / "clips" / "a" / "caf\udce9.txt"
         foreign.write_bytes(b"")
         manifest = self.folder / "manifest.json"
-        manifest.write_text(json.dumps(program.manifest([{"dataset": "frames", "root": "clips", "pairs": program.pairs([1])}])))
+        manifest.write_text(
+            json.dumps(program.manifest([{"dataset": "frames", "root": "clips", "pairs": program.pairs([1])}])))
         out = self.folder / "out"
         subprocess.run([program.PROGRAM, "convert", manifest, "--output", out], check=True, capture_output=True)
         self.assertIn("1 files left out in clips/a: caf\ufffd.txt", run("status", out)[0])

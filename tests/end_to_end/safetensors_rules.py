@@ -1,4 +1,5 @@
-"""Reads a weights file by the rules of the safetensors format, on its own: nothing of this project's reader is in it."""
+"""Reads a weights file by the rules of the safetensors format, on its own:
+nothing of this project's reader is in it."""
 
 import json
 import struct

@@ -1,6 +1,8 @@
-"""The bookkeeping of a million pairs in 4,000 shards: a plan is frozen within a minute and 1.5 GB, status and finalize take seconds.
+"""The bookkeeping of a million pairs in 4,000 shards: a plan is frozen within a minute and 1.5 GB, status and finalize
+take seconds.
 
-Only two shards are converted; the others are links to the first, with commit records as convert would have written them."""
+Only two shards are converted; the others are links to the first, with commit records as convert would have written
+them."""
 
 import hashlib
 import json
@@ -41,8 +43,8 @@ class Measured:
     def __init__(self, *arguments, expect=0, environment=None):
         start = time.monotonic()
         with tempfile.TemporaryFile("w+") as errors:
-            process = subprocess.Popen([program.PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=errors, text=True,
-                                       env={**os.environ, **(environment or {})})
+            process = subprocess.Popen([program.PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=errors,
+                                       text=True, env={**os.environ, **(environment or {})})
             with process.stdout:
                 self.out = process.stdout.read()
             _, status, usage = os.wait4(process.pid, 0)  # getrusage() knows only the largest of all children
@@ -51,10 +53,11 @@ class Measured:
             self.err = errors.read()
         self.seconds = time.monotonic() - start
         self.peak_bytes = usage.ru_maxrss * 1024
-        print(f"{' '.join(map(str, arguments[:2]))}: {self.seconds:.1f} s, of them {usage.ru_utime + usage.ru_stime:.1f} s busy, "
-              f"{self.peak_bytes / 1e6:.0f} MB", flush=True)
+        print(f"{' '.join(map(str, arguments[:2]))}: {self.seconds:.1f} s, of them "
+              f"{usage.ru_utime + usage.ru_stime:.1f} s busy, {self.peak_bytes / 1e6:.0f} MB", flush=True)
         if process.returncode != expect:
-            raise AssertionError(f"expected exit code {expect}, got {process.returncode}, of {arguments}\n{self.out[-4000:]}\n{self.err[-4000:]}")
+            raise AssertionError(f"expected exit code {expect}, got {process.returncode}, of "
+                                 f"{arguments}\n{self.out[-4000:]}\n{self.err[-4000:]}")
 
 
 class Scale(program.InFolder):
@@ -108,8 +111,8 @@ class Scale(program.InFolder):
         self.assertEqual(len(list(self.out.glob("*.h5"))), 2)
 
     def make_commit_records(self):
-        """Links and commit records for the other shards; every hundredth has a quarantined sample. Three commit records are given back
-        instead of written."""
+        """Links and commit records for the other shards; every hundredth has a quarantined sample. Three commit records
+        are given back instead of written."""
         record = json.loads(self.name(0, "json").read_text())
         self.assertEqual((record["samples"], record["valid"]), (SHARD, SHARD))
         self.quarantined = 0
@@ -121,7 +124,8 @@ class Scale(program.InFolder):
             if shard % 100 == 0:
                 mine["valid"] -= 1
                 mine.update(sha256=sha256, size_bytes=spoiled.stat().st_size)
-                mine["quarantined"] = [{"slot": 7, "sample_id": self.spoiled_id, "reason": "expected a PNG, got 0 bytes, in x"}]
+                mine["quarantined"] = [{"slot": 7, "sample_id": self.spoiled_id,
+                                        "reason": "expected a PNG, got 0 bytes, in x"}]
                 self.quarantined += 1
             text = json.dumps(mine, indent=2, sort_keys=True) + "\n"
             if shard in [1, 1999, SHARDS - 2]:

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import unittest
 
 import h5py
 import numpy as np
@@ -66,7 +65,8 @@ class SharedData(program.InFolder):
             [{"dataset": "kitti_object", "root": str(root), "pairs": pairs([1, 2, 3], choose="all")}],
             image={"width": 861, "height": 260, "fit": "stretch", "preset": "kitti"}))
         self.assertIn("without a paired frame", out)  # 000000, 000001, 000008 have no previous frames
-        self.assertEqual([text(s) for s in shard["pairs/sample_id"]], ["001497@before1", "001497@before2", "001497@before3"])
+        self.assertEqual([text(s) for s in shard["pairs/sample_id"]],
+                         ["001497@before1", "001497@before2", "001497@before3"])
         np.testing.assert_array_equal(shard["pairs/gap_frames"], [1, 2, 3])
         np.testing.assert_array_equal(shard["pairs/label_position"], [1, 1, 1])
         np.testing.assert_array_equal(shard["pairs/source_size"], [[375, 1242]] * 3)
@@ -80,7 +80,8 @@ class SharedData(program.InFolder):
         _, (shard,) = self.convert(manifest(
             [{"dataset": "kitti_object", "root": str(SHARED / "kitti_object" / "training"),
               "raw_root": str(SHARED / "kitti_raw"), "devkit": str(SHARED / "kitti_object" / "devkit"),
-              "pairs": pairs([4, 5, 6], choose="all")}], image={"width": 346, "height": 260, "fit": "letterbox", "preset": "kitti"}))
+              "pairs": pairs([4, 5, 6], choose="all")}],
+            image={"width": 346, "height": 260, "fit": "letterbox", "preset": "kitti"}))
         # By the mapping 001497 is frame 7 of drive 0052, which is there from frame 0.
         np.testing.assert_array_equal(shard["pairs/prev_index"], [3, 2, 1])
         np.testing.assert_array_equal(shard["pairs/next_index"], [7, 7, 7])
@@ -91,13 +92,15 @@ class SharedData(program.InFolder):
         self.assertFalse(shard["events/statistics/flags"][:].any())
 
     def test_kitti_raw(self):
-        _, shards = self.convert(manifest([{"dataset": "kitti_raw", "root": str(SHARED / "kitti_raw"), "pairs": pairs([6])}],
-                                          image={"width": 96, "height": 32, "fit": "crop", "preset": "kitti"}))
+        _, shards = self.convert(
+            manifest([{"dataset": "kitti_raw", "root": str(SHARED / "kitti_raw"), "pairs": pairs([6])}],
+                     image={"width": 96, "height": 32, "fit": "crop", "preset": "kitti"}))
         self.assertEqual(sum(shard["valid"][:].sum() for shard in shards), 15)  # frames 6..20
 
     def test_mpii(self):
-        _, shards = self.convert(manifest([{"dataset": "mpii", "root": str(SHARED / "mpii"), "pairs": pairs([2, 4], "around", "all")}],
-                                          image={"width": 256, "height": 256, "fit": "letterbox", "preset": "mpii"}))
+        _, shards = self.convert(
+            manifest([{"dataset": "mpii", "root": str(SHARED / "mpii"), "pairs": pairs([2, 4], "around", "all")}],
+                     image={"width": 256, "height": 256, "fit": "letterbox", "preset": "mpii"}))
         shard = shards[0]
         self.assertEqual(text(shard["pairs/sample_id"][0]), "000000001@around2")
         np.testing.assert_array_equal(shard["pairs/label_position"][:2], [0.5, 0.5])
@@ -127,8 +130,8 @@ class SharedData(program.InFolder):
                 seen = (annotations["pose/2d"][row] - [cx, cy]) / [fx, fy]
                 annotations["pose/3d-univ"][row] = np.append(5000 * seen, np.full((len(seen), 1), 5000), axis=1)
         _, shards = self.convert(manifest([{"dataset": "human36m", "root": str(root), "layout": "fetch",
-                                           "pairs": pairs([1, 6], "after", "one")}],
-                                         image={"width": 250, "height": 250, "fit": "stretch", "preset": "mpii"}))
+                                            "pairs": pairs([1, 6], "after", "one")}],
+                                          image={"width": 250, "height": 250, "fit": "stretch", "preset": "mpii"}))
         ids = [text(sample) for shard in shards for sample in shard["pairs/sample_id"]]
         self.assertEqual(len(ids), 16)  # 9 frames of each of two cameras, the last without a next one
         shard = shards[0]
@@ -139,15 +142,17 @@ class SharedData(program.InFolder):
         scale = np.array([250 / 1000, 250 / shard["pairs/source_size"][0][0]])
         np.testing.assert_allclose(shard["labels/poses/joints"][0], (expected + 0.5) * scale - 0.5, atol=1e-3)
         np.testing.assert_allclose(shard["labels/poses/camera"][0],
-                                   [fx * scale[0], fy * scale[1], (cx + 0.5) * scale[0] - 0.5, (cy + 0.5) * scale[1] - 0.5], atol=1e-6)
+                                   [fx * scale[0], fy * scale[1], (cx + 0.5) * scale[0] - 0.5,
+                                    (cy + 0.5) * scale[1] - 0.5], atol=1e-6)
         # One step is five frames of the 50 Hz original.
         np.testing.assert_allclose(shard["pairs/gap_s"][:], shard["pairs/gap_frames"][:] * 0.1, atol=1e-9)
 
     def test_human36m_as_it_is_downloaded(self):
-        _, shards = self.convert(manifest([{"dataset": "human36m", "root": str(SHARED / "human36m_official"), "layout": "official",
-                                            "every": 5, "pairs": pairs([1, 6], "after", "all")}],
-                                          image={"width": 250, "height": 250, "fit": "stretch", "preset": "mpii"},
-                                          generator={"kind": "difference"}, output={"directory": "out", "samples_per_shard": 64}))
+        _, shards = self.convert(
+            manifest([{"dataset": "human36m", "root": str(SHARED / "human36m_official"), "layout": "official",
+                       "every": 5, "pairs": pairs([1, 6], "after", "all")}],
+                     image={"width": 250, "height": 250, "fit": "stretch", "preset": "mpii"},
+                     generator={"kind": "difference"}, output={"directory": "out", "samples_per_shard": 64}))
         shard, = shards
         ids = [text(sample) for sample in shard["pairs/sample_id"]]
         # Of 40 frames 1, 6, ..., 36 are taken: 7 have a next one, 2 one six steps on, in each of two videos.
@@ -181,7 +186,8 @@ class SharedData(program.InFolder):
     def test_a_video(self):
         _, shards = self.convert(manifest(
             [{"dataset": "frames", "root": str(SHARED / "clips" / "04_coffee.mp4"), "pairs": pairs([1, 6])}],
-            image={"width": 64, "height": 36, "fit": "stretch", "preset": "mpii"}, output={"directory": "out", "samples_per_shard": 512}))
+            image={"width": 64, "height": 36, "fit": "stretch", "preset": "mpii"},
+            output={"directory": "out", "samples_per_shard": 512}))
         gaps = shards[0]["pairs/gap_frames"][:]
         self.assertEqual(set(gaps), {1, 6})
         np.testing.assert_allclose(shards[0]["pairs/gap_s"][:], gaps / 29.97, rtol=1e-4)

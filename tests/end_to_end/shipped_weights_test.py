@@ -1,4 +1,5 @@
-"""What the weights that come with the program promise, through the program: still images, real events, direction of motion.
+"""What the weights that come with the program promise, through the program: still images, real events, direction of
+motion.
 
 With EVENTGAN_CANDIDATE_WEIGHTS=FILE.safetensors these weights are judged in place of the shipped ones.
 """
@@ -21,7 +22,8 @@ SHIPPED = sorted(FOLDER.glob("eventgan-*.safetensors"))
 
 TOLD = FOLDER / "eventgan-sensor.safetensors"  # these draw events, which match no camera's one by one
 THRESHOLDS = [0.15, 0.3, 0.6]
-MOST_TOLD_STILL = 0.02  # events per pixel of a still pair, of weights that have learnt real cameras' noise: of 20 ms of 1 Hz
+# events per pixel of a still pair, of weights that have learnt real cameras' noise: of 20 ms of 1 Hz
+MOST_TOLD_STILL = 0.02
 LEAST_RATIO = 3  # of the events at the lowest threshold to those at the highest
 
 # Images of a moving texture, and of one that rests.
@@ -30,13 +32,15 @@ FRAMES = 7
 SPEED_PX = 1  # a frame
 TEXTURES = [1, 2, 3]
 GAPS = [1, 6]
-# A still pair's events, as a share of those of a pair that moves by a pixel. Not 0, since a network makes no exact nothing;
-# at a fiftieth a still scene costs its reader less than one event in a patch where the slowest motion makes fifty.
+# A still pair's events, as a share of those of a pair that moves by a pixel. Not 0, since a network makes no exact
+# nothing; at a fiftieth a still scene costs its reader less than one event in a patch where the slowest motion makes
+# fifty.
 MOST_OF_STILL = 0.02
 # Events per pixel of the farthest pair, so that a network without any events does not pass.
 LEAST_OF_FAR = 0.05
 
-# Real events that the training has not seen: six recordings of four kinds of sensor, one of which it has not seen at all.
+# Real events that the training has not seen: six recordings of four kinds of sensor, one of which it has not seen at
+# all.
 REAL = FOLDER / "train-8.json"  # its `validation`
 REAL_GAP = 1
 HIGHER = ["f1_time", "time_correlation"]
@@ -59,14 +63,16 @@ def realism(recordings, *arguments):
     """Scores of each recording, by method: name → score → number."""
     weights = ["--weights", CANDIDATE] if CANDIDATE and "--weights" not in arguments else []
     out, _ = run("realism", recordings, *weights, *arguments, "--json", "--progress", "none")
-    return [{method["name"]: method["mean"] for method in recording["methods"]} for recording in json.loads(out)["recordings"]]
+    return [{method["name"]: method["mean"] for method in recording["methods"]}
+            for recording in json.loads(out)["recordings"]]
 
 
 class ShippedWeights(program.InFolder):
     def convert_by_default(self, root):
         job = {"format": "eventgan-manifest", "version": 1, "name": "job", "seed": 1,
                "sources": [{"dataset": "frames", "root": str(root), "pairs": pairs(GAPS, choose="all")}],
-               "image": {"preset": "mpii"}, "output": {"directory": "out", "samples_per_shard": 512, "dtype": "float32"}}
+               "image": {"preset": "mpii"},
+               "output": {"directory": "out", "samples_per_shard": 512, "dtype": "float32"}}
         if CANDIDATE:
             job["generator"] = {"weights": CANDIDATE}
         _, err = run("convert", self.write_manifest(job), "--progress", "none")
@@ -85,7 +91,8 @@ class ShippedWeights(program.InFolder):
         gaps = shard["pairs/gap_frames"][:]
         self.assertEqual(still.sum(), len(TEXTURES) * sum(FRAMES - gap for gap in GAPS))
         near, far = (events[~still & (gaps == gap)].mean() for gap in GAPS)
-        print(f"events per pixel: still at most {events[still].max():.6f}, moving {near:.5f} and {far:.5f}, {GAPS} apart")
+        print(f"events per pixel: still at most {events[still].max():.6f}, moving {near:.5f} and {far:.5f}, "
+              f"{GAPS} apart")
         self.assertLess(events[still].max(), MOST_OF_STILL * near)
         self.assertGreater(far, near)
         self.assertGreater(far, LEAST_OF_FAR)
@@ -105,8 +112,10 @@ class ShippedWeights(program.InFolder):
             scores = realism(REAL, "--gaps", REAL_GAP, "--with", "network,difference", "--weights", weights)
             self.assertEqual(len(scores), 6)
             for score in HIGHER + LOWER:
-                network, model = (np.array([each[name][score] for each in scores]) for name in ("network", "difference"))
-                print(f"{weights.name if not CANDIDATE else CANDIDATE}: {score}, network / difference:", (network / model).round(2), network.mean() / model.mean())
+                network, model = (np.array([each[name][score] for each in scores])
+                                  for name in ("network", "difference"))
+                print(f"{weights.name if not CANDIDATE else CANDIDATE}: {score}, network / difference:",
+                      (network / model).round(2), network.mean() / model.mean())
                 with self.subTest(score, weights=str(weights)):
                     if score in HIGHER:
                         self.assertGreater(network.mean(), model.mean())
@@ -116,7 +125,8 @@ class ShippedWeights(program.InFolder):
     def events_at(self, threshold):
         """Events per pixel of still and of moving pairs."""
         job = {"format": "eventgan-manifest", "version": 1, "name": "job", "seed": 1,
-               "sources": [{"dataset": "frames", "root": str(self.folder / "images"), "pairs": pairs([1], choose="all")}],
+               "sources": [{"dataset": "frames", "root": str(self.folder / "images"),
+                            "pairs": pairs([1], choose="all")}],
                "generator": {"weights": str(TOLD), "sensor": {"threshold": threshold}},
                "image": {"preset": "mpii"}, "output": {"directory": f"out-{threshold}", "samples_per_shard": 512}}
         run("convert", self.write_manifest(job), "--progress", "none")
@@ -125,7 +135,8 @@ class ShippedWeights(program.InFolder):
             self.assertTrue((file["pairs/threshold"][:] == threshold).all())
             still = np.array(["still" in text(path) for path in file["pairs/prev_path"]])
             events = file["events/volume"][:].astype(float).sum(axis=1)
-        self.assertLess(np.abs(events - events.round()).max(), 0.02)  # whole ones at each pixel, but for how they are stored
+        # whole ones at each pixel, but for how they are stored
+        self.assertLess(np.abs(events - events.round()).max(), 0.02)
         return events[still].mean(), events[~still].mean()
 
     @unittest.skipIf(CANDIDATE or not TOLD.exists(), "other weights are judged")
@@ -141,21 +152,25 @@ class ShippedWeights(program.InFolder):
     @needs_shared_data
     @unittest.skipIf(CANDIDATE or not TOLD.exists(), "other weights are judged")
     def test_a_told_sensor_has_the_cameras_bins_and_polarities(self):
-        out, _ = run("realism", REAL, "--gaps", REAL_GAP, "--with", "network,difference", "--weights", TOLD, "--json", "--progress", "none")
+        out, _ = run("realism", REAL, "--gaps", REAL_GAP, "--with", "network,difference", "--weights", TOLD, "--json",
+                     "--progress", "none")
         for recording in json.loads(out)["recordings"]:
             network, model = recording["methods"]
-            shares, real = (np.array(each["mean"]["events_per_channel"]) / each["mean"]["events_per_pixel"] for each in (network, recording["real"]))
-            print(f"{recording['recording']}: distance of shares {network['share_distance']:.3f}, difference's {model['share_distance']:.3f}")
+            shares, real = (np.array(each["mean"]["events_per_channel"]) / each["mean"]["events_per_pixel"]
+                            for each in (network, recording["real"]))
+            print(f"{recording['recording']}: distance of shares {network['share_distance']:.3f}, difference's "
+                  f"{model['share_distance']:.3f}")
             with self.subTest(recording["recording"]):
                 self.assertLess(network["share_distance"], model["share_distance"])
                 self.assertAlmostEqual(shares[:9].sum(), real[:9].sum(), delta=0.03)
 
     @needs_shared_data
     def test_keeps_the_direction_of_motion(self):
-        sources = [{"path": str(SHARED / "clips" / f"{clip}.mp4"), "first_frame": FIRST_FRAME, "frame_count": FRAME_COUNT}
+        sources = [{"path": str(SHARED / "clips" / f"{clip}.mp4"), "first_frame": FIRST_FRAME,
+                    "frame_count": FRAME_COUNT}
                    for clip in CLIPS]
-        job = {"format": "eventgan-simulation", "version": 1, "name": "job", "seed": 1, "sources": sources, "size": CLIP_SIZE,
-               "sensor": SENSOR, "output": {"directory": "recordings"}}
+        job = {"format": "eventgan-simulation", "version": 1, "name": "job", "seed": 1, "sources": sources,
+               "size": CLIP_SIZE, "sensor": SENSOR, "output": {"directory": "recordings"}}
         run("simulate", self.write_manifest(job), "--progress", "none")
         pixels = right = 0
         for clip in CLIPS:

@@ -11,7 +11,8 @@ import program
 
 HEIGHT, WIDTH = 24, 32  # of the images and of the volumes
 JOINTS = 16
-LENIENT = {"policy": "quarantine", "max_count": 99, "max_fraction": 1}  # the manifest's `errors`: anything may be quarantined
+# the manifest's `errors`: anything may be quarantined
+LENIENT = {"policy": "quarantine", "max_count": 99, "max_fraction": 1}
 
 
 def small_job(folder, cars=5, people=4, samples_per_shard=2, **changes):
@@ -32,7 +33,8 @@ def small_job(folder, cars=5, people=4, samples_per_shard=2, **changes):
                         "sequences": "people/sequences",
                         "pairs": program.pairs([2, 4], side="around")})
     defaults = {"name": "small", "image": {"width": WIDTH, "height": HEIGHT, "preset": "mpii"},
-                "generator": {"kind": "difference"}, "output": {"directory": "out", "samples_per_shard": samples_per_shard}}
+                "generator": {"kind": "difference"},
+                "output": {"directory": "out", "samples_per_shard": samples_per_shard}}
     path = folder / "manifest.json"
     path.write_text(json.dumps(program.manifest(sources, **{**defaults, **changes})))
     return path
@@ -62,7 +64,8 @@ def write_cars(root, count, random):
         save_image(root / "image_2" / f"{k:06d}.png", random)
         for step in (1, 2, 3):
             save_image(root / "prev_2" / f"{k:06d}_{step:02d}.png", random)
-        cars = [f"Car 0.00 0 0.10 {2 + n}.00 3.00 {12 + n}.50 20.00 1.5 1.6 3.9 1.0 1.5 10.0 0.2\n" for n in range(k % 3)]
+        cars = [f"Car 0.00 0 0.10 {2 + n}.00 3.00 {12 + n}.50 20.00 1.5 1.6 3.9 1.0 1.5 10.0 0.2\n"
+                for n in range(k % 3)]
         (root / "label_2" / f"{k:06d}.txt").write_text("".join(cars))
 
 

@@ -164,7 +164,7 @@ class Init(program.InFolder):
         run("init", "one.mp4")
         _, errors = run("init", "one.mp4", expect=64)
         self.assertEqual(errors, "error: expected no manifest yet, got an existing one, in manifest.json "
-                                 "(--out FILE gives another name)\n")
+                         "(--out FILE gives another name)\n")
 
     def test_each_is_named_after_what_was_shown(self):
         """Two of one name would have one output folder, and the second's shards would want the first's place."""
@@ -180,7 +180,8 @@ class Init(program.InFolder):
                            ("\u0432\u0438\u0434\u0435\u043e", "frames")]:
             _, manifest = self.init(self.folder / path)
             written = read_commented(manifest)
-            self.assertEqual((written["name"], written["output"]), (f"{name}-events", {"directory": f"out/{name}-events"}))
+            self.assertEqual((written["name"], written["output"]),
+                             (f"{name}-events", {"directory": f"out/{name}-events"}))
 
         # Of one name all the same: no flag lets the second take the first one's place.
         write_video(self.folder / "b" / "one.mp4", 5)
@@ -215,11 +216,12 @@ class Init(program.InFolder):
         root = self.folder / "training"
         write_cars(root, 9, random)
         told, manifest = self.init(root / "image_2")
-        part = f"warning: this is only a part of KITTI object, without its labels and pairs: run eventgan init \"{root}\"\n"
+        part = ("warning: this is only a part of KITTI object, without its labels and pairs: run eventgan init "
+                f"\"{root}\"\n")
         self.assertIn(part, told)
         self.assertIn(f"// {part}", manifest.read_text())
         self.assertRegex(told, r"(?m)^8 of 8 compared pairs of neighbouring images do not show the same scene, "
-                               r"first \S*image_2/000000.png and \S*image_2/000001.png$")
+                         r"first \S*image_2/000000.png and \S*image_2/000001.png$")
         self.assertIn("no sequences: each image makes a pair with itself", told)
         self.assertNotIn("several sizes", told)
         self.assertEqual(read_commented(manifest)["sources"][0]["pairs"], STILLS)
@@ -233,20 +235,22 @@ class Init(program.InFolder):
         for folder in "ab":  # of two sizes, but each of one
             (self.folder / "clips" / folder).mkdir(parents=True)
             for k in range(5):
-                cv2.imwrite(str(self.folder / "clips" / folder / f"{k}.png"), wide[:, 3 * k:3 * k + 64 - 8 * (folder == "a")])
+                cv2.imwrite(str(self.folder / "clips" / folder / f"{k}.png"),
+                            wide[:, 3 * k:3 * k + 64 - 8 * (folder == "a")])
         for path in ["clips", "clips/a"]:
             told, manifest = self.init(self.folder / path)
             self.assertNotIn("warning", told)
-            self.assertEqual(read_commented(manifest)["sources"][0]["pairs"], {"gaps": [1], "side": "before", "choose": "one"})
+            self.assertEqual(read_commented(manifest)["sources"][0]["pairs"],
+                             {"gaps": [1], "side": "before", "choose": "one"})
 
     @unittest.skipUnless(SHARED.is_dir(), "no ../shared/data")
     def test_real_sequences_and_stills_are_told_apart(self):
         frames = SHARED / "labelled_frames"
-        sequences = [SHARED / "kitti_raw/2011_09_26/2011_09_26_drive_0052_sync/image_02/data", SHARED / "mpii/sequences",
-                     SHARED / "human36m_fetch/S1/Directions-1/imageSequence", SHARED / "davis/slider_depth/images",
-                     frames / "camvid/images", frames / "davis_tennis/images", frames / "davis_carshadow/images",
-                     frames / "cdnet_traffic/images", frames / "mot17_mini/images", frames / "sot_car/images",
-                     frames / "sot_person/images"]
+        sequences = [SHARED / "kitti_raw/2011_09_26/2011_09_26_drive_0052_sync/image_02/data",
+                     SHARED / "mpii/sequences", SHARED / "human36m_fetch/S1/Directions-1/imageSequence",
+                     SHARED / "davis/slider_depth/images", frames / "camvid/images", frames / "davis_tennis/images",
+                     frames / "davis_carshadow/images", frames / "cdnet_traffic/images", frames / "mot17_mini/images",
+                     frames / "sot_car/images", frames / "sot_person/images"]
         stills = [SHARED / "kitti_object/training/image_2", SHARED / "mpii_lists/images", frames / "coco256/images",
                   frames / "pennfudan/images", frames / "voc100/images", frames / "kitti_mini/images"]
         for path in sequences + stills:
@@ -261,8 +265,8 @@ class Init(program.InFolder):
         empty.mkdir()
         (self.folder / "notes.txt").write_text("notes")
         for path in [empty, self.folder / "notes.txt", pathlib.Path("/proc/self/fd")]:
-            self.assertIn("expected KITTI object, KITTI tracking, KITTI raw, MPII Human Pose, Human3.6M, MPII as a list "
-                          "of people, recording of an event camera, images or videos, got none of these, "
+            self.assertIn("expected KITTI object, KITTI tracking, KITTI raw, MPII Human Pose, Human3.6M, MPII "
+                          "as a list of people, recording of an event camera, images or videos, got none of these, "
                           f"in {path}", self.init(path, expect=66))
         self.assertIn("expected a folder or a video", self.init(self.folder / "absent", expect=66))
         self.assertIn("expected a folder or a video, got nothing", self.init("", expect=64))
@@ -275,7 +279,8 @@ class Init(program.InFolder):
         self.assertIn("expected a folder, got nothing that can be read, in ", self.init(self.folder / "k", expect=66))
         (self.folder / "v").mkdir()
         (self.folder / "v" / "broken.mp4").write_text("no video")
-        self.assertIn("expected a video, got a file that cannot be read as one, in ", self.init(self.folder / "v", expect=66))
+        self.assertIn("expected a video, got a file that cannot be read as one, in ",
+                      self.init(self.folder / "v", expect=66))
 
     def test_several_make_one_manifest(self):
         """Each with its own keys, gaps and findings; one size and one preset for all."""
@@ -287,13 +292,16 @@ class Init(program.InFolder):
         given = [self.folder / path for path in ["all/cars", "all/people", "all/one.mp4", "other/one.mp4"]]
         told, manifest = self.init(*given)
         written = read_commented(manifest)
-        self.assertEqual([(source["dataset"], source["root"], source["pairs"]["gaps"], source["pairs"]["side"]) for source in written["sources"]],
-                         [("kitti_object", str(given[0]), [1, 2], "before"), ("mpii_list", str(given[1]), [2, 4], "around"),
+        self.assertEqual([(source["dataset"], source["root"], source["pairs"]["gaps"], source["pairs"]["side"])
+                          for source in written["sources"]],
+                         [("kitti_object", str(given[0]), [1, 2], "before"),
+                          ("mpii_list", str(given[1]), [2, 4], "around"),
                           ("frames", str(given[2]), [1], "before"), ("frames", str(given[3]), [1], "before")])
         self.assertEqual(written["image"], {"width": 346, "height": 260, "fit": "letterbox", "preset": "kitti"})
         self.assertEqual((written["name"], written["output"]["directory"]), ("cars-events", "out/cars-events"))
-        for path, finding in zip(given, ["KITTI object: 3 labelled frames", "MPII as a list of people: 2 labelled frames",
-                                         "images or videos: 4 labelled frames", "images or videos: 5 labelled frames"]):
+        for path, finding in zip(given,
+                                 ["KITTI object: 3 labelled frames", "MPII as a list of people: 2 labelled frames",
+                                  "images or videos: 4 labelled frames", "images or videos: 5 labelled frames"]):
             self.assertIn(f"{path}\n{finding}", told)
             self.assertIn(f"    // {path}\n    // {finding}", manifest.read_text())
         self.trial(manifest, 3 + 2 + 3 + 4, limit=100)
@@ -304,7 +312,8 @@ class Init(program.InFolder):
         self.assertEqual((read_commented(manifest)["image"], len(read_commented(manifest)["sources"])), ({}, 2))
         self.assertIn("expected kitti_object, got mpii_list, in ", self.init("kitti_object", *given[:3], expect=66))
         for same in given[0] / "label_2" / "..", given[0]:
-            self.assertIn(f"expected each folder or video once, got it twice: {given[0]}", self.init(given[0], given[2], same, expect=64))
+            self.assertIn(f"expected each folder or video once, got it twice: {given[0]}",
+                          self.init(given[0], given[2], same, expect=64))
 
     def test_several_paths_start_at_the_manifest_where_all_are_given_so(self):
         write_video(self.folder / "a" / "one.mp4", 3)
@@ -312,16 +321,19 @@ class Init(program.InFolder):
         here = os.getcwd()
         os.chdir(self.folder)
         self.addCleanup(os.chdir, here)
-        for given, roots in [(["a", "b/two.mp4"], ["a", "b/two.mp4"]), (["a", self.folder / "b"], [f"{self.folder}/a", f"{self.folder}/b"])]:
+        for given, roots in [(["a", "b/two.mp4"], ["a", "b/two.mp4"]),
+                             (["a", self.folder / "b"], [f"{self.folder}/a", f"{self.folder}/b"])]:
             run("init", *given)
-            self.assertEqual([source["root"] for source in read_commented(pathlib.Path("manifest.json"))["sources"]], roots)
+            self.assertEqual([source["root"] for source in read_commented(pathlib.Path("manifest.json"))["sources"]],
+                             roots)
             run("plan", "manifest.json")
             pathlib.Path("manifest.json").unlink()
         pathlib.Path("b").rename("frames")  # a folder named as a dataset
         run("init", "a", "frames", "--out", "1.json")
         run("init", "frames", "frames", "--out", "2.json")
         run("init", "./frames", "a", "--out", "3.json")
-        self.assertEqual([[source["root"] for source in read_commented(pathlib.Path(f"{k}.json"))["sources"]] for k in (1, 2, 3)],
+        self.assertEqual([[source["root"] for source in read_commented(pathlib.Path(f"{k}.json"))["sources"]]
+                          for k in (1, 2, 3)],
                          [["a", "frames"], ["frames"], ["frames", "a"]])
 
     def test_of_several_datasets_one_must_be_named(self):
@@ -343,7 +355,8 @@ class Init(program.InFolder):
                 self.assertIn(f": {frames} labelled frames", told)
                 self.assertRegex(told, rf"by gap: gap \d: {partners},")
                 self.trial(manifest, partners)
-        self.assertIn("gap 1: 1, gap 2: 1, gap 3: 1, gap 4: 1, gap 5: 1, gap 6: 1", self.init(SHARED / "kitti_object")[0])
+        self.assertIn("gap 1: 1, gap 2: 1, gap 3: 1, gap 4: 1, gap 5: 1, gap 6: 1",
+                      self.init(SHARED / "kitti_object")[0])
         self.assertIn("expected one dataset, got ", self.init(SHARED, expect=66))
 
 
@@ -366,7 +379,8 @@ class Trial(program.InFolder):
         out, _ = self.convert("--limit", 4)
         self.assertEqual([path.name for path in self.folder.glob("out*")], ["out-trial-4"])
         self.assertIn("4 of 4 pairs written", out)
-        self.assertTrue(out.endswith(f"trial run: 4 pairs of the job. For all pairs:  eventgan convert {self.manifest}\n"), out)
+        self.assertTrue(
+            out.endswith(f"trial run: 4 pairs of the job. For all pairs:  eventgan convert {self.manifest}\n"), out)
         self.assertEqual(self.ids("out-trial-4"), ["000000", "000001", "000000000", "000000001"])  # two of each source
         trial = shard_bytes(self.folder / "out-trial-4")
         self.assertIn("in 2 of 2 shards (2 done before)", self.convert("--limit", 4)[0])
@@ -383,7 +397,8 @@ class Trial(program.InFolder):
         _, errors = self.convert("--output", self.folder / "mine", expect=64)
         self.assertIn("limit: expected 4, got nothing", errors)
         self.convert()
-        self.assertIn("limit: expected nothing, got 4", self.convert("--limit", 4, "--output", self.folder / "out", expect=64)[1])
+        self.assertIn("limit: expected nothing, got 4",
+                      self.convert("--limit", 4, "--output", self.folder / "out", expect=64)[1])
 
     def test_a_mended_sample_of_a_trial_is_retried(self):
         manifest = json.loads(self.manifest.read_text())
@@ -458,7 +473,8 @@ class Examples(program.InFolder):
         (mapping / "train_mapping.txt").write_text("".join(lines))
 
     def test_every_job_can_be_planned(self):
-        jobs = [path for path in sorted(EXAMPLES.glob("*.json")) if read_commented(path)["format"] == "eventgan-manifest"]
+        jobs = [path for path in sorted(EXAMPLES.glob("*.json"))
+                if read_commented(path)["format"] == "eventgan-manifest"]
         self.assertGreaterEqual(len(jobs), 6)
         for job in jobs:
             with self.subTest(job.name):
@@ -471,7 +487,8 @@ class Examples(program.InFolder):
         for source in read_commented(EXAMPLES / "simulate.json")["sources"]:
             self.assertTrue((self.tree / source["path"]).exists(), source)
             name = source.get("name", pathlib.Path(source["path"]).stem)
-            recordings.add(f"recordings/{name}-000.hdf5" if source.get("method") == "affine" else f"recordings/{name}.hdf5")
+            recordings.add(f"recordings/{name}-000.hdf5" if source.get("method") == "affine"
+                           else f"recordings/{name}.hdf5")
         train = read_commented(EXAMPLES / "train.json")
         named = {recording["path"] for recording in train["recordings"] + train["validation"]}
         self.assertEqual(named, recordings)

@@ -19,7 +19,8 @@ def stills(side="before", **motion):
 
 
 def moved_to_labelled(size, motion, label_position):
-    """[3, 3]: from pixels of the moved frame to those of the labelled image, both (width, height); pixel centres are whole."""
+    """[3, 3]: from pixels of the moved frame to those of the labelled image, both (width, height);
+    pixel centres are whole."""
     x, y, degrees, scale = motion
     angle = np.radians(degrees)
     middle = (np.array(size) - 1) / 2
@@ -68,8 +69,8 @@ class Stills(program.InFolder):
     def test_photographs_and_what_moves_in_them(self):
         self.photos("voc100", 12)
         for side, position in (("before", 1), ("after", 0)):
-            job = manifest([{"dataset": "frames", "root": "photos", "pairs": stills(side)}], generator={"kind": "difference"},
-                           image={"grey": "before_resize", "blur": 0})
+            job = manifest([{"dataset": "frames", "root": "photos", "pairs": stills(side)}],
+                           generator={"kind": "difference"}, image={"grey": "before_resize", "blur": 0})
             seen = 0
             for path in self.convert(job):
                 with h5py.File(path) as shard:
@@ -97,7 +98,8 @@ class Stills(program.InFolder):
 
         def likeness(motion):
             frames = [image, moved(image, motion, position)][::-1 if position == 1 else 1]
-            before, after = (np.log(np.asarray(frame.resize(size, PIL.Image.BILINEAR, box=box), float) + 20) for frame in frames)
+            before, after = (np.log(np.asarray(frame.resize(size, PIL.Image.BILINEAR, box=box), float) + 20)
+                             for frame in frames)
             return np.corrcoef(change.ravel(), (after - before).ravel())[0, 1]
 
         found = likeness(motion)
@@ -108,8 +110,10 @@ class Stills(program.InFolder):
         for folder, name in (("images", "image_2"), ("label_2", "label_2")):
             shutil.copytree(PHOTOS / "kitti_mini" / folder, self.folder / "kitti" / "training" / name)
         for fit in ("stretch", "letterbox", "crop"):
-            job = manifest([{"dataset": "kitti_object", "root": "kitti/training", "pairs": stills(translation_px=[4, 9], frames=2)}],
-                           generator={"kind": "difference"}, image={"width": 320, "height": 160, "fit": fit, "preset": "kitti"})
+            job = manifest([{"dataset": "kitti_object", "root": "kitti/training",
+                             "pairs": stills(translation_px=[4, 9], frames=2)}],
+                           generator={"kind": "difference"},
+                           image={"width": 320, "height": 160, "fit": fit, "preset": "kitti"})
             for path in self.convert(job):
                 with h5py.File(path) as shard:
                     boxes, offsets = shard["labels/boxes"], shard["labels/boxes/offsets"][:]
@@ -123,7 +127,8 @@ class Stills(program.InFolder):
                         scaled = np.floor(s * (width, height) + 0.5)
                         scale, offset = scaled / ((width, height) - 2 * cut), (np.array([320, 160]) - scaled) // 2
                         rows = slice(*offsets[slot:slot + 2])
-                        expected = (boxes["xyxy_source"][rows] - np.tile(cut, 2)) * np.tile(scale, 2) + np.tile(offset, 2)
+                        expected = (boxes["xyxy_source"][rows]
+                                    - np.tile(cut, 2)) * np.tile(scale, 2) + np.tile(offset, 2)
                         np.testing.assert_allclose(boxes["xyxy_unclipped"][rows], expected, atol=1e-9)
                         seen = np.maximum(offset, 0), np.minimum(offset + scaled, [320, 160])
                         inside = np.clip(expected, np.tile(seen[0], 2), np.tile(seen[1], 2))
@@ -155,13 +160,15 @@ class Stills(program.InFolder):
 
     def test_nothing_moves_where_nothing_may(self):
         self.photos("pennfudan", 2)
-        job = manifest([{"dataset": "frames", "root": "photos", "pairs": stills(translation_px=[0, 0], rotation_deg=0, scale=0)}],
-                       generator={"kind": "difference"})
+        job = manifest(
+            [{"dataset": "frames", "root": "photos", "pairs": stills(translation_px=[0, 0], rotation_deg=0, scale=0)}],
+            generator={"kind": "difference"})
         for path in self.convert(job):
             with h5py.File(path) as shard:
                 self.assertFalse(shard["events/volume"][:].any())
                 np.testing.assert_array_equal(shard["pairs/motion"][:], [[0, 0, 0, 1]] * len(shard["valid"]))
-                np.testing.assert_array_equal(shard["pairs/source_to_volume"][:], [[[1, 0, 0], [0, 1, 0]]] * len(shard["valid"]))
+                np.testing.assert_array_equal(shard["pairs/source_to_volume"][:],
+                                              [[[1, 0, 0], [0, 1, 0]]] * len(shard["valid"]))
 
     def test_tiny_odd_and_broken_images(self):
         folder = self.folder / "photos"
@@ -177,7 +184,8 @@ class Stills(program.InFolder):
         run("convert", path, "--progress", "none")
         reasons = {sample["sample_id"]: sample["reason"] for record in (self.folder / "out").glob("*-of-*.json")
                    for sample in json.loads(record.read_text())["quarantined"]}
-        self.assertEqual(sorted(reasons), ["photos/a16", "photos/b", "photos/c1"] if "photos/b" in reasons else ["a16", "b", "c1"])
+        self.assertEqual(sorted(reasons), ["photos/a16", "photos/b", "photos/c1"] if "photos/b" in reasons
+                         else ["a16", "b", "c1"])
         for sample, reason in reasons.items():
             if not sample.endswith("b"):
                 self.assertIn("half of each side", reason)

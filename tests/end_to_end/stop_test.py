@@ -26,7 +26,8 @@ def setUpModule():
     job = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-stop-"))
     small_job(job, cars=60, people=30, samples_per_shard=30)  # three shards
     whole = job / "out"
-    calls = failing_files.changes(failing_files.run(whole, "", "convert", job / "manifest.json", "--threads", "1").calls)
+    calls = failing_files.changes(failing_files.run(whole, "", "convert", job / "manifest.json",
+                                                    "--threads", "1").calls)
 
 
 def tearDownModule():
@@ -45,8 +46,8 @@ class Stop(program.InFolder):
         return out, outcome
 
     def stops_clean(self, rule, *more):
-        """Stopped, unless the signal came too late for the last shard; nothing half-done either way, and the next run completes
-        the job. How many shards were done by then."""
+        """Stopped, unless the signal came too late for the last shard; nothing half-done either way, and the next run
+        completes the job. How many shards were done by then."""
         out, outcome = self.signalled(rule, *more)
         done = len(records(out)) if out.exists() else 0
         self.assertEqual(outcome.code, STOPPED if done < 3 else 0, f"{rule}\n{outcome.err}")
@@ -62,7 +63,8 @@ class Stop(program.InFolder):
         shutil.rmtree(out)
 
     def number_of(self, kind, ending, occurrence=1):
-        """Which call, counted over all kinds, is the occurrence-th of a kind on a file with an ending (temporaries too)."""
+        """Which call, counted over all kinds, is the occurrence-th of a kind on a file with an ending (temporaries
+        too)."""
         of_kind = [n for n, call in enumerate(calls, 1) if call.kind == kind and ending in call.path.name]
         return of_kind[occurrence - 1]
 
@@ -168,7 +170,8 @@ class SlowShard(program.InFolder):
             samples = json.loads(run("status", out, "--json")[0])["samples"]
             self.assertEqual((samples["written"], samples["quarantined"]), (0, 0))
         self.assertLessEqual(samples["under_way"], 100)
-        self.assertRegex(run("status", out)[0], r"samples  0 of 100 written, \d+ more in unfinished shards, 0 quarantined")
+        self.assertRegex(run("status", out)[0],
+                         r"samples  0 of 100 written, \d+ more in unfinished shards, 0 quarantined")
 
     def slow_job(self):
         return small_job(self.folder / "job", cars=100, people=0, samples_per_shard=100,

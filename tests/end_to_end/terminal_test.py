@@ -29,11 +29,12 @@ def set_columns(terminal, columns):
 
 
 def on_terminal(*arguments, columns=80, resized=None, typed=(), expect=0, **environment):
-    """Everything the program writes to a pseudo-terminal. `resized`: its columns from the first bar on. `typed`: pairs of what has
-    to be there, as a regular expression, and of what a person types then."""
+    """Everything the program writes to a pseudo-terminal. `resized`: its columns from the first bar on. `typed`: pairs
+    of what has to be there, as a regular expression, and of what a person types then."""
     terminal, other_end = pty.openpty()
     set_columns(terminal, columns)
-    process = subprocess.Popen([program.PROGRAM, *map(str, arguments)], stdin=other_end, stdout=other_end, stderr=other_end,
+    process = subprocess.Popen([program.PROGRAM, *map(str, arguments)], stdin=other_end, stdout=other_end,
+                               stderr=other_end,
                                env={**os.environ, "TERM": "xterm-256color", "NO_COLOR": "", **environment},
                                start_new_session=True, preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0))
     os.close(other_end)
@@ -71,7 +72,8 @@ class Terminal(program.InFolder):
     def setUpClass(cls):
         cls.job = program.pathlib.Path(program.tempfile.mkdtemp(prefix="eventgan-"))
         cls.addClassCleanup(shutil.rmtree, cls.job)
-        moving_texture.write_images(cls.job / "frames" / "scene", [4 * index for index in range(PAIRS + 1)], HEIGHT, WIDTH, seed=3)
+        moving_texture.write_images(cls.job / "frames" / "scene", [4 * index for index in range(PAIRS + 1)], HEIGHT,
+                                    WIDTH, seed=3)
         cls.manifest = cls.job / "manifest.json"
         cls.manifest.write_text(program.json.dumps(program.manifest(
             [{"dataset": "frames", "root": "frames", "pairs": program.pairs([1])}],
@@ -79,7 +81,8 @@ class Terminal(program.InFolder):
             output={"directory": "out", "samples_per_shard": 6, "dtype": "float32", "deflate_level": 9})))
 
     def convert(self, **how):
-        return on_terminal("convert", self.manifest, "--output", self.folder / "out", "--overwrite", "--threads", 1, **how)
+        return on_terminal("convert", self.manifest, "--output", self.folder / "out", "--overwrite", "--threads", 1,
+                           **how)
 
     def test_the_bar_fits_the_terminal(self):
         for columns in (40, 80, 200):
@@ -170,7 +173,8 @@ class Terminal(program.InFolder):
                 out, _ = program.run("help", *([command] if command else []))
                 self.assertLessEqual(max(map(len, out.splitlines())), 80)
         texts = re.sub(r"\s+", " ", program.run("help", "convert")[0])  # lines are broken between words
-        for words in ["Number of threads; default: all cores", "a bar on a terminal, lines elsewhere; json: machine-readable lines and report"]:
+        for words in ["Number of threads; default: all cores",
+                      "a bar on a terminal, lines elsewhere; json: machine-readable lines and report"]:
             self.assertIn(words, texts)
 
     def test_verify_says_how_far_it_is(self):
@@ -184,14 +188,17 @@ class Terminal(program.InFolder):
         self.assertRegex(text, r"\[[#.]+\] verifying \d/4 shards, ")
         self.assertIn(WIPE, text)
         report = text[text.rindex(WIPE) + len(WIPE):]  # nothing is left of the bar
-        self.assertRegex(report, r"^job-train-00000-of-00004.h5: sound, [\d.]+ [kM]B hashed, 6 samples read, 0 quarantined\r\n")
+        self.assertRegex(report,
+                         r"^job-train-00000-of-00004.h5: sound, [\d.]+ [kM]B hashed, 6 samples read, 0 quarantined\r\n")
 
     @unittest.skipUnless(shutil.which("tmux"), "no tmux")
     def test_one_row_of_a_real_terminal_which_wraps_its_rows_anew(self):
         server = ["tmux", "-L", self.folder.name, "-f", "/dev/null"]
-        tmux = lambda *command: subprocess.run([*server, *map(str, command)], capture_output=True, text=True, check=True).stdout
+        tmux = lambda *command: subprocess.run([*server, *map(str, command)], capture_output=True,
+                                               text=True, check=True).stdout
         script = self.folder / "script"
-        convert = shlex.join(map(str, (program.PROGRAM, "convert", self.manifest, "--output", self.folder / "tmux", "--threads", 1)))
+        convert = shlex.join(map(str, (program.PROGRAM, "convert", self.manifest, "--output",
+                                       self.folder / "tmux", "--threads", 1)))
         script.write_text(f"seq 15\necho begun\n{convert}\necho exit code $?\nexec sleep 1000\n")
         tmux("new-session", "-d", "-x", 200, "-y", 24, "sh", script)
         self.addCleanup(subprocess.run, [*server, "kill-server"])

@@ -26,7 +26,8 @@ class Tradeoff(program.InFolder):
 
     def command(self, **changes):
         options = {**AXES, "out": self.out, "progress": "none", **changes}
-        return ["tradeoff", self.manifest, *[part for name, value in options.items() for part in (f"--{name.replace('_', '-')}", value)]]
+        return ["tradeoff", self.manifest,
+                *[part for name, value in options.items() for part in (f"--{name.replace('_', '-')}", value)]]
 
     def tradeoff(self, expect=0, **changes):
         return run(*self.command(**changes), expect=expect)
@@ -51,7 +52,8 @@ class Tradeoff(program.InFolder):
             self.assertIn(reason, text)
         by_name = {configuration["name"]: configuration for configuration in report["configurations"]}
         itself = by_name["shipped:8 float32 x1 float32"]
-        self.assertEqual((itself["relative_l2"], itself["largest_error"], itself["f1_raw"], itself["lost_in_labels"]), (0, 0, 1, 0))
+        self.assertEqual((itself["relative_l2"], itself["largest_error"], itself["f1_raw"], itself["lost_in_labels"]),
+                         (0, 0, 1, 0))
         self.assertGreater(itself["labelled_events"], 0)
         front = [by_name[name] for name in report["front"]]
         for slower, faster in zip(front, front[1:]):
@@ -81,7 +83,8 @@ class Tradeoff(program.InFolder):
         self.assertTrue(chosen.endswith(keys["output"]["dtype"]))
 
     def test_by_default_it_is_a_few_and_ends_with_a_recommendation(self):
-        text, told = run("tradeoff", self.manifest, "--out", self.out, "--progress", "lines", "--pairs", "2", "--rounds", "1")
+        text, told = run("tradeoff", self.manifest, "--out", self.out, "--progress", "lines", "--pairs", "2",
+                         "--rounds", "1")
         report = self.report()
         self.assertLessEqual(len(report["configurations"]), 10)
         self.assertIn(f"{len(report['configurations'])} configurations, 2 pairs, 1 round: about ", told.splitlines()[0])
@@ -106,7 +109,8 @@ class Tradeoff(program.InFolder):
         (folder / "events.txt").write_text("".join(f"{t:.6f} {x:.0f} {y:.0f} {int(p > 0)}\n" for x, y, t, p in events))
         for index, frame in enumerate(frames):
             PIL.Image.fromarray(frame).save(folder / "images" / f"{index}.png")
-        (folder / "images.txt").write_text("".join(f"{time} images/{index}.png\n" for index, time in enumerate([0.1, 0.5, 0.9])))
+        (folder / "images.txt").write_text("".join(f"{time} images/{index}.png\n"
+                                                   for index, time in enumerate([0.1, 0.5, 0.9])))
         recordings = [str(self.folder / name) for name in ("authors.hdf5", "mvsec.hdf5", "ecd")]
         real = [part for recording in recordings for part in ("--real", recording)]
         run(*self.command(methods="network", precisions="float32", sizes="1"), *real)
@@ -124,7 +128,8 @@ class Tradeoff(program.InFolder):
         self.assertEqual(list(self.out.iterdir()), [])
 
     def test_what_cannot_be_is_refused(self):
-        for option, value, word in [("methods", "magic", "expected one of network"), ("sizes", "1,0.5,1", "expected different"),
+        for option, value, word in [("methods", "magic", "expected one of network"),
+                                    ("sizes", "1,0.5,1", "expected different"),
                                     ("reference", "8,float32,9", "expected WEIGHTS"), ("out", "", "expected a folder"),
                                     ("reference", "untrained:2,int8", "expected a configuration that can be run")]:
             with self.subTest(option=option, value=value):

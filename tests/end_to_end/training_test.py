@@ -9,7 +9,6 @@ import signal
 import subprocess
 import tempfile
 import time
-import unittest
 from xml.etree import ElementTree
 
 import h5py
@@ -27,15 +26,16 @@ SPEED_PX = 2  # to the right, a frame
 FRAMES_PER_SECOND = 30
 THRESHOLD = 0.2
 LOG_EPSILON = 0.001
-SENSOR = {"positive_threshold": THRESHOLD, "negative_threshold": THRESHOLD, "threshold_spread": 0, "log_epsilon": LOG_EPSILON}
+SENSOR = {"positive_threshold": THRESHOLD, "negative_threshold": THRESHOLD, "threshold_spread": 0,
+          "log_epsilon": LOG_EPSILON}
 RECORDINGS = ["clip", "difference", "still-000", "still-001"]
 AFFINE_PX = 6
 AFFINE_FRAMES = 4
 STEPS = {"flow": 12, "reconstruction": 6, "generator": 30}
 CHANNELS = 2
 CONVERTED_GAPS = [1, 3]
-SCORES = ["f1_raw", "f1_time", "f1_time_polarity", "pool_mse_2", "pool_mse_4", "time_correlation", "polarity_correlation",
-          "events_per_pixel", "positive_share"]
+SCORES = ["f1_raw", "f1_time", "f1_time_polarity", "pool_mse_2", "pool_mse_4", "time_correlation",
+          "polarity_correlation", "events_per_pixel", "positive_share"]
 PATIENCE_S = 120
 
 
@@ -46,8 +46,8 @@ def simulation():
         "sources": [
             {**clip, "name": "clip"},
             {**clip, "name": "difference", "method": "difference"},
-            {**clip, "name": "still", "method": "affine", "frame_count": 2, "frame_step": 4, "frames_per_image": AFFINE_FRAMES,
-             "max_displacement_px": AFFINE_PX}],
+            {**clip, "name": "still", "method": "affine", "frame_count": 2, "frame_step": 4,
+             "frames_per_image": AFFINE_FRAMES, "max_displacement_px": AFFINE_PX}],
         "size": {"width": WIDTH, "height": HEIGHT}, "sensor": SENSOR, "output": {"directory": "recordings"},
     }
 
@@ -92,7 +92,8 @@ def temporaries(folder):
 
 class Recordings(program.InFolder):
     def test_there_is_one_for_each_clip_and_for_each_still_image(self):
-        self.assertEqual(sorted(path.name for path in (work / "recordings").iterdir()), [f"{name}.hdf5" for name in RECORDINGS])
+        self.assertEqual(sorted(path.name for path in (work / "recordings").iterdir()),
+                         [f"{name}.hdf5" for name in RECORDINGS])
 
     def test_they_are_in_the_layout_of_mvsec(self):
         for name in RECORDINGS:
@@ -110,7 +111,8 @@ class Recordings(program.InFolder):
                 self.assertEqual((frames.shape, frames.dtype), ((count, HEIGHT, WIDTH), np.uint8))
                 np.testing.assert_allclose(times, np.arange(count) / FRAMES_PER_SECOND, atol=1e-9)
                 # The last event at or before each frame, -1 where there is none.
-                np.testing.assert_array_equal(camera["image_raw_event_inds"][:], np.searchsorted(t, times, side="right") - 1)
+                np.testing.assert_array_equal(camera["image_raw_event_inds"][:],
+                                              np.searchsorted(t, times, side="right") - 1)
                 self.assertEqual(json.loads(program.text(file.attrs["simulation"]))["seed"], 3)
 
     def test_frames_of_a_clip_are_its_images(self):
@@ -144,7 +146,8 @@ class Recordings(program.InFolder):
     def test_threads_do_not_change_bytes(self):
         run("simulate", work / "simulation.json", "--output", self.folder, "--threads", "1", "--progress", "none")
         for name in RECORDINGS:
-            self.assertEqual((self.folder / f"{name}.hdf5").read_bytes(), (work / "recordings" / f"{name}.hdf5").read_bytes())
+            self.assertEqual((self.folder / f"{name}.hdf5").read_bytes(),
+                             (work / "recordings" / f"{name}.hdf5").read_bytes())
         self.assertEqual(temporaries(self.folder), [])
 
 
@@ -155,7 +158,8 @@ def without_seconds(table):
 
 class Training(program.InFolder):
     def stop_in(self, phase):
-        """Trains until at least a few steps of the phase are done, and stops it as `kill` does; exit code and messages."""
+        """Trains until at least a few steps of the phase are done, and stops it as `kill` does;
+        exit code and messages."""
         table = self.folder / "training.csv"
         before = table.read_text() if table.is_file() else ""
         process = subprocess.Popen([PROGRAM, "train", work / "training.json", "--output", self.folder, "--threads", "1",
@@ -207,7 +211,8 @@ class Training(program.InFolder):
             else:
                 column = row["phase"]
             self.assertTrue(np.isfinite(float(row[column])), row)
-        self.assertEqual(ElementTree.parse(work / "whole" / "curves.svg").getroot().tag, "{http://www.w3.org/2000/svg}svg")
+        self.assertEqual(ElementTree.parse(work / "whole" / "curves.svg").getroot().tag,
+                         "{http://www.w3.org/2000/svg}svg")
 
     def test_weights_are_safetensors_and_tell_where_they_come_from(self):
         tensors, metadata = read_safetensors(work / "whole" / "weights.safetensors")
@@ -229,10 +234,13 @@ class Training(program.InFolder):
     def test_the_shortest_example_runs_as_it_is_but_for_its_steps(self):
         write_images(self.folder / "images", range(0, FRAMES * SPEED_PX, SPEED_PX), 128, 144, seed=2)
         (self.folder / "simulation.json").write_text(json.dumps({
-            "format": "eventgan-simulation", "version": 1, "name": "one", "size": {"width": 144, "height": 128}, "output": {"directory": "."},
-            "sources": [{"path": "images", "name": "recording", "method": "difference", "frames_per_second": FRAMES_PER_SECOND}]}))
+            "format": "eventgan-simulation", "version": 1, "name": "one", "size": {"width": 144, "height": 128},
+            "output": {"directory": "."},
+            "sources": [{"path": "images", "name": "recording", "method": "difference",
+                         "frames_per_second": FRAMES_PER_SECOND}]}))
         run("simulate", self.folder / "simulation.json", "--progress", "none")
-        example, steps = (program.SOURCE / "manifests" / "examples" / "train_one.json").read_text(), '"steps": { "generator": 2000 }'
+        example, steps = (program.SOURCE / "manifests" / "examples"
+                          / "train_one.json").read_text(), '"steps": { "generator": 2000 }'
         self.assertEqual((example.count(steps), example.count('"path": "recording.hdf5"')), (1, 1))
         (self.folder / "train_one.json").write_text(example.replace(steps, '"steps": { "generator": 2 }'))
         run("train", self.folder / "train_one.json", "--threads", "1", "--progress", "none")
@@ -266,7 +274,8 @@ class TrainedWeights(program.InFolder):
     def convert(self, name, generator):
         source = {"dataset": "frames", "root": str(work / "images"), "frames_per_second": FRAMES_PER_SECOND,
                   "pairs": pairs(CONVERTED_GAPS, choose="all")}
-        job = manifest([source], generator=generator, output={"directory": name, "dtype": "float32", "samples_per_shard": 64})
+        job = manifest([source], generator=generator,
+                       output={"directory": name, "dtype": "float32", "samples_per_shard": 64})
         run("convert", self.write_manifest(job), "--progress", "none")
         run("verify", self.folder / name)
         shard, = (self.folder / name).glob("*.h5")
@@ -279,7 +288,8 @@ class TrainedWeights(program.InFolder):
                   "difference": self.convert("difference", {"kind": "difference", "sensor": SENSOR})}
         network = shards["network"]
         self.assertEqual(len(network["pairs/sample_id"]), sum(FRAMES - gap for gap in CONVERTED_GAPS))
-        self.assertEqual(json.loads(bytes(network["labels/original"][0])), {"seen": int(network["pairs/label_index"][0])})
+        self.assertEqual(json.loads(bytes(network["labels/original"][0])),
+                         {"seen": int(network["pairs/label_index"][0])})
         self.assertEqual(program.text(network.attrs["weights_hash"]), hashlib.sha256(weights.read_bytes()).hexdigest())
         for kind in ["esim", "difference"]:
             for group in ["pairs", "labels"]:
@@ -319,9 +329,11 @@ class TrainedWeights(program.InFolder):
         self.assertGreater(difference["f1_time"], 0.5)
 
     def test_realism_of_several_recordings_ends_with_their_mean(self):
-        arguments = (work / "recordings" / "clip.hdf5", work / "training.json", "--with", "difference", "--progress", "none")
+        arguments = (work / "recordings" / "clip.hdf5", work / "training.json", "--with", "difference", "--progress",
+                     "none")
         report = json.loads(run("realism", *arguments, "--json")[0])
-        self.assertEqual([pathlib.Path(one["recording"]).name for one in report["recordings"]], ["clip.hdf5", "still-001.hdf5"])
+        self.assertEqual([pathlib.Path(one["recording"]).name for one in report["recordings"]],
+                         ["clip.hdf5", "still-001.hdf5"])
         each = [one["methods"][0] for one in report["recordings"]]
         for score in SCORES:
             self.assertAlmostEqual(report["mean"]["difference"][score], np.mean([one["mean"][score] for one in each]))
@@ -332,7 +344,8 @@ class TrainedWeights(program.InFolder):
         self.assertEqual({path.parent.name for path in self.folder.glob("*/*.png")}, {"clip", "still-001"})
 
     def test_a_recording_that_is_too_short_for_the_gap_is_left_out_of_several(self):
-        clip, gap = work / "recordings" / "clip.hdf5", ["--with", "difference", "--progress", "none", "--json", "--gaps", FRAMES - 1]
+        clip, gap = work / "recordings" / "clip.hdf5", ["--with", "difference", "--progress", "none", "--json",
+                                                        "--gaps", FRAMES - 1]
         short = work / "recordings" / "still-001.hdf5"
         with h5py.File(short) as file:
             self.assertLess(len(file["davis/left/image_raw"]), FRAMES)
@@ -358,7 +371,8 @@ class TrainedWeights(program.InFolder):
         self.assertEqual(sensor["name"], "sim")
         self.assertIn("fit of clip.hdf5", sensor["origin"])
         folder = self.folder / "job"
-        run("convert", small_job(folder, people=0, generator={"kind": "difference", "sensor": "../sim.json"}), "--progress", "none")
+        run("convert", small_job(folder, people=0, generator={"kind": "difference", "sensor": "../sim.json"}),
+            "--progress", "none")
         document.unlink()
         run("verify", folder / "out")
         for path in folder.glob("out/*.h5"):
@@ -368,7 +382,8 @@ class TrainedWeights(program.InFolder):
         fields = json.loads((folder / "out" / "plan.json").read_text())["fingerprint"]
         self.assertEqual(fields["manifest $.generator.sensor.name"], '"sim"')
         told = {"threshold": [0.2, 0.3], "noise": {"shot_hz": 1}}
-        run("convert", small_job(self.folder / "told", people=0, generator={"kind": "difference", "sensor": told}), "--progress", "none")
+        run("convert", small_job(self.folder / "told", people=0, generator={"kind": "difference", "sensor": told}),
+            "--progress", "none")
         for path in self.folder.glob("told/out/*.h5"):
             self.assertIn(", threshold 0.2..0.3, noise of shot_hz 1, leak_hz 0, hot_pixels 0", run("inspect", path)[0])
         out, _ = run("realism", clip, "--with", "difference", "--sensor", "davis346", "--progress", "none")

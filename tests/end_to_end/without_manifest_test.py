@@ -1,4 +1,5 @@
-"""`convert` and `plan` of a folder or a video: the manifest that `init` would write, kept in the output folder from then on."""
+"""`convert` and `plan` of a folder or a video: the manifest that `init` would write,
+kept in the output folder from then on."""
 
 import os
 import pathlib
@@ -63,7 +64,8 @@ class WithoutManifest(program.InFolder):
         del mine["run.json"], its["run.json"]
         self.assertEqual(mine, its)
         _, err = convert(clip / "walk", self.folder / "out")
-        self.assertTrue(err.startswith(f"manifest: {self.folder}/out/manifest.json, kept as it was when the job began\n"), err)
+        self.assertTrue(err.startswith(f"manifest: {self.folder}/out/manifest.json, kept as it was when the "
+                                       "job began\n"), err)
         self.assertNotIn("labelled frames", err)
 
     def test_the_kept_manifest_is_that_of_the_folder(self):
@@ -88,10 +90,12 @@ class WithoutManifest(program.InFolder):
             told, err = convert(self.folder / "one.mp4", self.folder / "out")
             self.assertEqual(err.count("manifest: "), 1, err)
             self.assertIn(line.format(self.folder / "out"), err)
-            self.assertEqual((err.count("generator: "), err.count("warning: "), told.count("3 of 3 pairs written")), (1, 1, 1), err)
+            self.assertEqual((err.count("generator: "), err.count("warning: "), told.count("3 of 3 pairs written")),
+                             (1, 1, 1), err)
         alone = self.folder / "eventgan"
         shutil.copy(program.PROGRAM, alone)
-        done = subprocess.run([alone, "convert", self.folder / "one.mp4", "--output", self.folder / "new"], capture_output=True, text=True)
+        done = subprocess.run([alone, "convert", self.folder / "one.mp4", "--output", self.folder / "new"],
+                              capture_output=True, text=True)
         self.assertEqual(done.returncode, 1)
         self.assertRegex(done.stderr, r"\Aerror: expected eventgan-video, got none in .*\n\Z")
         self.assertFalse((self.folder / "new").exists())
@@ -128,13 +132,16 @@ class WithoutManifest(program.InFolder):
                           for name in ["manifest.json", "plan.json"])
         self.assertLess(manifest, plan)
         text = next(n for n, call in enumerate(calls, 1) if call.kind == "write" and "manifest.json" in call.path.name)
-        shard = next(n for n, call in enumerate(calls, 1) if call.kind == "write" and "00001-of-00003.h5" in call.path.name)
+        shard = next(n for n, call in enumerate(calls, 1) if call.kind == "write"
+                     and "00001-of-00003.h5" in call.path.name)
         for rule, code in [(f"SIGTERM any {shard}", 75), (f"kill-before any {manifest}", -signal.SIGKILL),
-                           (f"kill-after any {manifest}", -signal.SIGKILL), (f"kill-before any {plan}", -signal.SIGKILL),
+                           (f"kill-after any {manifest}", -signal.SIGKILL),
+                           (f"kill-before any {plan}", -signal.SIGKILL),
                            (f"kill-after any {shard}", -signal.SIGKILL), (f"ENOSPC any {text}", 1)]:
             with self.subTest(rule=rule):
                 out = self.folder / rule.replace(" ", "-")
-                outcome = failing_files.run(out, rule, "convert", clip / "walk", "--output", out, "--threads", "1", *QUIET)
+                outcome = failing_files.run(out, rule, "convert", clip / "walk", "--output", out, "--threads", "1",
+                                            *QUIET)
                 self.assertTrue(outcome.struck)
                 self.assertEqual(outcome.code, code, outcome.err)
                 if rule.startswith("ENOSPC"):
@@ -147,7 +154,8 @@ class WithoutManifest(program.InFolder):
 
     def test_workers_that_begin_at_once_agree(self):
         out = self.folder / "out"
-        workers = [subprocess.Popen([program.PROGRAM, "convert", clip / "walk", "--output", out, "--shards", f"{k}/3", "--threads", "1", *QUIET],
+        workers = [subprocess.Popen([program.PROGRAM, "convert", clip / "walk", "--output", out, "--shards", f"{k}/3",
+                                     "--threads", "1", *QUIET],
                                     stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) for k in range(3)]
         for worker in workers:
             _, err = worker.communicate(timeout=300)
@@ -190,8 +198,9 @@ class WithoutManifest(program.InFolder):
         before = content(out)
         for more in [], ["--overwrite"], ["--limit", "2"]:
             _, err = convert(clip / "walk", out, *more, expect=64)
-            self.assertIn(f"error: expected the manifest for {clip / 'walk'} (frames), got that of another job, in {out}/manifest.json "
-                          f"(--output names another folder; eventgan convert {out}/manifest.json goes on with that job)\n", err)
+            self.assertIn(f"error: expected the manifest for {clip / 'walk'} (frames), got that of another job, in "
+                          f"{out}/manifest.json (--output names another folder; eventgan convert {out}/manifest.json "
+                          "goes on with that job)\n", err)
         (out / "manifest.json").unlink()
         del before["manifest.json"]
         for given in clip / "walk", self.folder / "run" / "walk":

@@ -50,7 +50,8 @@ def finish(*workers, expect=0):
     for worker in workers:
         out, err = worker.communicate(timeout=PATIENCE_S)
         if worker.returncode != expect:
-            raise AssertionError(f"expected exit code {expect}, got {worker.returncode}, of {worker.args}\n{out}\n{err}")
+            raise AssertionError(f"expected exit code {expect}, got {worker.returncode}, of "
+                                 f"{worker.args}\n{out}\n{err}")
         said.append(out + err)
     return said
 

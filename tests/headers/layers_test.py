@@ -1,5 +1,5 @@
-"""Which room may include which: every arrow points downward, and no stage knows another but for recordings, on which datasets of
-events rest."""
+"""Which room may include which: every arrow points downward, and no stage knows another but for recordings, on which
+datasets of events rest."""
 
 import os
 import pathlib
@@ -59,7 +59,8 @@ class Layers(unittest.TestCase):
         for room in FLOOR:
             if (SOURCE / room).is_dir():
                 text = (SOURCE / room / "CMakeLists.txt").read_text()
-                self.assertEqual(len(re.findall(r"^(?:eventgan_library|pybind11_add_module)\(", text, re.MULTILINE)), 1, room)
+                self.assertEqual(len(re.findall(r"^(?:eventgan_library|pybind11_add_module)\(", text, re.MULTILINE)), 1,
+                                 room)
 
 
 if __name__ == "__main__":

@@ -89,7 +89,8 @@ class ShardInH5py(unittest.TestCase):
 
     def test_optional_texts_and_levels(self):
         file = self.open("float16-1")
-        self.assertEqual(file["pairs/action"].asstr()[:].tolist(), ["", "Walking-1", "Walking-1", "Walking-1", "Walking-1"])
+        self.assertEqual(file["pairs/action"].asstr()[:].tolist(),
+                         ["", "Walking-1", "Walking-1", "Walking-1", "Walking-1"])
         self.assertEqual(file["labels/boxes/difficulty"][:].tolist(), [1, -1, -1])
         np.testing.assert_array_equal(file["pairs/motion"][:], [[np.nan] * 4] * 4 + [[-1.5, 0.25, 0.75, 1.0078125]])
         np.testing.assert_array_equal(file["pairs/threshold"][:], [np.nan] * 4 + [0.3125])

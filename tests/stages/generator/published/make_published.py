@@ -3,10 +3,10 @@
 
     /usr/bin/python3 tests/stages/generator/published/make_published.py [GOLDEN.h5]
 
-The generator as the authors' code defines it (repository alexzzhu/EventGAN, commit c423048), with random weights of base
-width 2: published.pt is the state dict before the first forward pass (spectral norm changes it with each), in the format
-before PyTorch 1.6; published_case.pt has the input and what that pass gives. With a file of numbers that the authors' own
-code computed (golden.h5 of ../shared/data) this definition is compared with them first.
+The generator as the authors' code defines it (repository alexzzhu/EventGAN, commit c423048), with random weights of
+base width 2: published.pt is the state dict before the first forward pass (spectral norm changes it with each), in the
+format before PyTorch 1.6; published_case.pt has the input and what that pass gives. With a file of numbers that the
+authors' own code computed (golden.h5 of ../shared/data) this definition is compared with them first.
 """
 
 import pathlib
