@@ -178,7 +178,7 @@ InputFile::Stream InputFile::stream(std::size_t block_bytes) const {
   Stream stream(
       ::fopencookie(place.get(), "rb", {read_stream, nullptr, seek_stream, close_stream}));
   if (!stream) throw std::bad_alloc();
-  place.release();
+  static_cast<void>(place.release());  // close_stream has it
   return stream;
 }
 
