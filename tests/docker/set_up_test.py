@@ -144,9 +144,9 @@ class Image(unittest.TestCase):
 
 
 class Workflow(unittest.TestCase):
-    def test_runs_the_readmes_commands_on_each_debian(self):
+    def test_runs_the_readmes_commands_on_each_debian_and_all_checks_on_one(self):
         workflow = yaml.safe_load((SOURCE / ".github" / "workflows" / "ci.yml").read_text())
-        debian, image = workflow["jobs"]["debian"], workflow["jobs"]["image"]
+        debian, checks, image = (workflow["jobs"][name] for name in ("debian", "checks", "image"))
         self.assertEqual(debian["strategy"]["matrix"], {"release": ["bookworm", "trixie"]})
         self.assertEqual(debian["container"], "debian:${{ matrix.release }}")
         commands = [step["run"] for step in debian["steps"] if "run" in step]
@@ -156,7 +156,10 @@ class Workflow(unittest.TestCase):
         build = next(step["run"] for step in image["steps"] if "run" in step)
         for page in (README, (DOCKER / "bootstrap.sh").read_text()):
             self.assertIn(build, page)
-        for step in debian["steps"] + image["steps"]:
+        self.assertEqual(checks["container"], "debian:bookworm")
+        self.assertIn(".ci/run", [step.get("run") for step in checks["steps"]])
+        self.assertTrue(os.access(SOURCE / ".ci" / "run", os.X_OK))
+        for step in debian["steps"] + checks["steps"] + image["steps"]:
             self.assertRegex(step.get("uses", "actions/checkout@v4"), r"@v\d+$")
 
 
