@@ -41,7 +41,7 @@ TEST(ManifestSchema, LeavesOnlyTheOrderOfARangeAndTheSizeOfVolumesToTheProgram) 
 }
 
 template <class T, std::size_t N>
-json words(const std::array<Word<T>, N>& table) {
+json word_list(const std::array<Word<T>, N>& table) {
   json list = json::array();
   for (const Word<T>& entry : table) list.push_back(entry.word);
   return list;
@@ -51,25 +51,25 @@ TEST(ManifestSchema, ListsTheSameWords) {
   const auto listed = [](const char* pointer) {
     return testing::schema_document(kSchema).at(json::json_pointer(std::string(pointer) + "/enum"));
   };
-  EXPECT_EQ(listed("/definitions/source/properties/dataset"), words(kDatasetWords));
-  EXPECT_EQ(listed("/definitions/source/properties/layout"), words(kLayoutWords));
-  EXPECT_EQ(listed("/definitions/pairs/properties/from"), words(kPairOriginWords));
+  EXPECT_EQ(listed("/definitions/source/properties/dataset"), word_list(kDatasetWords));
+  EXPECT_EQ(listed("/definitions/source/properties/layout"), word_list(kLayoutWords));
+  EXPECT_EQ(listed("/definitions/pairs/properties/from"), word_list(kPairOriginWords));
   EXPECT_EQ(listed("/definitions/source/properties/columns/properties/unit"),
-            words(kTimeUnitWords));
-  EXPECT_EQ(listed("/definitions/pairs/properties/side"), words(kSideWords));
-  EXPECT_EQ(listed("/definitions/pairs/properties/choose"), words(kChoiceWords));
-  EXPECT_EQ(listed("/definitions/image/properties/fit"), words(kFitWords));
-  EXPECT_EQ(listed("/definitions/image/properties/grey"), words(kGreyWords));
+            word_list(kTimeUnitWords));
+  EXPECT_EQ(listed("/definitions/pairs/properties/side"), word_list(kSideWords));
+  EXPECT_EQ(listed("/definitions/pairs/properties/choose"), word_list(kChoiceWords));
+  EXPECT_EQ(listed("/definitions/image/properties/fit"), word_list(kFitWords));
+  EXPECT_EQ(listed("/definitions/image/properties/grey"), word_list(kGreyWords));
   EXPECT_EQ(listed("/definitions/source/properties/labels/properties/format"),
-            words(kLabelFormatWords));
-  EXPECT_EQ(listed("/properties/generator/properties/kind"), words(kGeneratorWords));
-  EXPECT_EQ(listed("/properties/generator/properties/engine"), words(kEngineWords));
-  EXPECT_EQ(listed("/properties/generator/properties/device"), words(kDeviceWords));
-  EXPECT_EQ(listed("/properties/generator/properties/precision"), words(kPrecisionWords));
-  EXPECT_EQ(listed("/properties/generator/properties/scope"), words(kScopeWords));
-  EXPECT_EQ(listed("/properties/volume/properties/normalize"), words(kNormalizationWords));
-  EXPECT_EQ(listed("/properties/output/properties/dtype"), words(kStoredTypeWords));
-  EXPECT_EQ(listed("/properties/errors/properties/policy"), words(kPolicyWords));
+            word_list(kLabelFormatWords));
+  EXPECT_EQ(listed("/properties/generator/properties/kind"), word_list(kGeneratorWords));
+  EXPECT_EQ(listed("/properties/generator/properties/engine"), word_list(kEngineWords));
+  EXPECT_EQ(listed("/properties/generator/properties/device"), word_list(kDeviceWords));
+  EXPECT_EQ(listed("/properties/generator/properties/precision"), word_list(kPrecisionWords));
+  EXPECT_EQ(listed("/properties/generator/properties/scope"), word_list(kScopeWords));
+  EXPECT_EQ(listed("/properties/volume/properties/normalize"), word_list(kNormalizationWords));
+  EXPECT_EQ(listed("/properties/output/properties/dtype"), word_list(kStoredTypeWords));
+  EXPECT_EQ(listed("/properties/errors/properties/policy"), word_list(kPolicyWords));
 }
 
 TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {

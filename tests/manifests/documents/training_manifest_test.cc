@@ -164,7 +164,7 @@ const std::string kLossesOfASensor =
     "expected likelihood above 0 and adversarial, flow, reconstruction 0, since network.sensor, "
     "got others";
 
-const ManifestCase kSensorCases[] = {
+const ManifestCase kSensorTrainingCases[] = {
     with_sensor("a network that knows its sensor", {}),
     with_sensor("thresholds of the polarities", {{"/recordings/0/threshold_ratio", "0.2"},
                                                  {"/validation", R"([{"path": "b", "format": "ecd",
@@ -259,7 +259,7 @@ TEST_P(TrainingFaults, AreAllReportedAndSeenByTheSchema) {
 
 INSTANTIATE_TEST_SUITE_P(Table, TrainingFaults, ::testing::ValuesIn(kTrainingCases),
                          [](const auto& entry) { return testing::test_name(entry.param); });
-INSTANTIATE_TEST_SUITE_P(Sensors, TrainingFaults, ::testing::ValuesIn(kSensorCases),
+INSTANTIATE_TEST_SUITE_P(Sensors, TrainingFaults, ::testing::ValuesIn(kSensorTrainingCases),
                          [](const auto& entry) { return testing::test_name(entry.param); });
 
 TEST(TrainingManifest, HoldsEveryValueGiven) {
