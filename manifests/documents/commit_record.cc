@@ -12,7 +12,7 @@ namespace eventgan {
 namespace {
 
 constexpr char kCommitRecordFormat[] = "eventgan-commit-record";
-constexpr int kCommitRecordVersion = 2;
+constexpr FormatVersion kCommitRecordVersion{1, 0};
 constexpr int kMostGap = 6;
 constexpr double kMostSeconds = 1e12;
 
@@ -133,6 +133,7 @@ CommitRecord read_document(const nlohmann::json& document, FaultList& faults) {
     record.peak_bytes = peak->integer<std::int64_t>(0, INT64_MAX);
   }
   object.finish();
+  record.unknown = faults.unknown_keys();
   // A slot is either good or accounted for. Only worth saying if the numbers themselves are sound.
   const auto lost = static_cast<int>(record.quarantined.size());
   if (faults.empty() && record.valid + lost != record.samples) {
@@ -158,7 +159,7 @@ std::string to_json(const CommitRecord& record) {
   }
   require_seconds(record.wall_seconds, "wall_seconds");
   return indented({{"format", kCommitRecordFormat},
-                   {"version", kCommitRecordVersion},
+                   {"version", to_string(kCommitRecordVersion)},
                    {"shard", record.shard},
                    {"plan_hash", record.plan_hash},
                    {"sha256", record.sha256},

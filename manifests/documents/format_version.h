@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
@@ -28,5 +29,11 @@ std::optional<FormatVersion> readable_version(std::string_view text, FormatVersi
 /// What a file should have stated, for "expected X, got Y": "\"1.0\" (this program reads versions
 /// 1.x)".
 std::string readable_versions(FormatVersion own);
+
+/// A file of a version that this program does not read: nothing says that it is damaged.
+class UnreadableVersion : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 }  // namespace eventgan

@@ -1,5 +1,7 @@
 #include "manifests/documents/plan.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -16,10 +18,16 @@ std::int64_t Plan::sample_count() const {
   return count;
 }
 
-std::vector<std::string> notes_of(const std::vector<SourceSummary>& sources) {
+std::vector<std::string> notes_of(const std::vector<SourceSummary>& sources,
+                                  const std::set<std::string>& unknown) {
   std::vector<std::string> notes;
   for (const SourceSummary& source : sources) {
     notes.insert(notes.end(), source.notes.begin(), source.notes.end());
+  }
+  if (!unknown.empty()) {
+    notes.push_back(
+        fmt::format("the folder is of a later version, and has what this program does not know: {}",
+                    fmt::join(unknown, ", ")));
   }
   return notes;
 }
@@ -73,7 +81,8 @@ std::vector<ShardOutline> outlines_of(const std::vector<const PlannedShard*>& sh
 }
 
 PlanOutline outline_of(const Plan& plan) {
-  PlanOutline outline{plan.name, plan.manifest_text, plan.fingerprint, plan.sources, {}};
+  PlanOutline outline{plan.name, plan.manifest_text, plan.fingerprint, plan.sources,
+                      {},        plan.unknown};
   outline.shards.reserve(plan.shards.size());
   for (const PlannedShard& shard : plan.shards) outline.shards.push_back(outline_of(shard));
   return outline;
@@ -136,7 +145,8 @@ void write_shard(const PlannedShard& shard, Pieces& pieces) {
 
 void write_plan(const Plan& plan, const std::function<void(std::string_view)>& sink) {
   Pieces pieces(sink);
-  pieces << "{\"fingerprint\":" << dump(plan.fingerprint) << ",\n\"format\":" << dump(kPlanFormat)
+  pieces << "{\"format\":" << dump(kPlanFormat) << ",\"version\":" << dump(to_string(kPlanVersion))
+         << ",\n\"fingerprint\":" << dump(plan.fingerprint)
          << ",\n\"manifest\":" << dump(plan.manifest_text) << ",\n\"name\":" << dump(plan.name)
          << ",\n\"shards\":[";
   const char* between = "\n";
@@ -147,8 +157,7 @@ void write_plan(const Plan& plan, const std::function<void(std::string_view)>& s
   }
   json sources = json::array();
   for (const SourceSummary& source : plan.sources) sources.push_back(to_json_value(source));
-  pieces << "\n],\n\"sources\":" << dump(sources)
-         << ",\n\"version\":" << std::to_string(kPlanVersion) << "}\n";
+  pieces << "\n],\n\"sources\":" << dump(sources) << "}\n";
   pieces.flush();
 }
 
@@ -169,7 +178,8 @@ Plan read_plan(std::istream& stream, const std::string& name) {
             std::move(outline.manifest_text),
             std::move(outline.fingerprint),
             std::move(outline.sources),
-            {}};
+            {},
+            std::move(outline.unknown)};
   for (std::size_t i = 0; i < outline.shards.size(); ++i) {
     ShardOutline& shard = outline.shards[i];
     plan.shards.push_back({std::move(shard.name), shard.source, shard.volume_size,

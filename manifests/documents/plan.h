@@ -4,6 +4,7 @@
 #include <functional>
 #include <iosfwd>
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -48,8 +49,9 @@ struct SourceSummary {
   std::vector<std::string> notes;         ///< Dataset::notes(), and what planning found out besides
 };
 
-/// The notes of all sources, in their order.
-std::vector<std::string> notes_of(const std::vector<SourceSummary>& sources);
+/// The notes of all sources, in their order; and what of a file is not known, if there is any.
+std::vector<std::string> notes_of(const std::vector<SourceSummary>& sources,
+                                  const std::set<std::string>& unknown = {});
 
 /// For a person, at the end of a report: how many notes there are, and the first few, a line each.
 /// Empty if there are none.
@@ -64,11 +66,13 @@ struct Plan {
   std::map<std::string, std::string> fingerprint;  ///< field → value; compared field by field
   std::vector<SourceSummary> sources;
   std::vector<PlannedShard> shards;
+  std::set<std::string> unknown = {};  ///< as PlanOutline's
 
   std::int64_t sample_count() const;
 };
 
-/// Canonical JSON: sorted keys, no spaces but a line a sample, newline at the end. Its SHA-256 is
+/// Canonical JSON: format and version, then sorted keys, no spaces but a line a sample, newline at
+/// the end. Its SHA-256 is
 /// the plan's hash. Goes to `sink` in pieces of about 64 KiB, since a plan of a million pairs is
 /// hundreds of megabytes long. Throws std::runtime_error for names that are not UTF-8, after some
 /// pieces perhaps; passes on what `sink` throws.
@@ -78,7 +82,7 @@ std::string to_json(const Plan& plan);
 /// Reads what write_plan has written, line by line, so that no more than a line is in memory
 /// beside the plan. Any other layout is damage, even of the same JSON. Throws std::runtime_error
 /// for the first line that is damaged, with all of its faults: "NAME:LINE: $.key: expected X, got
-/// Y".
+/// Y"; UnreadableVersion for a plan of another major version (format_version.h).
 Plan read_plan(std::istream& stream, const std::string& name);
 Plan parse_plan(std::string_view text, const std::string& name);
 
@@ -104,6 +108,8 @@ struct PlanOutline {
   std::map<std::string, std::string> fingerprint;
   std::vector<SourceSummary> sources;
   std::vector<ShardOutline> shards;
+  /// Places in the file that this program does not know, of a later minor version; not written.
+  std::set<std::string> unknown = {};
 
   std::int64_t sample_count() const;
 };

@@ -1,5 +1,7 @@
 #include "manifests/documents/detail/plan_lines.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <istream>
@@ -147,8 +149,23 @@ class Lines {
     if (!at_end_ && stream_.eof()) fail("a line feed at the end of the line");
   }
 
+  /// From here on what is not known is named and passed over.
+  void allow_unknown() { allows_unknown_ = true; }
+  const std::set<std::string>& unknown() const { return unknown_; }
+
+  /// Goes on to the line that begins with `begin`, over lines of keys that are not known.
+  void pass_unknown(std::string_view begin) {
+    while (allows_unknown_ && !at_end_ && line_.starts_with('"') && !line_.starts_with(begin)) {
+      const std::size_t end = line_.find("\":");
+      if (end == line_.npos || !line_.ends_with(',')) return;
+      unknown_.insert(json_path("$", line_.substr(1, end - 1)));
+      next();
+    }
+  }
+
   /// What is between `begin` and `end` in this line; goes on to the next.
   std::string take(std::string_view begin, std::string_view end) {
+    if (begin.starts_with('"')) pass_unknown(begin);
     const std::string_view text = line_;
     if (at_end_ || text.size() < begin.size() + end.size() || !text.starts_with(begin) ||
         !text.ends_with(end)) {
@@ -161,6 +178,7 @@ class Lines {
 
   /// Goes on to the next line if this one is `expected`.
   void pass(const std::string& expected) {
+    if (expected.starts_with('"')) pass_unknown(expected);
     if (at_end_ || line_ != expected) fail("the line " + expected);
     next();
   }
@@ -168,13 +186,13 @@ class Lines {
   /// Parses `text`, which ended on the line before this one, and gives it to `read`, which may add
   /// faults.
   template <class Read>
-  auto parse(std::string_view text, const std::string& path, Read&& read) const {
+  auto parse(std::string_view text, const std::string& path, Read&& read) {
     return parse_of(number_ - 1, text, path, read);
   }
 
   /// The same for what is in this line.
   template <class Read>
-  auto parse_here(std::string_view text, const std::string& path, Read&& read) const {
+  auto parse_here(std::string_view text, const std::string& path, Read&& read) {
     return parse_of(number_, text, path, read);
   }
 
@@ -190,11 +208,12 @@ class Lines {
   std::string place(std::size_t number) const { return name_ + ":" + std::to_string(number); }
 
   template <class Read>
-  auto parse_of(std::size_t number, std::string_view text, const std::string& path,
-                Read&& read) const {
+  auto parse_of(std::size_t number, std::string_view text, const std::string& path, Read&& read) {
     FaultList faults(place(number));
+    if (allows_unknown_) faults.allow_unknown_keys();
     if (const auto document = parse_json_text(text, faults)) {
       auto result = read(StrictValue(*document, path, faults));
+      unknown_.insert(faults.unknown_keys().begin(), faults.unknown_keys().end());
       if (faults.empty()) return result;
     }
     throw std::runtime_error(faults.text());
@@ -205,9 +224,25 @@ class Lines {
   std::string line_;
   std::size_t number_ = 0;  // of line_, from 1
   bool at_end_ = false;
+  bool allows_unknown_ = false;
+  std::set<std::string> unknown_;
 };
 
 std::string read_text(const StrictValue& value) { return value.text(); }
+
+/// The first line.
+void read_version(Lines& lines, const std::string& name) {
+  const std::string begin = fmt::format("{{\"format\":\"{}\",\"version\":", kPlanFormat);
+  const std::string stated = lines.parse(lines.take(begin, ","), "$.version", read_text);
+  const auto version = readable_version(stated, kPlanVersion);
+  if (!version) {
+    throw UnreadableVersion(fmt::format(
+        "expected a plan of version {}, got {}, in {}: it was written by another "
+        "version of eventgan",
+        readable_versions(kPlanVersion), dump_json(json(stated), JsonLayout::kAsciiLine), name));
+  }
+  if (version->minor > kPlanVersion.minor) lines.allow_unknown();
+}
 
 std::map<std::string, std::string> read_fingerprint(const StrictValue& value) {
   std::map<std::string, std::string> fingerprint;
@@ -262,9 +297,9 @@ PlanOutline read_plan_lines(
     const std::function<void(std::size_t, const StrictValue&)>& take_sample) {
   PlanOutline plan;
   Lines lines(stream, name);
+  read_version(lines, name);
   plan.fingerprint =
-      lines.parse(lines.take("{\"fingerprint\":", ","), "$.fingerprint", read_fingerprint);
-  lines.pass("\"format\":\"" + std::string(kPlanFormat) + "\",");
+      lines.parse(lines.take("\"fingerprint\":", ","), "$.fingerprint", read_fingerprint);
   plan.manifest_text = lines.parse(lines.take("\"manifest\":", ","), "$.manifest", read_text);
   plan.name = lines.parse(lines.take("\"name\":", ","), "$.name", read_text);
   lines.pass("\"shards\":[");
@@ -283,9 +318,9 @@ PlanOutline read_plan_lines(
     plan.shards.push_back(std::move(shard));
   }
   lines.pass("],");
-  plan.sources = lines.parse(lines.take("\"sources\":", ","), "$.sources", read_sources);
-  lines.pass("\"version\":" + std::to_string(kPlanVersion) + "}");
+  plan.sources = lines.parse(lines.take("\"sources\":", "}"), "$.sources", read_sources);
   if (!lines.at_end()) lines.fail("the end of the file");
+  plan.unknown = lines.unknown();
 
   const std::size_t sources = std::max<std::size_t>(plan.sources.size(), 1);
   for (const ShardOutline& shard : plan.shards) {

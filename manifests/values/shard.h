@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -113,6 +114,8 @@ struct CommitRecord {
   double wall_seconds = 0;  ///< since the writer's previous commit, or the start of its run
   /// Most memory of the writer's process up to the commit; 0: not known.
   std::int64_t peak_bytes = 0;
+  /// Places in the file that this program does not know, of a later minor version; not written.
+  std::set<std::string> unknown = {};
   bool operator==(const CommitRecord&) const = default;
 };
 

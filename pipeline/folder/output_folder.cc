@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstdio>
 #include <istream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -17,7 +16,7 @@
 
 #include "manifests/documents/commit_record.h"
 #include "manifests/documents/detail/json_text.h"
-#include "manifests/documents/detail/plan_lines.h"
+#include "manifests/documents/format_version.h"
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
 #include "pipeline/folder/amendments.h"
@@ -75,21 +74,6 @@ class HashedFile : public std::streambuf {
   Sha256 hash_;
 };
 
-/// The version that the last line of a plan states, `"version":1}`; none if that line is another.
-std::optional<int> stated_version(const fs::path& file) {
-  constexpr std::uint64_t kLastLine = 24;  // of a version with so many digits as an int has
-  constexpr std::string_view kStart = "\"version\":";
-  const InputFile opened(file);
-  const std::uint64_t size = std::min(kLastLine, opened.size_bytes());
-  const std::string end = opened.read(opened.size_bytes() - size, size);
-  const std::size_t start = end.rfind(kStart);
-  int version = 0;
-  if (start == end.npos || std::sscanf(end.c_str() + start + kStart.size(), "%d}", &version) != 1) {
-    return std::nullopt;
-  }
-  return version;
-}
-
 /// Reads FOLDER/plan.json with `read` (a stream and a name to a plan, or a part of one).
 template <class Frozen, class Read>
 Frozen read_plan_file(const fs::path& folder, const Read& read) {
@@ -109,13 +93,9 @@ Frozen read_plan_file(const fs::path& folder, const Read& read) {
     return {std::move(plan), hashed.hash_of_read()};
   } catch (const std::system_error&) {
     throw;  // the file system's trouble, not the plan's: starting again would be the wrong advice
+  } catch (const UnreadableVersion&) {
+    throw;
   } catch (const std::runtime_error&) {
-    if (const auto version = stated_version(file); version && *version > kPlanVersion) {
-      throw std::runtime_error(
-          fmt::format("expected a plan of version {} (the one that this program reads), got "
-                      "version {}, in {}: it was written by a newer eventgan",
-                      kPlanVersion, *version, file.string()));
-    }
     std::throw_with_nested(std::runtime_error("expected a whole plan, got a damaged one, in " +
                                               file.string() + " (--overwrite starts again)"));
   }
@@ -148,7 +128,7 @@ std::string hash_of(const Plan& plan, const ShowPhase& show_phase) {
 
 using Fingerprint = std::map<std::string, std::string>;
 
-/// The fingerprint that the first line of FOLDER/plan.json states, also where the plan is damaged
+/// The fingerprint that the second line of FOLDER/plan.json states, also where the plan is damaged
 /// further on; empty if that line is.
 Fingerprint stated_fingerprint(const fs::path& folder) {
   const fs::path file = folder / kPlanName;
@@ -156,8 +136,10 @@ Fingerprint stated_fingerprint(const fs::path& folder) {
   if (!bytes.is_open()) return {};
   std::istream stream(&bytes);
   std::string line;
+  std::getline(stream, line);  // format and version
   std::getline(stream, line);
   if (line.ends_with(',')) line.back() = '}';
+  line.insert(0, "{");
   FaultList faults(file.string());
   const auto document = parse_json_text(line, faults);
   if (!document || !document->is_object() || !document->contains("fingerprint")) return {};

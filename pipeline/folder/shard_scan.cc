@@ -198,6 +198,15 @@ ShardState shard_state(const fs::path& folder, const ShardOutline& shard,
   return Look(folder, shard, plan_hash).run(depth);
 }
 
+std::set<std::string> unknown_places(const PlanOutline& plan,
+                                     const std::vector<ShardState>& shards) {
+  std::set<std::string> places = plan.unknown;
+  for (const ShardState& shard : shards) {
+    if (shard.record) places.insert(shard.record->unknown.begin(), shard.record->unknown.end());
+  }
+  return places;
+}
+
 std::vector<ShardState> scan_shards(const fs::path& folder, const std::vector<ShardOutline>& shards,
                                     const std::string& plan_hash, ScanDepth depth,
                                     const ScanOptions& options) {

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -70,6 +71,10 @@ struct ScanOptions {
   TraceRecorder* trace = nullptr;  ///< of shards that are read; null: nobody asks
   ShowPhase show_phase{};
 };
+
+/// What plan and commit records have that this program does not know, of a later minor version.
+std::set<std::string> unknown_places(const PlanOutline& plan,
+                                     const std::vector<ShardState>& shards);
 
 /// What the folder holds of each of `shards`, in their order.
 std::vector<ShardState> scan_shards(const std::filesystem::path& folder,

@@ -14,7 +14,7 @@ namespace eventgan {
 // out; both ways of a part are together.
 
 inline constexpr char kPlanFormat[] = "eventgan-plan";
-inline constexpr int kPlanVersion = 1;
+inline constexpr FormatVersion kPlanVersion{1, 0};
 
 nlohmann::json to_json_value(const PlannedSample& sample);
 PlannedSample read_planned_sample(const StrictValue& value);
@@ -24,8 +24,8 @@ SourceSummary read_source_summary(const StrictValue& value);
 
 /// Reads plan.json, whose layout is fixed, line by line:
 ///
-///   {"fingerprint":{...},
-///   "format":"eventgan-plan",
+///   {"format":"eventgan-plan","version":"1.0",
+///   "fingerprint":{...},
 ///   "manifest":"...",
 ///   "name":"...",
 ///   "shards":[
@@ -35,8 +35,10 @@ SourceSummary read_source_summary(const StrictValue& value);
 ///   ],"source":S,"width":W},              likewise
 ///   ...
 ///   ],
-///   "sources":[...],
-///   "version":1}
+///   "sources":[...]}
+///
+/// A later minor version may have keys beside these, the outermost in lines of their own before one
+/// of these.
 ///
 /// Each sample goes to `take_sample` with its shard's index, in order; if that is empty, samples
 /// are counted but not parsed. Throws std::runtime_error for the first line that is damaged (see

@@ -80,7 +80,7 @@ TEST(CommitRecord, TextIsCanonical) {
     "write": 0.1
   },
   "valid": 2,
-  "version": 2,
+  "version": "1.0",
   "wall_seconds": 2.25
 }
 )");
@@ -137,6 +137,18 @@ TEST(CommitRecord, RowCountsStandOnOneLineHoweverManyTheyAre) {
   EXPECT_EQ(parse_commit_record(text, "m"), record);
 }
 
+TEST(CommitRecord, OfALaterMinorVersionNamesWhatIsNotKnown) {
+  auto document = nlohmann::json::parse(to_json(sample_commit_record()));
+  document["version"] = "1.7";
+  document["host"] = "x";
+  document["quarantined"][0]["frame"] = 3;
+  const CommitRecord record = parse_commit_record(document.dump(), "m");
+  EXPECT_THAT(record.unknown, ::testing::ElementsAre("$.host", "$.quarantined[].frame"));
+  CommitRecord known = record;
+  known.unknown = {};
+  EXPECT_EQ(known, sample_commit_record());
+}
+
 struct BadCommitRecord {
   const char* pointer;
   const char* value;
@@ -147,7 +159,8 @@ TEST(CommitRecord, EveryRuleIsChecked) {
   const std::vector<BadCommitRecord> table = {
       {"/format", R"("eventgan-manifest")",
        R"($.format: expected "eventgan-commit-record", got "eventgan-manifest")"},
-      {"/version", "1", "$.version: expected 2 (the version that this program reads), got 1"},
+      {"/version", R"("2.0")",
+       R"($.version: expected "1.0" (this program reads versions 1.x), got "2.0")"},
       {"/shard", R"("../job-train-00000-of-00001.h5")",
        "$.shard: expected a shard's name, such as job-train-00012-of-01024.h5, got "
        R"("../job-train-00000-of-00001.h5")"},

@@ -82,8 +82,8 @@ TEST(PlanJson, OfNoShardsRoundTrips) {
 
 TEST(PlanJson, BytesAreAsTheyEverWere) {
   // Changing them would orphan every folder that was frozen before.
-  EXPECT_EQ(to_json(small_plan()), R"({"fingerprint":{"manifest":"bb","weights":"aa"},
-"format":"eventgan-plan",
+  EXPECT_EQ(to_json(small_plan()), R"({"format":"eventgan-plan","version":"1.0",
+"fingerprint":{"manifest":"bb","weights":"aa"},
 "manifest":"{ // a \"job\"\n}",
 "name":"job",
 "shards":[
@@ -95,8 +95,7 @@ TEST(PlanJson, BytesAreAsTheyEverWere) {
 {"gap":2,"id":"s3","label":"","label_index":7,"label_position":1.0,"next":{"index":7,"path":"b"},"previous":{"index":5,"path":"a"},"sequence":""}
 ],"source":1,"width":6}
 ],
-"sources":[{"faults":1,"labelled_frames":3,"notes":["a \"note\""],"pairs_by_gap":[{"gap":1,"pairs":1},{"gap":6,"pairs":1}],"unpaired":1,"unpaired_ids":["b"]},{"faults":0,"labelled_frames":1,"notes":[],"pairs_by_gap":[{"gap":2,"pairs":1}],"unpaired":0,"unpaired_ids":[]}],
-"version":1}
+"sources":[{"faults":1,"labelled_frames":3,"notes":["a \"note\""],"pairs_by_gap":[{"gap":1,"pairs":1},{"gap":6,"pairs":1}],"unpaired":1,"unpaired_ids":["b"]},{"faults":0,"labelled_frames":1,"notes":[],"pairs_by_gap":[{"gap":2,"pairs":1}],"unpaired":0,"unpaired_ids":[]}]}
 )");
 }
 
@@ -141,11 +140,15 @@ struct Damage {
 TEST(PlanJson, EveryRuleIsChecked) {
   const std::vector<Damage> table = {
       {"\"eventgan-plan\"", "\"eventgan-commit-record\"",
-       "p:2: expected the line \"format\":\"eventgan-plan\",, got \"\\\"format"},
-      {"\"version\":1", "\"version\":2", ": expected the line \"version\":1}, got"},
+       "p:1: expected a line {\"format\":\"eventgan-plan\",\"version\":...,, got \"{\\\"format"},
+      {"\"version\":\"1.0\"", "\"version\":1", "p:1: $.version: expected text, got 1"},
+      {"\"version\":\"1.0\"", "\"version\":\"2.0\"",
+       "expected a plan of version \"1.0\" (this program reads versions 1.x), got \"2.0\", in p: "
+       "it "
+       "was written by another version of eventgan"},
       {"\"name\":\"job\"", "\"name\":7", "p:4: $.name: expected text, got 7"},
-      {"\"bb\"", "2", "p:1: $.fingerprint.manifest: expected text, got 2"},
-      {"{\"manifest\":\"bb\"", "{\"weights\":\"bb\"", "p:1: $.weights: expected the key once"},
+      {"\"bb\"", "2", "p:2: $.fingerprint.manifest: expected text, got 2"},
+      {"{\"manifest\":\"bb\"", "{\"weights\":\"bb\"", "p:2: $.weights: expected the key once"},
       {"\"height\":3", "\"height\":0", "p:9: $.shards[0].height: expected an integer"},
       {"\"height\":3", "\"depth\":3,\"height\":3", "p:9: $.shards[0].depth: expected"},
       {"\"source\":1", "\"source\":2", "p: expected a source 0..1, got 2"},
@@ -160,8 +163,8 @@ TEST(PlanJson, EveryRuleIsChecked) {
       {"{\"gap\":2", " {\"gap\":2", "p:11: expected a sample, got \" {"},
       {"},\n{\"fault\"", "}\n{\"fault\"", "p:8: expected a line ],...}, got"},
       {"\n],\"source\":0", ",\n],\"source\":0", "p:9: expected a sample, got \"],"},
-      {"]}],\n\"version\"", "]}]\n\"version\"", "expected a line \"sources\":...,, got"},
-      {"\"version\":1}\n", "\"version\":1}\n\n", "p:16: expected the end of the file, got \"\""},
+      {"[]}]}\n", "[]}]\n", "expected a line \"sources\":...}, got"},
+      {"[]}]}\n", "[]}]}\n\n", "p:15: expected the end of the file, got \"\""},
   };
   for (const Damage& damage : table) {
     std::string text = to_json(small_plan());
@@ -172,6 +175,30 @@ TEST(PlanJson, EveryRuleIsChecked) {
                 ThrowsMessage<std::runtime_error>(HasSubstr(damage.fault)))
         << damage.with;
   }
+}
+
+TEST(PlanJson, OfALaterMinorVersionNamesWhatIsNotKnown) {
+  std::string text = to_json(small_plan());
+  const auto replace = [&](const std::string& what, const std::string& with) {
+    const std::size_t at = text.find(what);
+    ASSERT_NE(at, text.npos) << what;
+    text.replace(at, what.size(), with);
+  };
+  replace("\"1.0\"", "\"1.2\"");
+  replace("\"manifest\":\"{", "\"host\":{\"name\":\"a\"},\n\"manifest\":\"{");
+  replace("\"gap\":1,", "\"gap\":1,\"gap_s\":0.5,");
+  replace("\"source\":0,", "\"source\":0,\"wide\":1,");
+  const Plan plan = parse_plan(text, "p");
+  EXPECT_THAT(plan.unknown,
+              ::testing::ElementsAre("$.host", "$.shards[].samples[].gap_s", "$.shards[].wide"));
+  EXPECT_EQ(to_json(plan), to_json(small_plan()));
+  EXPECT_THAT(notes_of({}, plan.unknown),
+              ::testing::ElementsAre("the folder is of a later version, and has what this program "
+                                     "does not know: $.host, $.shards[].samples[].gap_s, "
+                                     "$.shards[].wide"));
+  replace("\"1.2\"", "\"1.0\"");
+  EXPECT_THAT([&] { parse_plan(text, "p"); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("expected a line \"manifest\":")));
 }
 
 TEST(PlanJson, NoPartOfAPlanIsAPlan) {
