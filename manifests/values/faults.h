@@ -15,13 +15,23 @@ struct SampleFault {
   bool operator==(const SampleFault&) const = default;
 };
 
-/// A stage's result for one sample: the value, or why there is none.
+/// A stage's result for one sample: the value, or why there is none. Asking for what it is not is
+/// std::bad_variant_access.
 template <class T>
-using Outcome = std::variant<T, SampleFault>;
+struct Outcome : std::variant<T, SampleFault> {
+  using std::variant<T, SampleFault>::variant;
+
+  const T& operator*() const& { return std::get<0>(*this); }
+  T& operator*() & { return std::get<0>(*this); }
+  T&& operator*() && { return std::get<0>(std::move(*this)); }
+  const T* operator->() const { return &std::get<0>(*this); }
+  T* operator->() { return &std::get<0>(*this); }
+  const SampleFault& fault() const { return std::get<1>(*this); }
+};
 
 template <class T>
 bool is_fault(const Outcome<T>& outcome) {
-  return std::holds_alternative<SampleFault>(outcome);
+  return outcome.index() == 1;
 }
 
 /// The user asked for something that cannot be: bad command line or bad manifest. Exit code 64.

@@ -105,9 +105,9 @@ void SampleStages::read_frames(SampleMessage& message) const {
   }
   Outcome<PreparedPair> prepared = reader_.read(message.planned().pair, orientation, source.every);
   if (is_fault(prepared)) {
-    message.fail(std::get<SampleFault>(prepared).reason);
+    message.fail(prepared.fault().reason);
   } else {
-    message.prepared = std::move(std::get<PreparedPair>(prepared));
+    message.prepared = std::move(*prepared);
     take_placement(message);
   }
 }
@@ -115,10 +115,10 @@ void SampleStages::read_frames(SampleMessage& message) const {
 void SampleStages::read_events(SampleMessage& message, const Dataset& dataset) const {
   Outcome<EventWindow> outcome = dataset.events(message.planned().label_key);
   if (is_fault(outcome)) {
-    message.fail(std::get<SampleFault>(outcome).reason);
+    message.fail(outcome.fault().reason);
     return;
   }
-  EventWindow& window = std::get<EventWindow>(outcome);
+  EventWindow& window = *outcome;
   window.tell_times(message.sample.pair);
   PreparedPair& prepared = message.prepared;
   prepared.placement = place(window.sensor, manifest_.image);
@@ -154,18 +154,18 @@ void SampleStages::read_labels(SampleMessage& message, const Dataset& dataset) c
   const PlannedSample& planned = message.planned();
   Outcome<Annotation> annotation = dataset.annotation(planned.label_key);
   if (is_fault(annotation)) {
-    if (!message.failed()) message.fail(std::get<SampleFault>(annotation).reason);
+    if (!message.failed()) message.fail(annotation.fault().reason);
     return;
   }
-  message.sample.annotation = std::move(std::get<Annotation>(annotation));
+  message.sample.annotation = std::move(*annotation);
   if (!message.failed()) {
     Outcome<VolumeLabels> labels = map_labels(message.sample.annotation, message.prepared.placement,
                                               dataset.label_place(planned.label_key));
     if (!is_fault(labels)) {
-      message.sample.labels = std::move(std::get<VolumeLabels>(labels));
+      message.sample.labels = std::move(*labels);
       return;
     }
-    message.fail(std::get<SampleFault>(labels).reason);
+    message.fail(labels.fault().reason);
   }
   // Without a usable image or label there is no place in the volume; the original text is kept.
   message.sample.annotation.boxes.clear();

@@ -14,7 +14,6 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
-#include <variant>
 
 #include "manifests/values/faults.h"
 #include "manifests/values/pair_key.h"
@@ -144,22 +143,21 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   if (!stored.valid) {
     // What could not be read then may have been mended meanwhile; what was kept must be right.
     if (is_fault(read) || stored.annotation.original.empty() ||
-        std::get<Annotation>(read).original == stored.annotation.original) {
+        read->original == stored.annotation.original) {
       return {};
     }
     return {"expected the annotation as it is in " + place + ", got other bytes"};
   }
   if (is_fault(read)) {
-    return {"expected the annotation that the shard holds, got none: " +
-            std::get<SampleFault>(read).reason};
+    return {"expected the annotation that the shard holds, got none: " + read.fault().reason};
   }
   ImageSizes& sizes = dataset.image_sizes() ? *dataset.image_sizes() : sizes_;
   const Outcome<ImageSize> size =
       has_events(kind) ? Outcome<ImageSize>(dataset.sensor_size(planned.label_key))
                        : sizes.of(resolve(manifest_, stored.pair.next.path), orientation_of(kind));
-  if (!is_fault(size) && std::get<ImageSize>(size) != stored.source_size) {
-    return {"expected a source size of " + to_string(std::get<ImageSize>(size)) + " as in " +
-            stored.pair.next.path + ", got " + to_string(stored.source_size)};
+  if (!is_fault(size) && *size != stored.source_size) {
+    return {"expected a source size of " + to_string(*size) + " as in " + stored.pair.next.path +
+            ", got " + to_string(stored.source_size)};
   }
   if (stored.source_size.height <= 0 || stored.source_size.width <= 0) {
     return {"expected a source size, got " + to_string(stored.source_size)};
@@ -177,11 +175,11 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
     return {"expected source_to_volume of an image of " + to_string(stored.source_size) +
             ", got another map"};
   }
-  auto& annotation = std::get<Annotation>(read);
+  auto& annotation = *read;
   Outcome<VolumeLabels> mapped = map_labels(annotation, placement, place);
   if (is_fault(mapped)) {
     return {"expected the annotation that the shard holds, got an invalid one: " +
-            std::get<SampleFault>(mapped).reason};
+            mapped.fault().reason};
   }
   ShardSample expected;
   expected.sample_id = planned.sample_id;
@@ -192,9 +190,9 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
     const Outcome<EventWindow> read_window = dataset.events(planned.label_key);
     if (is_fault(read_window)) {
       return {"expected the events that the shard was made from, got none: " +
-              std::get<SampleFault>(read_window).reason};
+              read_window.fault().reason};
     }
-    std::get<EventWindow>(read_window).tell_times(expected.pair);
+    read_window->tell_times(expected.pair);
   }
   expected.source_size = placement.source;
   expected.source_to_volume = map;
@@ -204,7 +202,7 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   }
   expected.tiles = stored.tiles;
   expected.annotation = std::move(annotation);
-  expected.labels = std::move(std::get<VolumeLabels>(mapped));
+  expected.labels = std::move(*mapped);
   ShardHeader header = reader.header();
   header.dataset = to_string(kind);
   return row_differences(header, reader.tables(), slot, expected, place);

@@ -188,7 +188,7 @@ void compare_sizes(const Dataset& dataset, const fs::path& folder, SourceDraft& 
     const std::string& path = frames[i].frame.path;
     const Outcome<ImageSize> probed = probe_image_size(folder / path, ImageOrientation::kUpright);
     if (is_fault(probed)) continue;
-    const auto size = std::get<ImageSize>(probed);
+    const auto size = *probed;
     const auto known = first.try_emplace(frames[i].sequence, size, path).first;
     draft.has_sizes |= first.begin()->second.first != size;
     if (draft.is_stills || known->second.first == size) continue;
@@ -217,7 +217,7 @@ void compare_neighbours(const Dataset& dataset, const fs::path& folder, SourceDr
       const auto a = decoder.decode(frame, 1, ImageOrientation::kUpright);
       const auto b = decoder.decode(next.frame, 1, ImageOrientation::kUpright);
       if (is_fault(a) || is_fault(b)) continue;
-      const auto alike = likeness(std::get<ColourFrame>(a), std::get<ColourFrame>(b));
+      const auto alike = likeness(*a, *b);
       if (!alike) continue;
       ++pairs;
       if (*alike >= kUnrelated) continue;

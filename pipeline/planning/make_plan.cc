@@ -279,7 +279,7 @@ class SizeProbe {
     for (const FrameRef* frame : {&sample.pair.next, &sample.pair.previous}) {
       if (frame->path.empty()) continue;
       const Outcome<ImageSize> size = sizes.of(resolve(manifest_, frame->path), orientation);
-      if (!is_fault(size)) return std::get<ImageSize>(size);
+      if (!is_fault(size)) return *size;
     }
     return {};
   }

@@ -67,10 +67,10 @@ std::vector<std::uint8_t> frame_image(const Outcome<ColourFrame>& decoded, const
                                       const ShardSample& sample, const ImageSpec& image,
                                       std::vector<std::string>& warnings) {
   if (is_fault(decoded)) {
-    warnings.push_back(std::get<SampleFault>(decoded).reason + " (" + sample.sample_id + ")");
+    warnings.push_back(decoded.fault().reason + " (" + sample.sample_id + ")");
     return {};
   }
-  const ColourFrame& colour = std::get<ColourFrame>(decoded);
+  const ColourFrame& colour = *decoded;
   if (colour.size != sample.source_size) {
     warnings.push_back(
         "expected the size that the frame had when it was converted, got another, in " +

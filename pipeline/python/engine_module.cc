@@ -274,8 +274,8 @@ class PairGenerator {
     made.placement = pair.placement;
     if (labels) {
       Outcome<VolumeLabels> mapped = map_labels(labels->annotation, pair.placement, "the labels");
-      if (is_fault(mapped)) throw UsageError(std::get<SampleFault>(mapped).reason);
-      made.labels = std::move(std::get<VolumeLabels>(mapped));
+      if (is_fault(mapped)) throw UsageError(mapped.fault().reason);
+      made.labels = std::move(*mapped);
     }
     std::vector<float> content;
     std::span<float> values = volume;

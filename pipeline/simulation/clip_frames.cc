@@ -124,8 +124,8 @@ ClipFrames::ClipFrames(const SimulationSource& source, const SimulationManifest&
 GreyImage ClipFrames::frame(std::int64_t position) {
   const FrameRef& ref = frames_[at(position)];
   const Outcome<ColourFrame> decoded = decoder_.decode(ref, 1, ImageOrientation::kUpright);
-  if (is_fault(decoded)) throw InputError(std::get<SampleFault>(decoded).reason);
-  const auto& frame = std::get<ColourFrame>(decoded);
+  if (is_fault(decoded)) throw InputError(decoded.fault().reason);
+  const auto& frame = *decoded;
   if (!frame_size_) frame_size_ = frame.size;
   if (frame.size != *frame_size_) {
     throw InputError("expected a frame of " + to_string(*frame_size_) + " as the first one, got " +

@@ -111,8 +111,8 @@ Outcome<std::string> SourceRoot::read(std::string_view relative) const {
 
 std::string SourceRoot::read_or_throw(std::string_view relative) const {
   Outcome<std::string> bytes = read(relative);
-  if (const auto* fault = std::get_if<SampleFault>(&bytes)) throw InputError(fault->reason);
-  return std::get<std::string>(std::move(bytes));
+  if (is_fault(bytes)) throw InputError(bytes.fault().reason);
+  return *std::move(bytes);
 }
 
 }  // namespace eventgan

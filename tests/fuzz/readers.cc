@@ -101,8 +101,8 @@ void check_all(const Images& images, std::size_t input_size) {
   std::size_t bytes = 0;
   for (const auto& [name, outcome] : images) {
     if (is_fault(outcome)) continue;
-    check_labels(std::get<ImageLabels>(outcome));
-    bytes += std::get<ImageLabels>(outcome).original.size();
+    check_labels(*outcome);
+    bytes += outcome->original.size();
   }
   if (bytes > input_size) std::abort();
 }
@@ -161,7 +161,7 @@ void read_cdf_input(std::span<const std::uint8_t> input, const std::filesystem::
 
 void read_voc_input(std::span<const std::uint8_t> input, const std::filesystem::path&) {
   const auto labels = parse_voc_labels(text_of(input), "input");
-  if (!is_fault(labels)) check_labels(std::get<ImageLabels>(labels));
+  if (!is_fault(labels)) check_labels(*labels);
 }
 
 void read_mot_input(std::span<const std::uint8_t> input, const std::filesystem::path&) {
@@ -224,7 +224,7 @@ void read_yolo_input(std::span<const std::uint8_t> input, const std::filesystem:
   schemas.push_back(parse_yolo_yaml("names: [a]\nkpt_shape: [2, 3]", "data"));
   for (const YoloSchema& schema : schemas) {
     const auto annotation = parse_yolo_text(text, schema, {480, 640}, "input");
-    if (!is_fault(annotation)) check_annotation(std::get<Annotation>(annotation), schema.names);
+    if (!is_fault(annotation)) check_annotation(*annotation, schema.names);
   }
 }
 

@@ -159,8 +159,8 @@ Outcome<std::array<PreparedFrame, 2>> PairReader::still(const FramePair& pair,
       return prepare_still({image.size, image.bgr.data()}, pair, spec_);
     }
     const Outcome<ColourFrame> image = stills_.decode(pair.next, stride);
-    if (is_fault(image)) return std::get<SampleFault>(image);
-    const ColourFrame& colour = std::get<ColourFrame>(image);
+    if (is_fault(image)) return image.fault();
+    const ColourFrame& colour = *image;
     return prepare_still({colour.size, colour.bgr.data()}, pair, spec_);
   } catch (const std::runtime_error& error) {
     return fault_in(pair.next, error.what());
@@ -179,18 +179,18 @@ Outcome<PreparedPair> PairReader::read(const FramePair& pair, ImageOrientation o
                                        std::int64_t still_stride) const {
   if (pair.motion) {
     const auto outcome = still(pair, orientation, still_stride);
-    if (is_fault(outcome)) return std::get<SampleFault>(outcome);
-    const auto& [previous, next] = std::get<0>(outcome);
+    if (is_fault(outcome)) return outcome.fault();
+    const auto& [previous, next] = *outcome;
     return prepare_pair(previous, next);
   }
   const auto outcome = frames(pair, orientation);
-  if (is_fault(outcome)) return std::get<SampleFault>(outcome);
-  const auto& [previous, next] = std::get<0>(outcome);
+  if (is_fault(outcome)) return outcome.fault();
+  const auto& [previous, next] = *outcome;
   for (const auto& [frame, ref] : {std::pair{&previous, &pair.previous}, {&next, &pair.next}}) {
-    if (is_fault(**frame)) return fault_in(*ref, std::get<SampleFault>(**frame).reason);
+    if (is_fault(**frame)) return fault_in(*ref, (*frame)->fault().reason);
   }
-  const auto& before = std::get<PreparedFrame>(*previous);
-  const auto& after = std::get<PreparedFrame>(*next);
+  const auto& before = **previous;
+  const auto& after = **next;
   if (before.placement.source != after.placement.source) {
     return SampleFault{"expected two frames of one size, got " +
                        to_string(before.placement.source) + " in " + pair.previous.path + " and " +

@@ -103,8 +103,8 @@ class CsvLabels {
 
   void read_header(const CsvRecord& header) {
     const auto places = csv_columns(header, kColumns, kCategory);
-    if (is_fault(places)) return add_fault(std::get<SampleFault>(places).reason);
-    places_ = std::get<0>(places);
+    if (is_fault(places)) return add_fault(places.fault().reason);
+    places_ = *places;
     columns_ = header.fields.size();
   }
 

@@ -180,8 +180,8 @@ Outcome<Annotation> parse_kitti_label(std::string text, const std::string& path)
     const auto columns = split_columns(line.bytes);
     if (columns.empty()) continue;
     auto box = parse_kitti_object(columns, KittiColumns::kObject, place_in_file(path, line.number));
-    if (is_fault(box)) return std::get<SampleFault>(box);
-    annotation.boxes.push_back(std::get<Box>(box));
+    if (is_fault(box)) return box.fault();
+    annotation.boxes.push_back(*box);
   }
   annotation.original = std::move(text);
   return annotation;

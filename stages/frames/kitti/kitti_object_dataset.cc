@@ -141,14 +141,12 @@ class KittiObjectDataset : public Dataset {
 
   Outcome<Annotation> annotation(const std::string& label_key) const override {
     auto text = root_.read(label_key);
-    if (auto* fault = std::get_if<SampleFault>(&text)) return *fault;
-    auto annotation =
-        parse_kitti_label(std::get<std::string>(std::move(text)), label_place(label_key));
+    if (is_fault(text)) return text.fault();
+    auto annotation = parse_kitti_label(*std::move(text), label_place(label_key));
     const std::string calibration = calibration_of(label_key);
     if (is_fault(annotation) || !root_.has_file(calibration)) return annotation;
     try {
-      std::get<Annotation>(annotation).projection =
-          CalibrationFile(root_, calibration).read<12>("P2");
+      annotation->projection = CalibrationFile(root_, calibration).read<12>("P2");
     } catch (const InputError& error) {
       return SampleFault{error.what()};
     }

@@ -84,8 +84,8 @@ class KittiRawDataset : public Dataset {
     if (drive.calibration != nullptr) annotation.projection = drive.calibration->projection;
     if (!drive.tracklets) return annotation;
     auto outcome = drive.tracklets->frame(number);
-    if (auto* fault = std::get_if<SampleFault>(&outcome)) return std::move(*fault);
-    auto& frame = std::get<TrackletFrame>(outcome);
+    if (is_fault(outcome)) return outcome.fault();
+    auto& frame = *outcome;
     annotation.original = std::move(frame.json);
     if (drive.calibration == nullptr) return annotation;
     for (const TrackletPose& pose : frame.poses) {
@@ -132,10 +132,10 @@ class KittiRawDataset : public Dataset {
     if (root_.has_file(labels)) {
       annotation_files_.push_back(root_.written(labels));
       auto xml = root_.read(labels);
-      if (auto* fault = std::get_if<SampleFault>(&xml)) {
-        drive.unreadable = std::move(*fault);
+      if (is_fault(xml)) {
+        drive.unreadable = xml.fault();
       } else {
-        drive.tracklets.emplace(std::get<std::string>(xml), root_.written(labels));
+        drive.tracklets.emplace(*xml, root_.written(labels));
         note_labels_beyond_images(drive, root_.written(labels));
       }
     }

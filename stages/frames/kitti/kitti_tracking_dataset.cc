@@ -51,14 +51,14 @@ Outcome<Annotation> TrackingLabels::annotation(std::int64_t frame) const {
     const auto columns = split_columns(bytes);
     const std::string where = place_in_file(path_, line.number);
     auto box = parse_kitti_object(columns, KittiColumns::kTracking, where);
-    if (is_fault(box)) return std::get<SampleFault>(box);
+    if (is_fault(box)) return box.fault();
     const auto track = parse_number<std::int64_t>(columns[1]);
     if (!track) {
       return SampleFault{"expected a whole number for track id, got " + in_quotes(columns[1]) +
                          ", in " + where};
     }
-    std::get<Box>(box).track_id = *track;
-    annotation.boxes.push_back(std::get<Box>(box));
+    box->track_id = *track;
+    annotation.boxes.push_back(*box);
     annotation.original += bytes;
   }
   return annotation;
@@ -123,9 +123,7 @@ class KittiTrackingDataset : public Dataset {
                          ", in " + root_.written("")};
     }
     auto annotation = sequence->second.labels.annotation(*frame);
-    if (auto* found = std::get_if<Annotation>(&annotation)) {
-      found->projection = sequence->second.projection;
-    }
+    if (!is_fault(annotation)) annotation->projection = sequence->second.projection;
     return annotation;
   }
 
@@ -136,8 +134,8 @@ class KittiTrackingDataset : public Dataset {
  private:
   TrackingLabels read_labels(const std::string& label) const {
     auto text = root_.read(label);
-    if (auto* fault = std::get_if<SampleFault>(&text)) return TrackingLabels(std::move(*fault));
-    return {std::get<std::string>(std::move(text)), root_.written(label)};
+    if (is_fault(text)) return TrackingLabels(text.fault());
+    return {*std::move(text), root_.written(label)};
   }
 
   std::optional<std::array<double, 12>> read_projection(const std::string& file) {

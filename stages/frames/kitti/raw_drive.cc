@@ -109,13 +109,12 @@ RawDrive::RawDrive(const SourceRoot& root, const std::string& folder)
   timestamps_path_ = root.written(timestamps);
   const auto text = root.read(timestamps);
   Outcome<std::vector<double>> times =
-      is_fault(text) ? std::get<SampleFault>(text)
-                     : parse_timestamps(std::get<std::string>(text), timestamps_path_);
-  if (const auto* fault = std::get_if<SampleFault>(&times)) {
-    fault_ = fault->reason;
+      is_fault(text) ? text.fault() : parse_timestamps(*text, timestamps_path_);
+  if (is_fault(times)) {
+    fault_ = times.fault().reason;
     return;
   }
-  times_s_ = std::get<std::vector<double>>(std::move(times));
+  times_s_ = *std::move(times);
   const std::int64_t last = images_.frames().back().first;
   if (last < std::ssize(times_s_)) return;
   fault_ = "expected a line for each frame up to " + std::to_string(last) + ", got " +

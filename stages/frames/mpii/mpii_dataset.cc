@@ -49,10 +49,11 @@ class MpiiDataset final : public Dataset {
       const MpiiEntry& read = entry->second;
       const auto scale =
           frames_.label_scale(read.image, frames_.labelled(read.image, read.keyframe).frame.path);
-      if (auto* fault = std::get_if<SampleFault>(&scale)) {
-        return SampleFault{fault->reason + " (sample " + without_extension(read.image) + ")"};
+      if (is_fault(scale)) {
+        return SampleFault{scale.fault().reason + " (sample " + without_extension(read.image) +
+                           ")"};
       }
-      scale_labels(std::get<LabelScale>(scale), annotation.persons);
+      scale_labels(*scale, annotation.persons);
       return annotation;
     } catch (const std::invalid_argument& error) {
       return SampleFault{std::string(error.what()) + ", in " + label_place(label_key) +

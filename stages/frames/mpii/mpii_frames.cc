@@ -203,11 +203,11 @@ Outcome<LabelScale> MpiiFrames::label_scale(const std::string& image,
   const auto entry = images_.find(image);
   if (entry == images_.end() || entry->second == frame) return LabelScale{};
   const Outcome<ImageSize> annotated = size_of(base_, entry->second);
-  if (is_fault(annotated)) return std::get<SampleFault>(annotated);
+  if (is_fault(annotated)) return annotated.fault();
   const Outcome<ImageSize> stored = size_of(base_, frame);
   if (is_fault(stored)) return LabelScale{};
-  const auto& from = std::get<ImageSize>(annotated);
-  const auto& to = std::get<ImageSize>(stored);
+  const auto& from = *annotated;
+  const auto& to = *stored;
   if (!have_one_shape(from, to)) {
     return SampleFault{"expected a frame of the shape of " + entry->second + ", " +
                        to_string(from) + ", where it was annotated, got " + to_string(to) +

@@ -266,8 +266,8 @@ class MpiiListDataset final : public Dataset {
     }
     Annotation annotation{rows->second.json, {}, {}};
     const auto scale = frames_.label_scale(label_key, rows->second.frame);
-    if (auto* fault = std::get_if<SampleFault>(&scale)) {
-      return SampleFault{fault->reason + " (sample " + without_extension(label_key) + ")"};
+    if (is_fault(scale)) {
+      return SampleFault{scale.fault().reason + " (sample " + without_extension(label_key) + ")"};
     }
     try {
       for (const Json& row : Json::parse(rows->second.json)) {
@@ -278,7 +278,7 @@ class MpiiListDataset final : public Dataset {
                          std::to_string(annotation.persons.size()) + ", in " +
                          label_place(label_key) + " (sample " + without_extension(label_key) + ")"};
     }
-    scale_labels(std::get<LabelScale>(scale), annotation.persons);
+    scale_labels(*scale, annotation.persons);
     return annotation;
   }
 

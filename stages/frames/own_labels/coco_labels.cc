@@ -35,15 +35,14 @@ class CocoLabels : public OwnLabels {
     };
     std::string text = read(image.entry);
     Outcome<ImageSize> size = image_size(label_key, read_coco_image(text, image.id, written_));
-    if (auto* fault = std::get_if<SampleFault>(&size)) return std::move(*fault);
+    if (is_fault(size)) return size.fault();
     Annotation annotation;
     annotation.original = "{\"image\": " + text + ", \"annotations\": [";
     const CocoIndex::Image* const next = &image + 1;
     for (std::size_t i = image.first_annotation; i < next->first_annotation; ++i) {
       text = read(index_.annotations[i]);
       annotation.original += (i > image.first_annotation ? ", " : "") + text;
-      add_coco_annotation(text, image.id, std::get<ImageSize>(size), index_, schema_, written_,
-                          annotation);
+      add_coco_annotation(text, image.id, *size, index_, schema_, written_, annotation);
     }
     annotation.original += "]}";
     return annotation;

@@ -100,10 +100,9 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
   }
   const auto columns = csv_columns(*header, kColumns, kTrack);
   if (is_fault(columns)) {
-    throw InputError(std::get<SampleFault>(columns).reason + ", in " +
-                     place_in_file(path, header->line));
+    throw InputError(columns.fault().reason + ", in " + place_in_file(path, header->line));
   }
-  const auto& places = std::get<0>(columns);
+  const auto& places = *columns;
   std::map<std::string, Outcome<ImageRows>> images;
   while (const std::optional<CsvRecord> record = next()) {
     const std::string place = place_in_file(path, record->line);
@@ -121,7 +120,7 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
     }
     Outcome<ImageRows>& image = images[std::string(row[kImage])];
     if (is_fault(image)) continue;
-    auto& rows = std::get<ImageRows>(image);
+    auto& rows = *image;
     rows.labels().original.append(record->bytes);
     try {
       rows.add(row);
@@ -132,9 +131,9 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
   std::map<std::string, Outcome<ImageLabels>> labels;
   for (auto& [name, rows] : images) {
     if (is_fault(rows)) {
-      labels.emplace(name, std::get<SampleFault>(rows));
+      labels.emplace(name, rows.fault());
     } else {
-      labels.emplace(name, std::move(std::get<ImageRows>(rows).labels()));
+      labels.emplace(name, std::move(rows->labels()));
     }
   }
   return labels;

@@ -32,11 +32,11 @@ Outcome<Annotation> ReadLabels::annotation(const std::string& label_key) const {
   if (found == by_key_.end()) {
     return SampleFault{"expected a label, got none, in " + label_place(label_key)};
   }
-  if (const auto* fault = std::get_if<SampleFault>(&found->second)) return *fault;
-  const ImageLabels& labels = std::get<ImageLabels>(found->second);
+  if (is_fault(found->second)) return found->second.fault();
+  const ImageLabels& labels = *found->second;
   Outcome<ImageSize> size = image_size(label_key, labels.size);
-  if (auto* fault = std::get_if<SampleFault>(&size)) return std::move(*fault);
-  return numbered(labels, schema_.class_names, std::get<ImageSize>(size), label_place(label_key));
+  if (is_fault(size)) return size.fault();
+  return numbered(labels, schema_.class_names, *size, label_place(label_key));
 }
 
 bool overlaps(const Rectangle& box, ImageSize image) {

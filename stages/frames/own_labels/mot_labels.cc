@@ -171,7 +171,7 @@ std::map<std::int64_t, Outcome<ImageLabels>> parse_mot_labels(std::string_view t
         throw BadLabel("expected each id once in a frame, got " + std::to_string(box.box.track_id) +
                        " twice");
       }
-      auto& labels = std::get<ImageLabels>(outcome);
+      auto& labels = *outcome;
       labels.original.append(line->bytes);
       labels.boxes.push_back(std::move(box));
     } catch (const BadLabel& bad) {
@@ -294,7 +294,7 @@ class MotLabels : public ReadLabels {
     for (auto& [number, labels] : by_number) {
       const std::string key = file + "#" + std::to_string(number);
       classes_.add(labels);
-      if (info && !is_fault(labels)) std::get<ImageLabels>(labels).size = info->size;
+      if (info && !is_fault(labels)) labels->size = info->size;
       by_key_.emplace(key, std::move(labels));
       const auto frame = frames.find(from_0 ? number - 1 : number);
       if (frame != frames.end()) {

@@ -59,10 +59,10 @@ Outcome<ImageSize> OwnLabels::image_size(const std::string& label_key,
   Outcome<ImageSize> size =
       frame.size ? Outcome<ImageSize>(*frame.size) : image_sizes_->of(file, kUpright);
   if (is_fault(size)) size = probe_image_size(file, kUpright);  // it may have been mended since
-  if (is_fault(size) || !claimed || std::get<ImageSize>(size) == *claimed) return size;
+  if (is_fault(size) || !claimed || *size == *claimed) return size;
   return SampleFault{"expected an image of " + to_string(*claimed) + ", as " +
-                     label_place(label_key) + " says, got " + to_string(std::get<ImageSize>(size)) +
-                     ", in " + source_.root.written(frame.name)};
+                     label_place(label_key) + " says, got " + to_string(*size) + ", in " +
+                     source_.root.written(frame.name)};
 }
 
 const LabelReader& label_reader(LabelFormat format) {

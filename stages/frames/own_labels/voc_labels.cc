@@ -157,19 +157,18 @@ class VocLabels : public FilePerImage {
 
   Outcome<Annotation> annotation(const std::string& label_key) const override {
     Outcome<ImageLabels> labels = read(label_key);
-    if (auto* fault = std::get_if<SampleFault>(&labels)) return std::move(*fault);
-    auto& read = std::get<ImageLabels>(labels);
+    if (is_fault(labels)) return labels.fault();
+    auto& read = *labels;
     Outcome<ImageSize> size = image_size(label_key, read.size);
-    if (auto* fault = std::get_if<SampleFault>(&size)) return std::move(*fault);
-    return numbered(std::move(read), schema_.class_names, std::get<ImageSize>(size),
-                    label_place(label_key));
+    if (is_fault(size)) return size.fault();
+    return numbered(std::move(read), schema_.class_names, *size, label_place(label_key));
   }
 
  private:
   Outcome<ImageLabels> read(const std::string& label_key) const {
     Outcome<std::string> text = root().read(label_key);
-    if (auto* fault = std::get_if<SampleFault>(&text)) return std::move(*fault);
-    return parse_voc_labels(std::get<std::string>(std::move(text)), label_place(label_key));
+    if (is_fault(text)) return text.fault();
+    return parse_voc_labels(*std::move(text), label_place(label_key));
   }
 };
 

@@ -24,11 +24,10 @@ class YoloLabels : public FilePerImage {
 
   Outcome<Annotation> annotation(const std::string& label_key) const override {
     Outcome<std::string> text = root().read(label_key);
-    if (auto* fault = std::get_if<SampleFault>(&text)) return std::move(*fault);
+    if (is_fault(text)) return text.fault();
     Outcome<ImageSize> size = image_size(label_key);
-    if (auto* fault = std::get_if<SampleFault>(&size)) return std::move(*fault);
-    return parse_yolo_text(std::get<std::string>(std::move(text)), classes_,
-                           std::get<ImageSize>(size), label_place(label_key));
+    if (is_fault(size)) return size.fault();
+    return parse_yolo_text(*std::move(text), classes_, *size, label_place(label_key));
   }
 
  private:

@@ -89,8 +89,8 @@ class ImagesDataset final : public Dataset {
     if (labels_) return labels_->annotation(label_key);
     if (lower_extension(label_key) != ".json") return Annotation{};
     Outcome<std::string> text = root_.read(label_key);
-    if (auto* fault = std::get_if<SampleFault>(&text)) return std::move(*fault);
-    Annotation annotation{std::get<std::string>(std::move(text)), {}, {}};
+    if (is_fault(text)) return text.fault();
+    Annotation annotation{*std::move(text), {}, {}};
     try {
       parse_json_data(annotation.original, label_place(label_key));
     } catch (const std::runtime_error& error) {

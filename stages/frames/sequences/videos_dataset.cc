@@ -231,8 +231,8 @@ class VideosDataset final : public Dataset {
     for (const auto& [stem, clip] : clips_) {
       const Outcome<ImageSize> size =
           probe_image_size(base / clip.path, ImageOrientation::kUpright);
-      if (const auto* fault = std::get_if<SampleFault>(&size)) throw InputError(fault->reason);
-      sizes[stem] = std::get<ImageSize>(size);
+      if (is_fault(size)) throw InputError(size.fault().reason);
+      sizes[stem] = *size;
     }
     for (const LabelledFrame& frame : frames) {
       source.frames.push_back({frame.sequence + "/" + std::to_string(frame.frame.index),

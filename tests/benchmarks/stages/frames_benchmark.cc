@@ -145,7 +145,7 @@ void read_pairs(benchmark::State& state, const Drive& drive) {
       const auto outcome = sharing
                                ? shared.read(drive.pair(next))
                                : PairReader(drive.folder(), kitti_spec()).read(drive.pair(next));
-      if (is_fault(outcome)) throw std::runtime_error(std::get<SampleFault>(outcome).reason);
+      if (is_fault(outcome)) throw std::runtime_error(outcome.fault().reason);
     }
   }
   state.SetItemsProcessed((kFrames - 1) * state.iterations());

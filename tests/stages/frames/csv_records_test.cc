@@ -78,12 +78,11 @@ TEST(CsvColumns, AreFoundByTheirNames) {
   const auto places = [&](const char* header) {
     return csv_columns(records_of(header).at(0), kTableColumns, 2);
   };
-  EXPECT_THAT(std::get<0>(places("z,x,y")), ElementsAre(1, 2, 0));
-  EXPECT_THAT(std::get<0>(places("y, x")), ElementsAre(1, 0, std::nullopt));
-  EXPECT_EQ(std::get<SampleFault>(places("x,z")).reason, "expected a column y, got none");
-  EXPECT_EQ(std::get<SampleFault>(places("x,y,x")).reason,
-            "expected columns x, y, z, each once, got \"x\"");
-  EXPECT_EQ(std::get<SampleFault>(places("x,y,w\t1")).reason,
+  EXPECT_THAT(*places("z,x,y"), ElementsAre(1, 2, 0));
+  EXPECT_THAT(*places("y, x"), ElementsAre(1, 0, std::nullopt));
+  EXPECT_EQ(places("x,z").fault().reason, "expected a column y, got none");
+  EXPECT_EQ(places("x,y,x").fault().reason, "expected columns x, y, z, each once, got \"x\"");
+  EXPECT_EQ(places("x,y,w\t1").fault().reason,
             "expected columns x, y, z, each once, got \"w\\t1\"");
 }
 

@@ -201,12 +201,12 @@ TEST_F(ImagesDatasetTest, PassesSidecarsThroughByteForByte) {
   const auto annotation = [&](int i) {
     return dataset->annotation(dataset->labelled_frames()[i].label_key);
   };
-  const auto first = std::get<Annotation>(annotation(0));
+  const auto first = *annotation(0);
   EXPECT_EQ(first.original, label);
   EXPECT_TRUE(first.boxes.empty() && first.persons.empty());
   ASSERT_TRUE(is_fault(annotation(1)));
-  EXPECT_THAT(std::get<SampleFault>(annotation(1)).reason, HasSubstr("clip/a/2.json"));
-  EXPECT_EQ(std::get<Annotation>(annotation(2)).original, "");
+  EXPECT_THAT(annotation(1).fault().reason, HasSubstr("clip/a/2.json"));
+  EXPECT_EQ(annotation(2)->original, "");
 
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("clip/a/1.json", "clip/a/2.json"));
   EXPECT_EQ(dataset->label_place(dataset->labelled_frames()[0].label_key), "clip/a/1.json");
@@ -221,7 +221,7 @@ TEST_F(ImagesDatasetTest, ASidecarsExtensionMayBeInCapitals) {
   touch({"1.png", "unrelated.json"});
   testing::write_file(folder_ / "clip/1.JSON", "[7]");
   const auto dataset = open();
-  EXPECT_EQ(std::get<Annotation>(dataset->annotation(dataset->labelled_frames()[0].label_key)),
+  EXPECT_EQ(*dataset->annotation(dataset->labelled_frames()[0].label_key),
             (Annotation{"[7]", {}, {}}));
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("clip/1.JSON"));
 }
@@ -232,7 +232,7 @@ TEST_F(ImagesDatasetTest, ALabelThatIsNoSoundJsonFileIsAFault) {
   const auto reason = [&] {
     const auto dataset = open();
     const auto annotation = dataset->annotation(dataset->labelled_frames()[0].label_key);
-    return is_fault(annotation) ? std::get<SampleFault>(annotation).reason : "none";
+    return is_fault(annotation) ? annotation.fault().reason : "none";
   };
   const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
   testing::write_file(label, deep);

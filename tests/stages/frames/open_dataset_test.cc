@@ -43,7 +43,7 @@ TEST(SourceRoot, ReadsWholeFilesByteForByte) {
   write_file(folder / "root/file", bytes);
   write_file(folder / "root/empty", "");
   const SourceRoot root("root", folder.path());
-  EXPECT_EQ(std::get<std::string>(root.read("file")), bytes);
+  EXPECT_EQ(*root.read("file"), bytes);
   EXPECT_EQ(root.read_or_throw("empty"), "");
 }
 
@@ -51,9 +51,9 @@ TEST(SourceRoot, AFileThatCannotBeReadIsNamedWithTheReason) {
   const TemporaryFolder folder;
   write_file(folder / "root/sub/file", "");
   const SourceRoot root("root", folder.path());
-  EXPECT_EQ(std::get<SampleFault>(root.read("none")).reason,
+  EXPECT_EQ(root.read("none").fault().reason,
             "expected a readable file, got 'No such file or directory', in root/none");
-  EXPECT_THAT(std::get<SampleFault>(root.read("sub")).reason, HasSubstr("Is a directory"));
+  EXPECT_THAT(root.read("sub").fault().reason, HasSubstr("Is a directory"));
   EXPECT_THROW(root.read_or_throw("none"), InputError);
 }
 
@@ -96,7 +96,7 @@ TEST(SourceRoot, WhatCannotBeReadIsThereAllTheSame) {
                                      std::pair("loop", "Too many levels of symbolic links"),
                                      std::pair("dangling", "No such file or directory")}) {
     EXPECT_TRUE(root.has_file(name)) << name;
-    EXPECT_EQ(std::get<SampleFault>(root.read(name)).reason,
+    EXPECT_EQ(root.read(name).fault().reason,
               "expected a readable file, got '" + std::string(reason) + "', in root/" + name);
   }
 }

@@ -234,7 +234,7 @@ TEST_F(VideoDatasetTest, EveryFrameIsASample) {
   EXPECT_EQ(dataset->paired_frame(frame, 2).state, State::kBeyond);
   EXPECT_EQ(dataset->paired_frame(frame, -5).frame, (FrameRef{"v/clip.avi", 0, 0}));
   EXPECT_EQ(dataset->paired_frame(frame, -6).state, State::kBeyond);
-  EXPECT_EQ(std::get<Annotation>(dataset->annotation(frame.label_key)), Annotation{});
+  EXPECT_EQ(*dataset->annotation(frame.label_key), Annotation{});
   EXPECT_THAT(dataset->annotation_files(), IsEmpty());
 }
 
@@ -278,9 +278,8 @@ TEST_F(VideoDatasetTest, PassesLabelsThrough) {
   testing::write_file(folder_ / "v/clip.json", R"({"2": {"k": [1, 2]}, "7": 1, "9": 2})");
   const auto dataset = open();
   const auto& frames = dataset->labelled_frames();
-  EXPECT_EQ(std::get<Annotation>(dataset->annotation(frames[2].label_key)).original,
-            R"({"k":[1,2]})");
-  EXPECT_EQ(std::get<Annotation>(dataset->annotation(frames[3].label_key)).original, "");
+  EXPECT_EQ(dataset->annotation(frames[2].label_key)->original, R"({"k":[1,2]})");
+  EXPECT_EQ(dataset->annotation(frames[3].label_key)->original, "");
   EXPECT_TRUE(is_fault(dataset->annotation("clip/4")));
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("v/clip.json"));
   EXPECT_EQ(dataset->label_place(frames[2].label_key), "v/clip.json#2");
@@ -292,7 +291,7 @@ TEST_F(VideoDatasetTest, PassesLabelsThrough) {
 TEST_F(VideoDatasetTest, ALabelFilesExtensionMayBeInCapitals) {
   testing::write_file(folder_ / "v/clip.JSON", R"({"2": "two"})");
   EXPECT_THAT(open()->annotation_files(), ElementsAre("v/clip.JSON"));
-  EXPECT_EQ(std::get<Annotation>(open()->annotation("clip/2")).original, "\"two\"");
+  EXPECT_EQ(open()->annotation("clip/2")->original, "\"two\"");
   testing::write_file(folder_ / "v/clip.json", "{}");
   EXPECT_THAT(open()->annotation_files(), ElementsAre("v/clip.JSON"));
   EXPECT_THAT(open()->notes(),
@@ -335,9 +334,9 @@ TEST_F(VideoFolderTest, EachVideoIsASequence) {
   EXPECT_EQ(dataset->paired_frame(frames[3], 6).frame, (FrameRef{"v/clip.avi", 6, 6}));
   EXPECT_DOUBLE_EQ(frames[4].frame.time_s, 1.0 / 20);  // each at its own rate
   EXPECT_DOUBLE_EQ(frames[1].frame.time_s, 1.0 / 25);
-  EXPECT_EQ(std::get<Annotation>(dataset->annotation(frames[1].label_key)).original, "\"one\"");
-  EXPECT_EQ(std::get<Annotation>(dataset->annotation(frames[4].label_key)).original, "\"another\"");
-  EXPECT_EQ(std::get<Annotation>(dataset->annotation(frames[0].label_key)).original, "");
+  EXPECT_EQ(dataset->annotation(frames[1].label_key)->original, "\"one\"");
+  EXPECT_EQ(dataset->annotation(frames[4].label_key)->original, "\"another\"");
+  EXPECT_EQ(dataset->annotation(frames[0].label_key)->original, "");
   EXPECT_EQ(dataset->label_place(frames[4].label_key), "v/clip.json#1");
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("v/b.json", "v/clip.json"));
   EXPECT_THAT(dataset->notes(), IsEmpty());

@@ -37,16 +37,16 @@ Person person(std::vector<Joint> joints) {
 VolumeLabels mapped(const Annotation& annotation, const Placement& placement) {
   const Outcome<VolumeLabels> labels = map_labels(annotation, placement, "a.txt");
   if (is_fault(labels)) {
-    ADD_FAILURE() << std::get<SampleFault>(labels).reason;
+    ADD_FAILURE() << labels.fault().reason;
     return {};
   }
-  return std::get<VolumeLabels>(labels);
+  return *labels;
 }
 
 /// The reason of the fault; empty if there is none.
 std::string fault(const Annotation& annotation) {
   const Outcome<VolumeLabels> labels = map_labels(annotation, kHalf, "label_2/001497.txt");
-  return is_fault(labels) ? std::get<SampleFault>(labels).reason : "";
+  return is_fault(labels) ? labels.fault().reason : "";
 }
 
 std::string fault(const Box& one) { return fault(Annotation{"", {one}, {}}); }
@@ -234,7 +234,7 @@ TEST(MapLabels, NumbersOfAPersonMustBeFinite) {
 TEST(MapLabels, PlacesLieWithinAMillionPixels) {
   const auto reason = [&](const Annotation& annotation) -> std::string {
     const auto labels = map_labels(annotation, {{100, 100}, {400, 400}, {400, 400}, 0, 0}, "a.txt");
-    return is_fault(labels) ? std::get<SampleFault>(labels).reason : "";
+    return is_fault(labels) ? labels.fault().reason : "";
   };
   EXPECT_EQ(reason({"", {box(1, 2, 3, 4), box(10, 10, 1e300, 20)}, {}}),
             "expected edges within 1e6 pixels, got left 10, top 10, right 1e+300, bottom 20, in "

@@ -44,7 +44,7 @@ class ClassList {
  public:
   void add(const Outcome<ImageLabels>& labels) {
     if (is_fault(labels)) return;
-    for (const NamedBox& box : std::get<ImageLabels>(labels).boxes) names_.insert(box.class_name);
+    for (const NamedBox& box : labels->boxes) names_.insert(box.class_name);
   }
   std::vector<std::string> names() const { return {names_.begin(), names_.end()}; }
 

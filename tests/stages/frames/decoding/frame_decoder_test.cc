@@ -34,13 +34,11 @@ TEST(ImageSizeProbe, ImagesAndVideos) {
   const TemporaryFolder folder;
   for (const std::string name : {"a.png", "b.jpg", "c.bmp"}) {
     cv::imwrite((folder / name).string(), gradient_image({31, 57}));
-    EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / name, ImageOrientation::kStored)),
-              (ImageSize{31, 57}))
+    EXPECT_EQ(*probe_image_size(folder / name, ImageOrientation::kStored), (ImageSize{31, 57}))
         << name;
   }
   testing::write_counting_video(folder / "clip.avi", 3);
-  EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / "clip.avi", ImageOrientation::kStored)),
-            (ImageSize{48, 64}));
+  EXPECT_EQ(*probe_image_size(folder / "clip.avi", ImageOrientation::kStored), (ImageSize{48, 64}));
 }
 
 TEST(ImageSizeProbe, ReadsOnlyTheHeader) {
@@ -49,8 +47,7 @@ TEST(ImageSizeProbe, ReadsOnlyTheHeader) {
     cv::imwrite((folder / name).string(), gradient_image({120, 160}));
     const auto size = std::filesystem::file_size(folder / name);
     std::filesystem::resize_file(folder / name, size * 3 / 4);
-    EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / name, ImageOrientation::kStored)),
-              (ImageSize{120, 160}))
+    EXPECT_EQ(*probe_image_size(folder / name, ImageOrientation::kStored), (ImageSize{120, 160}))
         << name;
   }
 }
@@ -63,9 +60,8 @@ TEST(ImageSizeProbe, FaultsNameTheFile) {
   for (const std::string name : {"empty.png", "words.txt", "zeros.mp4", "none.jpg"}) {
     const auto outcome = probe_image_size(folder / name, ImageOrientation::kStored);
     ASSERT_TRUE(is_fault(outcome)) << name;
-    EXPECT_THAT(std::get<SampleFault>(outcome).reason, StartsWith("expected a"));
-    EXPECT_THAT(std::get<SampleFault>(outcome).reason,
-                EndsWith(", in " + (folder / name).string()));
+    EXPECT_THAT(outcome.fault().reason, StartsWith("expected a"));
+    EXPECT_THAT(outcome.fault().reason, EndsWith(", in " + (folder / name).string()));
   }
 }
 
@@ -76,7 +72,7 @@ FrameRef image_ref(const std::string& path) {
 }
 
 std::string fault(const Outcome<ColourFrame>& outcome) {
-  return is_fault(outcome) ? std::get<SampleFault>(outcome).reason : "no fault";
+  return is_fault(outcome) ? outcome.fault().reason : "no fault";
 }
 
 TEST(FrameDecoder, DecodesEveryFormatBelowItsBase) {
@@ -86,7 +82,7 @@ TEST(FrameDecoder, DecodesEveryFormatBelowItsBase) {
     ASSERT_TRUE(cv::imwrite((folder / name).string(), gradient_image({12, 20})));
     const auto outcome = decoder.decode(image_ref(name));
     ASSERT_EQ(fault(outcome), "no fault");
-    EXPECT_TRUE(same_pixels(std::get<ColourFrame>(outcome), opencv_read(folder / name))) << name;
+    EXPECT_TRUE(same_pixels(*outcome, opencv_read(folder / name))) << name;
   }
 }
 
@@ -96,18 +92,15 @@ TEST(FrameDecoder, TurnsImagesWhereItIsAskedTo) {
   const auto file = folder / "a.jpg";
   cv::imwrite(file.string(), gradient_image({12, 20}));
   write_file(file, testing::with_orientation(testing::read_file(file), 8));
-  EXPECT_EQ(std::get<ImageSize>(probe_image_size(file, ImageOrientation::kStored)),
-            (ImageSize{12, 20}));
-  EXPECT_EQ(std::get<ImageSize>(probe_image_size(file, ImageOrientation::kUpright)),
-            (ImageSize{20, 12}));
-  EXPECT_TRUE(
-      same_pixels(std::get<ColourFrame>(decoder.decode(image_ref("a.jpg"))), opencv_read(file)));
+  EXPECT_EQ(*probe_image_size(file, ImageOrientation::kStored), (ImageSize{12, 20}));
+  EXPECT_EQ(*probe_image_size(file, ImageOrientation::kUpright), (ImageSize{20, 12}));
+  EXPECT_TRUE(same_pixels(*decoder.decode(image_ref("a.jpg")), opencv_read(file)));
   const auto upright = decoder.decode(image_ref("a.jpg"), 1, ImageOrientation::kUpright);
-  EXPECT_TRUE(same_pixels(std::get<ColourFrame>(upright), cv::imread(file.string())));
+  EXPECT_TRUE(same_pixels(*upright, cv::imread(file.string())));
   write_file(file, testing::with_orientation(testing::read_file(file), 5));
   EXPECT_EQ(fault(decoder.decode(image_ref("a.jpg"), 1, ImageOrientation::kUpright)),
             "expected an image that is not mirrored, got EXIF orientation 5, in a.jpg");
-  EXPECT_EQ(std::get<SampleFault>(probe_image_size(file, ImageOrientation::kUpright)).reason,
+  EXPECT_EQ(probe_image_size(file, ImageOrientation::kUpright).fault().reason,
             "expected an image that is not mirrored, got EXIF orientation 5, in " + file.string());
   EXPECT_EQ(orientation_of(DatasetKind::kFrames), ImageOrientation::kUpright);
   EXPECT_EQ(orientation_of(DatasetKind::kMpii), ImageOrientation::kStored);
@@ -153,7 +146,7 @@ TEST(FrameDecoder, VideoFramesAreFoundByCountingInAnyOrder) {
   for (const int position : {0, 5, 3, 80, 75, 0, 99}) {
     const auto outcome = decoder.decode(testing::video_ref("clip.avi", position));
     ASSERT_EQ(fault(outcome), "no fault");
-    EXPECT_EQ(testing::counted(std::get<ColourFrame>(outcome)), position);
+    EXPECT_EQ(testing::counted(*outcome), position);
   }
 }
 
@@ -167,7 +160,7 @@ TEST(FrameDecoder, KeepsAsManyFramesAsToldAndOpensAnewForEarlierOnes) {
   for (const int position : {30, 99, 31}) {  // the latest 70 are 30..99
     const auto outcome = decoder.decode(testing::video_ref("clip.avi", position));
     ASSERT_EQ(fault(outcome), "no fault");
-    EXPECT_EQ(testing::counted(std::get<ColourFrame>(outcome)), position);
+    EXPECT_EQ(testing::counted(*outcome), position);
   }
   EXPECT_EQ(fault(decoder.decode(testing::video_ref("clip.avi", 29))),
             "expected a readable file, got 'No such file or directory', in clip.avi");
@@ -182,7 +175,7 @@ TEST(FrameDecoder, SeveralVideosByTurns) {
     for (const auto& name : names) {
       const auto outcome = decoder.decode(testing::video_ref(name, position));
       ASSERT_EQ(fault(outcome), "no fault");
-      EXPECT_EQ(testing::counted(std::get<ColourFrame>(outcome)), position) << name;
+      EXPECT_EQ(testing::counted(*outcome), position) << name;
     }
   }
 }
@@ -197,8 +190,7 @@ TEST(FrameDecoder, SeveralThreadsReadOneVideo) {
     threads.emplace_back([&, worker] {
       for (int position = worker; position < 40; position += 4) {
         const auto outcome = decoder.decode(testing::video_ref("clip.avi", position));
-        wrong[worker] +=
-            is_fault(outcome) || testing::counted(std::get<ColourFrame>(outcome)) != position;
+        wrong[worker] += is_fault(outcome) || testing::counted(*outcome) != position;
       }
     });
   }

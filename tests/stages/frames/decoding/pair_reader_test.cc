@@ -40,8 +40,8 @@ FramePair pair_of(const std::string& previous, const std::string& next) {
 PreparedPair read(const TemporaryFolder& folder, const cv::Mat& image, const ImageSpec& spec) {
   cv::imwrite((folder / "a.png").string(), image);
   auto outcome = PairReader(folder.path(), spec).read(pair_of("a.png", "a.png"));
-  if (is_fault(outcome)) throw std::runtime_error(std::get<SampleFault>(outcome).reason);
-  return std::get<PreparedPair>(outcome);
+  if (is_fault(outcome)) throw std::runtime_error(outcome.fault().reason);
+  return *outcome;
 }
 
 TEST(PairReader, GreyIsWeightedAndScaledToMinusOneToOne) {
@@ -50,8 +50,7 @@ TEST(PairReader, GreyIsWeightedAndScaledToMinusOneToOne) {
   cv::imwrite((folder / "b.png").string(), cv::Mat(1, 1, CV_8UC3, cv::Scalar(255, 255, 255)));
   const auto outcome = PairReader(folder.path(), {}).read(pair_of("a.png", "b.png"));
   // 0.114 * 10 + 0.587 * 200 + 0.299 * 30 = 127.51, so 128; the previous frame comes first.
-  EXPECT_THAT(std::get<PreparedPair>(outcome).input,
-              ElementsAre(FloatEq((128.0f / 255.0f - 0.5f) * 2.0f), FloatEq(1.0f)));
+  EXPECT_THAT(outcome->input, ElementsAre(FloatEq((128.0f / 255.0f - 0.5f) * 2.0f), FloatEq(1.0f)));
 }
 
 TEST(PairReader, WithoutASizeTheImageKeepsItsOwn) {
@@ -127,7 +126,7 @@ TEST(PairReader, FramesOfDifferentSizesAreAFault) {
   cv::imwrite((folder / "a.png").string(), testing::gradient_image({5, 7}));
   cv::imwrite((folder / "b.png").string(), testing::gradient_image({5, 8}));
   const auto outcome = PairReader(folder.path(), {}).read(pair_of("a.png", "b.png"));
-  EXPECT_EQ(std::get<SampleFault>(outcome).reason,
+  EXPECT_EQ(outcome.fault().reason,
             "expected two frames of one size, got 7x5 in a.png and 8x5, in b.png");
 }
 
@@ -138,7 +137,7 @@ TEST(PairReader, ABadFrameOfEitherSideIsAFault) {
   for (const auto& pair : {pair_of("none.png", "a.png"), pair_of("a.png", "none.png")}) {
     const auto outcome = reader.read(pair);
     ASSERT_TRUE(is_fault(outcome));
-    EXPECT_THAT(std::get<SampleFault>(outcome).reason, HasSubstr("in none.png"));
+    EXPECT_THAT(outcome.fault().reason, HasSubstr("in none.png"));
   }
 }
 
@@ -149,7 +148,7 @@ TEST(PairReader, ReadsPairsFromAVideo) {
   pair.previous = testing::video_ref("clip.avi", 10);
   pair.next = testing::video_ref("clip.avi", 16);
   const auto outcome = PairReader(folder.path(), {}).read(pair);
-  const auto& input = std::get<PreparedPair>(outcome).input;
+  const auto& input = outcome->input;
   EXPECT_NEAR(level(input.front()), 20, 1);  // frame i is grey of value 2 i
   EXPECT_NEAR(level(input.back()), 32, 1);
 }
@@ -167,8 +166,8 @@ TEST(PairReader, PairsUnderWayMayComeInAnyOrderAndTheVideoIsOpenedOnce) {
       pair.previous = testing::video_ref("clip.avi", next - 6);
       pair.next = testing::video_ref("clip.avi", next);
       const auto outcome = reader.read(pair);
-      ASSERT_FALSE(is_fault(outcome)) << next << ": " << std::get<SampleFault>(outcome).reason;
-      const auto& input = std::get<PreparedPair>(outcome).input;
+      ASSERT_FALSE(is_fault(outcome)) << next << ": " << outcome.fault().reason;
+      const auto& input = outcome->input;
       const std::size_t middle = input.size() / 4;  // of the previous frame
       EXPECT_NEAR(level(input[middle]), 2 * (next - 6), 1);
       EXPECT_NEAR(level(input[middle + input.size() / 2]), 2 * next, 1);
@@ -191,8 +190,8 @@ TEST(PairReader, OfAThinnedVideoTheFramesTakenAreKept) {
       pair.next = testing::video_ref("clip.avi", next);
       pair.gap_frames = 6;
       const auto outcome = reader.read(pair);
-      ASSERT_FALSE(is_fault(outcome)) << next << ": " << std::get<SampleFault>(outcome).reason;
-      const auto& input = std::get<PreparedPair>(outcome).input;
+      ASSERT_FALSE(is_fault(outcome)) << next << ": " << outcome.fault().reason;
+      const auto& input = outcome->input;
       EXPECT_NEAR(level(input[input.size() / 4]), 2 * (next - 30), 1);
       EXPECT_NEAR(level(input[input.size() / 4 * 3]), 2 * next, 1);
       // The open video outlives its name; opening it a second time fails.
@@ -212,8 +211,8 @@ TEST(PairReader, OneVideoIsReadWholeAndThinnedByTurns) {
       pair.next = testing::video_ref("clip.avi", next);
       pair.gap_frames = 2;
       const auto outcome = reader.read(pair);
-      ASSERT_FALSE(is_fault(outcome)) << next << ": " << std::get<SampleFault>(outcome).reason;
-      const auto& input = std::get<PreparedPair>(outcome).input;
+      ASSERT_FALSE(is_fault(outcome)) << next << ": " << outcome.fault().reason;
+      const auto& input = outcome->input;
       EXPECT_NEAR(level(input[input.size() / 4]), 2 * (next - 2 * stride), 1);
       EXPECT_NEAR(level(input[input.size() / 4 * 3]), 2 * next, 1);
     }
@@ -221,7 +220,7 @@ TEST(PairReader, OneVideoIsReadWholeAndThinnedByTurns) {
 }
 
 std::string reason(const Outcome<PreparedPair>& outcome) {
-  return is_fault(outcome) ? std::get<SampleFault>(outcome).reason : "no fault";
+  return is_fault(outcome) ? outcome.fault().reason : "no fault";
 }
 
 TEST(PairReader, FramesOfAVideoAndOfAFolderPair) {
@@ -231,11 +230,11 @@ TEST(PairReader, FramesOfAVideoAndOfAFolderPair) {
   const PairReader reader(folder.path(), {});
   FramePair pair = pair_of("a.png", "");
   pair.next = testing::video_ref("clip.avi", 9);
-  const std::vector<float> input = std::get<PreparedPair>(reader.read(pair)).input;
+  const std::vector<float> input = reader.read(pair)->input;
   EXPECT_EQ(level(input.front()), 77);
   EXPECT_NEAR(level(input.back()), 18, 1);
   std::swap(pair.previous, pair.next);
-  EXPECT_EQ(level(std::get<PreparedPair>(reader.read(pair)).input.back()), 77);
+  EXPECT_EQ(level(reader.read(pair)->input.back()), 77);
   pair.previous.video_frame = 20;
   EXPECT_EQ(reason(reader.read(pair)),
             "expected a frame at position 20, got a video whose frames end after 20, in clip.avi");
@@ -270,7 +269,7 @@ TEST(PairReader, InputEqualsTheReferenceBitForBit) {
   cv::imwrite((folder / "b.png").string(),
               cv::Mat(size.height, size.width, CV_8UC1, frames.data() + plane));
   const auto outcome = PairReader(folder.path(), {}).read(pair_of("a.png", "b.png"));
-  EXPECT_EQ(std::get<PreparedPair>(outcome).input, expected);
+  EXPECT_EQ(outcome->input, expected);
 }
 
 }  // namespace

@@ -78,11 +78,11 @@ TEST_F(Stills, AShiftByWholePixelsIsExact) {
     spec_.grey = order;
     // A point goes from the previous frame to the next by (4, -3). Labelled is the next: of the
     // previous one pixel (x, y) is what comes to lie at (x + 4, y - 3) of the image.
-    const auto before = std::get<PreparedPair>(read(still_of(file, {.x_px = 4, .y_px = -3}, 1)));
+    const auto before = *read(still_of(file, {.x_px = 4, .y_px = -3}, 1));
     EXPECT_TRUE(are_equal(frame(before, 1), image(cv::Rect(4, 3, 32, 24))));
     EXPECT_TRUE(are_equal(frame(before, 0), image(cv::Rect(8, 0, 32, 24))));
     // Labelled is the previous: of the next one (x, y) is what lay at (x - 4, y + 3).
-    const auto after = std::get<PreparedPair>(read(still_of(file, {.x_px = 4, .y_px = -3}, 0)));
+    const auto after = *read(still_of(file, {.x_px = 4, .y_px = -3}, 0));
     EXPECT_TRUE(are_equal(frame(after, 0), image(cv::Rect(4, 3, 32, 24))));
     EXPECT_TRUE(are_equal(frame(after, 1), image(cv::Rect(0, 6, 32, 24))));
   }
@@ -93,7 +93,7 @@ TEST_F(Stills, WithoutMotionBothFramesAreTheImage) {
     const cv::Mat image = noise(size);
     const FrameRef file = write(image);
     for (const double position : {0.0, 1.0}) {
-      const auto pair = std::get<PreparedPair>(read(still_of(file, {}, position)));
+      const auto pair = *read(still_of(file, {}, position));
       EXPECT_TRUE(are_equal(frame(pair, 0), image)) << to_string(size);
       EXPECT_TRUE(are_equal(frame(pair, 1), image)) << to_string(size);
     }
@@ -135,7 +135,7 @@ TEST_F(Stills, ABoxStaysOnItsObjectAndTheObjectMovesAsTold) {
     for (const double position : {1.0, 0.0}) {
       SCOPED_TRACE(std::string(to_string(c.fit)) + (position == 1 ? " before" : " after"));
       const FramePair pair = still_of(file, motion, position);
-      const auto prepared = std::get<PreparedPair>(read(pair));
+      const auto prepared = *read(pair);
       const Placement& placement = prepared.placement;
       EXPECT_EQ(prepared.content, visible_part(place({120, 160}, spec_)).size);
 
@@ -187,7 +187,7 @@ TEST_F(Stills, EveryPixelIsTheImageWhereItWas) {
       const FramePair pair = still_of(file, {2.6, -1.7, 3, 0.96}, position);
       const Placement whole = place(size, {}, pair);
       spec_.size = whole.cut();  // nothing is resized
-      const auto prepared = std::get<PreparedPair>(read(pair));
+      const auto prepared = *read(pair);
       const cv::Mat moved = frame(prepared, position == 1 ? 0 : 1);
       const std::array<double, 6> map = moved_to_labelled(size, pair);
       const double* row = &map[along_x ? 0 : 3];
@@ -204,7 +204,7 @@ TEST_F(Stills, EveryPixelIsTheImageWhereItWas) {
 TEST_F(Stills, WhatCannotBeHadIsAFaultThatNamesTheImage) {
   const auto why = [&](const FramePair& pair) {
     const auto outcome = read(pair);
-    return is_fault(outcome) ? std::get<SampleFault>(outcome).reason : "no fault";
+    return is_fault(outcome) ? outcome.fault().reason : "no fault";
   };
   const FrameRef file = write(noise({16, 16}));
   for (const double position : {0.0, 1.0}) {
@@ -231,8 +231,7 @@ TEST_F(Stills, MovedAndUnmovedImagesAreNotConfused) {
   const FramePair much = still_of(file, {.x_px = 4}, 0);
   const PairReader shared(folder_.path(), spec_);
   for (const FramePair& pair : {sequence, little, much, sequence, much, little}) {
-    EXPECT_EQ(std::get<PreparedPair>(shared.read(pair)).input,
-              std::get<PreparedPair>(read(pair)).input);
+    EXPECT_EQ(shared.read(pair)->input, read(pair)->input);
   }
 }
 
@@ -248,8 +247,8 @@ TEST_F(Stills, OfAVideoItIsOpenedOnceWhateverTheOrder) {
         const auto outcome =
             reader.read(still_of(testing::video_ref("clip.avi", number), {.x_px = 2}),
                         ImageOrientation::kStored, stride);
-        ASSERT_FALSE(is_fault(outcome)) << number << std::get<SampleFault>(outcome).reason;
-        const cv::Mat moved = frame(std::get<PreparedPair>(outcome), 0);
+        ASSERT_FALSE(is_fault(outcome)) << number << outcome.fault().reason;
+        const cv::Mat moved = frame(*outcome, 0);
         EXPECT_NEAR(moved.at<std::uint8_t>(10, 10), 2 * number, 1);
         // The open video outlives its name; opening it a second time fails.
         std::filesystem::remove(folder_ / "clip.avi");

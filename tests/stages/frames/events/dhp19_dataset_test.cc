@@ -124,7 +124,7 @@ TEST_F(Dhp19Test, CutsTheTwoCamerasIntoWindows) {
   EXPECT_EQ(frame.frame.path, "dhp19/DVS_movies/S1/session1/mov1.h5");
   EXPECT_EQ(dataset->paired_frame(frame, -1).frame.index, 3);
   EXPECT_EQ(dataset->paired_frame(frame, 1).frame.index, 5);
-  const auto window = std::get<EventWindow>(dataset->events(frame.label_key));
+  const auto window = *dataset->events(frame.label_key);
   EXPECT_EQ(window.sensor, (ImageSize{260, 346}));
   ASSERT_EQ(window.events.size(), 3u);
   for (int i = 0; i < 3; ++i) {
@@ -149,7 +149,7 @@ TEST_F(Dhp19Test, ProjectsTheMeanPoseByTheCamerasMatrix) {
   const auto dataset = open();
   for (const auto& [key, f] : {std::pair{"S1/1_1/2/000002", 300.0}, {"S1/1_1/3/000002", 200.0}}) {
     // Events 6, 7, 8 at 18, 21, 24 ms: rows 1 and 2.
-    const auto annotation = std::get<Annotation>(dataset->annotation(key));
+    const auto annotation = *dataset->annotation(key);
     ASSERT_EQ(annotation.persons.size(), 1u);
     const Person& person = annotation.persons[0];
     ASSERT_EQ(person.joints.size(), 13u);
@@ -234,11 +234,10 @@ TEST_F(Dhp19Test, CorruptEventsAreTheFaultOfTheirWindow) {
   }
   testing::write_hdf5(folder_ / "dhp19/DVS_movies/S1/session1/mov1.h5", datasets);
   const auto dataset = open();
-  EXPECT_EQ(std::get<EventWindow>(dataset->events("S1/1_1/2/000000")).events.size(), 3u);
+  EXPECT_EQ(dataset->events("S1/1_1/2/000000")->events.size(), 3u);
   const auto outcome = dataset->events("S1/1_1/2/000001");
   ASSERT_TRUE(is_fault(outcome));
-  EXPECT_THAT(std::get<SampleFault>(outcome).reason,
-              AllOf(HasSubstr("346"), HasSubstr("cam2, event 4")));
+  EXPECT_THAT(outcome.fault().reason, AllOf(HasSubstr("346"), HasSubstr("cam2, event 4")));
 }
 
 TEST_F(Dhp19Test, KeysThatItDoesNotKnowAreFaults) {

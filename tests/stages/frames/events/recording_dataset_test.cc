@@ -55,8 +55,8 @@ class RecordingDatasetTest : public ::testing::Test {
 
   static std::vector<Event> events(const Dataset& dataset, std::size_t sample) {
     const auto outcome = dataset.events(dataset.labelled_frames().at(sample).label_key);
-    EXPECT_FALSE(is_fault(outcome)) << std::get<SampleFault>(outcome).reason;
-    return std::get<EventWindow>(outcome).events;
+    EXPECT_FALSE(is_fault(outcome)) << outcome.fault().reason;
+    return outcome->events;
   }
 
   testing::TemporaryFolder folder_;
@@ -76,7 +76,7 @@ TEST_F(RecordingDatasetTest, WithoutLabelsEachFrameEndsItsInterval) {
   EXPECT_EQ(dataset->paired_frame(frame, 1).frame, (FrameRef{"drive.h5", 1, 1}));
   EXPECT_EQ(dataset->paired_frame(frame, 2).state, PairedFrame::State::kBeyond);
   EXPECT_EQ(dataset->sensor_size(frame.label_key), (ImageSize{3, 4}));
-  EXPECT_EQ(std::get<Annotation>(dataset->annotation(frame.label_key)), Annotation{});
+  EXPECT_EQ(*dataset->annotation(frame.label_key), Annotation{});
   EXPECT_THAT(dataset->annotation_files(), IsEmpty());
 }
 
@@ -92,8 +92,7 @@ TEST_F(RecordingDatasetTest, LabelsAreAtTheEndOrInTheMiddleOfTheirWindows) {
   EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[4]));
   EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("bus", "car"));
   const auto annotation = dataset->annotation(dataset->labelled_frames()[0].label_key);
-  EXPECT_EQ(std::get<Annotation>(annotation).boxes.at(0),
-            (Box{.class_id = 1, .xyxy = {0, 0, 2, 1}, .difficulty = 0}));
+  EXPECT_EQ(annotation->boxes.at(0), (Box{.class_id = 1, .xyxy = {0, 0, 2, 1}, .difficulty = 0}));
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("drive.csv"));
   EXPECT_EQ(dataset->label_place(dataset->labelled_frames()[0].label_key),
             "drive.csv (1.500000 s)");
@@ -172,7 +171,7 @@ TEST_F(RecordingDatasetTest, BoxesWithoutAnAreaAreTheFaultOfTheirSample) {
   const auto dataset = open();
   const auto fault = [&](std::size_t i) {
     const auto read = dataset->annotation(dataset->labelled_frames().at(i).label_key);
-    return is_fault(read) ? std::get<SampleFault>(read).reason : "no fault";
+    return is_fault(read) ? read.fault().reason : "no fault";
   };
   EXPECT_EQ(fault(0), "no fault");
   EXPECT_EQ(fault(1),
@@ -231,7 +230,7 @@ TEST_F(RecordingDatasetTest, CorruptEventsAreTheFaultOfTheirWindow) {
   EXPECT_THAT(events(*dataset, 0), ElementsAre(all_[2], all_[3]));
   const auto outcome = dataset->events(dataset->labelled_frames()[1].label_key);
   ASSERT_TRUE(is_fault(outcome));
-  EXPECT_THAT(std::get<SampleFault>(outcome).reason, AllOf(HasSubstr("got"), HasSubstr("event 4")));
+  EXPECT_THAT(outcome.fault().reason, AllOf(HasSubstr("got"), HasSubstr("event 4")));
 }
 
 TEST_F(RecordingDatasetTest, AFolderHoldsRecordingsOfAnyLayout) {

@@ -138,7 +138,7 @@ TEST_F(ExtractedLayoutTest, ReadsThePersonOfARow) {
   const auto dataset = open();
   EXPECT_EQ(dataset->label_schema().joint_names.at(16), "right_wrist");
   const auto outcome = dataset->annotation("a.npz#1");
-  const Person& person = std::get<Annotation>(outcome).persons.at(0);
+  const Person& person = outcome->persons.at(0);
   ASSERT_EQ(person.joints.size(), 17u);
   EXPECT_EQ(person.joints[0], (Joint{{10, 10.5}, -1})) << "Human3.6M annotates no visibility";
   EXPECT_EQ(person.joints[1], (Joint{{11, 11.5}, 0})) << "a place without confidence";
@@ -161,7 +161,7 @@ TEST_F(ExtractedLayoutTest, JointsInSpaceWithoutConfidenceAreUnknown) {
   const auto dataset = open();
   const auto joints3d = [&](const char* key) {
     const auto outcome = dataset->annotation(key);
-    return std::get<Annotation>(outcome).persons.at(0).joints3d_mm;
+    return outcome->persons.at(0).joints3d_mm;
   };
   EXPECT_THAT(joints3d("a.npz#0"),
               ElementsAre(std::nullopt, ::testing::Optional(std::array{500.0, 250.0, 4000.0})));
@@ -174,7 +174,7 @@ TEST_F(ExtractedLayoutTest, JointsWithoutAnnotationAreMissing) {
   add_npz(arrays);
   spec_.annotations = "h36m/a.npz";
   const auto outcome = open()->annotation("a.npz#0");
-  EXPECT_THAT(std::get<Annotation>(outcome).persons.at(0).joints,
+  EXPECT_THAT(outcome->persons.at(0).joints,
               ElementsAre(Joint{kMissingPoint, 0}, Joint{{0, 0}, -1}));
 }
 
@@ -190,7 +190,7 @@ TEST_F(ExtractedLayoutTest, OriginalHoldsEveryFieldOfTheRow) {
   add_npz(arrays);
   const auto dataset = open();
   const auto outcome = dataset->annotation("a.npz#1");
-  const auto original = nlohmann::json::parse(std::get<Annotation>(outcome).original);
+  const auto original = nlohmann::json::parse(outcome->original);
   std::vector<std::string> names;
   for (const auto& field : original.items()) names.push_back(field.key());
   EXPECT_THAT(names, ElementsAre("S", "center", "imgname", "keep", "part", "pose", "scale"));
@@ -288,8 +288,7 @@ TEST_F(ExtractedLayoutTest, ValuesThatAreNotFiniteAreAFaultOfTheirRow) {
     EXPECT_FALSE(is_fault(dataset->annotation("a.npz#0")));
     const auto outcome = dataset->annotation("a.npz#1");
     ASSERT_TRUE(is_fault(outcome)) << name;
-    EXPECT_THAT(std::get<SampleFault>(outcome).reason,
-                HasSubstr("h36m/a.npz (" + std::string(name) + ", row 1)"));
+    EXPECT_THAT(outcome.fault().reason, HasSubstr("h36m/a.npz (" + std::string(name) + ", row 1)"));
   }
 }
 
@@ -340,7 +339,7 @@ TEST_F(ExtractedLayoutTest, ReadsSharedData) {
   }
   const auto outcome = dataset->annotation(frames[0].label_key);
   ASSERT_FALSE(is_fault(outcome));
-  const auto original = nlohmann::json::parse(std::get<Annotation>(outcome).original);
+  const auto original = nlohmann::json::parse(outcome->original);
   EXPECT_EQ(original["cameras.pkl"]["name"], "camera1");
   EXPECT_EQ(original["cameras.pkl"]["w"], 1000);
   EXPECT_EQ(original["cameras.pkl"]["R"].size(), 3u);
@@ -363,7 +362,7 @@ class RealPeopleTest : public ::testing::Test {
     const auto dataset = open_human36m_dataset(spec, data);
     names_ = dataset->label_schema().joint_names;
     for (const LabelledFrame& frame : dataset->labelled_frames()) {
-      annotations_.push_back(std::get<Annotation>(dataset->annotation(frame.label_key)));
+      annotations_.push_back(*dataset->annotation(frame.label_key));
     }
     ASSERT_EQ(annotations_.size(), 4u);
   }
@@ -413,7 +412,7 @@ TEST_F(RealPeopleTest, CameraAndDistortionProjectTheJointsInTheImageAndInTheVolu
           Placement{{1000, 1000}, {400, 600}, {260, 346}, -127, -70}}) {
       const auto outcome = map_labels(annotation, placement, "a.npz");
       ASSERT_FALSE(is_fault(outcome));
-      const VolumePerson& mapped = std::get<VolumeLabels>(outcome).persons.at(0);
+      const VolumePerson& mapped = outcome->persons.at(0);
       for (std::size_t j = 0; j < person.joints.size(); ++j) {
         const Point source = projected(*person.camera, *person.distortion, *person.joints3d_mm[j]);
         EXPECT_NEAR(source.x, person.joints[j].at.x, 1e-3);

@@ -79,8 +79,8 @@ TEST_F(FetchLayoutTest, ReadsThePersonOfARow) {
   add_annotations(fetch_annotations({{7, 1}, {7, 6}}));
   const auto dataset = open();
   const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#1");
-  ASSERT_FALSE(is_fault(outcome)) << std::get<SampleFault>(outcome).reason;
-  const Annotation& annotation = std::get<Annotation>(outcome);
+  ASSERT_FALSE(is_fault(outcome)) << outcome.fault().reason;
+  const Annotation& annotation = *outcome;
   EXPECT_TRUE(annotation.boxes.empty());
   ASSERT_EQ(annotation.persons.size(), 1u);
   const Person& person = annotation.persons[0];
@@ -111,7 +111,7 @@ Datasets present_annotations() {
 Person only_person(const Dataset& dataset) {
   const auto outcome = dataset.annotation("S1/Walking-1/annot.h5#0");
   EXPECT_FALSE(is_fault(outcome));
-  return std::get<Annotation>(outcome).persons.at(0);
+  return outcome->persons.at(0);
 }
 
 TEST_F(FetchLayoutTest, TakesJointsInSpaceAndTheCameraThatWasFittedToThem) {
@@ -141,7 +141,7 @@ TEST_F(FetchLayoutTest, TakesJointsInSpaceAndTheCameraThatWasFittedToThem) {
 TEST_F(FetchLayoutTest, OriginalHoldsBothCameras) {
   add_annotations(present_annotations());
   const auto outcome = open()->annotation("S1/Walking-1/annot.h5#0");
-  const auto original = nlohmann::json::parse(std::get<Annotation>(outcome).original);
+  const auto original = nlohmann::json::parse(outcome->original);
   EXPECT_EQ(original["intrinsics/7"][0], 1250);
   EXPECT_EQ(original["intrinsics-univ/7"][0], 1251);
 }
@@ -162,7 +162,7 @@ TEST_F(FetchLayoutTest, ACameraThatDoesNotProjectTheJointsIsNotClaimed) {
                   "h36m/S1/Walking-1/annot.h5"));
   const auto person = [&](int row) {
     const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#" + std::to_string(row));
-    return std::get<Annotation>(outcome).persons.at(0);
+    return outcome->persons.at(0);
   };
   EXPECT_TRUE(person(0).camera);
   EXPECT_FALSE(person(1).camera);
@@ -187,7 +187,7 @@ TEST_F(FetchLayoutTest, OriginalHoldsEveryFieldOfTheRow) {
   datasets["whole_file"] = {{3}, std::vector<double>(3)};
   add_annotations(datasets);
   const auto outcome = open()->annotation("S1/Walking-1/annot.h5#1");
-  const auto original = nlohmann::json::parse(std::get<Annotation>(outcome).original);
+  const auto original = nlohmann::json::parse(outcome->original);
   std::vector<std::string> names;
   for (const auto& field : original.items()) names.push_back(field.key());
   EXPECT_THAT(names, ElementsAre("action", "camera", "float", "frame", "intrinsics/7", "odd",
@@ -205,7 +205,7 @@ TEST_F(FetchLayoutTest, RowsAsManyAsIntrinsicsAreNotMixedUp) {
   add_images("7", {1, 6, 11, 16});
   add_annotations(fetch_annotations({{7, 1}, {7, 6}, {7, 11}, {7, 16}}));
   const auto outcome = open()->annotation("S1/Walking-1/annot.h5#0");
-  const auto original = nlohmann::json::parse(std::get<Annotation>(outcome).original);
+  const auto original = nlohmann::json::parse(outcome->original);
   EXPECT_EQ(original["intrinsics/7"].size(), 4u);
 }
 
@@ -272,7 +272,7 @@ TEST_F(FetchLayoutTest, TellsOfImagesWithoutLabelsAndCamerasWithoutIntrinsics) {
                           "2 folders of images without labels, the first "
                           "h36m/S1/Walking-1/imageSequence/9"));
   const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#1");
-  EXPECT_FALSE(std::get<Annotation>(outcome).persons[0].camera);
+  EXPECT_FALSE(outcome->persons[0].camera);
 }
 
 TEST_F(FetchLayoutTest, FilesLeftOutAreCountedAndNamed) {
@@ -294,7 +294,7 @@ TEST_F(FetchLayoutTest, ValuesThatAreNotFiniteAreAFaultOfTheirRow) {
     const auto dataset = open();
     const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#1");
     ASSERT_TRUE(is_fault(outcome)) << name;
-    EXPECT_THAT(std::get<SampleFault>(outcome).reason,
+    EXPECT_THAT(outcome.fault().reason,
                 AllOf(HasSubstr("expected finite"), HasSubstr("h36m/S1/Walking-1/annot.h5"),
                       HasSubstr(name)));
     if (std::string(name) != "intrinsics/7") {
@@ -311,7 +311,7 @@ TEST_F(FetchLayoutTest, UnknownLabelKeysAreFaults) {
         "S1/Walking-1/annot.h5#-1", "S1/Walking-1/annot.h5#0x", "S2/Walking-1/annot.h5#0"}) {
     const auto outcome = dataset->annotation(key);
     ASSERT_TRUE(is_fault(outcome)) << key;
-    EXPECT_THAT(std::get<SampleFault>(outcome).reason, HasSubstr(", in h36m"));
+    EXPECT_THAT(outcome.fault().reason, HasSubstr(", in h36m"));
   }
 }
 
@@ -392,7 +392,7 @@ TEST_F(FetchLayoutTest, ReadsSharedData) {
   EXPECT_EQ(dataset->paired_frame(frames[0], 6).frame.index, 31);
   EXPECT_EQ(dataset->paired_frame(frames[0], 9).state, State::kBeyond);
   const auto outcome = dataset->annotation(frames[17].label_key);
-  EXPECT_FALSE(std::get<Annotation>(outcome).persons[0].camera);
+  EXPECT_FALSE(outcome->persons[0].camera);
 }
 
 }  // namespace

@@ -125,8 +125,8 @@ TEST_F(OfficialLayoutTest, ReadsThePersonOfAFrame) {
     const auto dataset = open(every);
     const auto outcome =
         dataset->annotation("S1/MyPoseFeatures/D2_Positions/Walking.54138969.cdf#6");
-    ASSERT_FALSE(is_fault(outcome)) << std::get<SampleFault>(outcome).reason;
-    const Annotation& annotation = std::get<Annotation>(outcome);
+    ASSERT_FALSE(is_fault(outcome)) << outcome.fault().reason;
+    const Annotation& annotation = *outcome;
     const Person& person = annotation.persons.at(0);
     ASSERT_EQ(person.joints.size(), 32u);
     EXPECT_EQ(person.joints[31], (Joint{{106, 262}, -1}));
@@ -166,9 +166,7 @@ TEST_F(OfficialLayoutTest, TakesTheCameraThatProjectsTheJoints) {
   const auto dataset = open();
   const auto& frames = dataset->labelled_frames();
   const auto person = [&](int row) {
-    return std::get<Annotation>(
-               dataset->annotation(frames.at(static_cast<std::size_t>(row)).label_key))
-        .persons.at(0);
+    return dataset->annotation(frames.at(static_cast<std::size_t>(row)).label_key)->persons.at(0);
   };
   EXPECT_EQ(person(0).camera, (Intrinsics{11, 12, 5, 6}));
   EXPECT_FALSE(person(1).camera);
@@ -232,7 +230,7 @@ TEST_F(OfficialLayoutTest, FilesWithoutTheirCounterpartsAreTold) {
                           "1 videos without joints in 3-D: h36m/S1/Videos/Walking.54138969.mp4",
                           HasSubstr("no intrinsics")));
   const auto outcome = dataset->annotation(dataset->labelled_frames()[0].label_key);
-  EXPECT_THAT(std::get<Annotation>(outcome).persons[0].joints3d_mm, IsEmpty());
+  EXPECT_THAT(outcome->persons[0].joints3d_mm, IsEmpty());
 }
 
 TEST_F(OfficialLayoutTest, AVideoThatCannotBeReadIsAFaultOfItsFrames) {
@@ -284,7 +282,7 @@ TEST_F(OfficialLayoutTest, ValuesThatAreNotFiniteAreAFaultOfTheirFrame) {
   EXPECT_FALSE(is_fault(dataset->annotation(frames[0].label_key)));
   const auto outcome = dataset->annotation(frames[1].label_key);
   ASSERT_TRUE(is_fault(outcome));
-  EXPECT_EQ(std::get<SampleFault>(outcome).reason,
+  EXPECT_EQ(outcome.fault().reason,
             "expected finite numbers, got nan, in "
             "h36m/S1/MyPoseFeatures/D3_Positions_mono/Walking.54138969.cdf (Pose, row 2)");
 }
@@ -306,8 +304,8 @@ TEST_F(OfficialLayoutTest, PairsOfAThinnedVideoAreItsFrames) {
                        6, last.frame.index, 1};
   EXPECT_NEAR(pair.gap_s(), 0.6, 1e-12);
   const auto outcome = PairReader(folder_.path(), {}).read(pair);
-  ASSERT_FALSE(is_fault(outcome)) << std::get<SampleFault>(outcome).reason;
-  const auto& input = std::get<PreparedPair>(outcome).input;
+  ASSERT_FALSE(is_fault(outcome)) << outcome.fault().reason;
+  const auto& input = outcome->input;
   // Frame i, counted from 0, is grey of value 2 i.
   EXPECT_NEAR((input.front() / 2 + 0.5) * 255, 2 * 30, 1);
   EXPECT_NEAR((input.back() / 2 + 0.5) * 255, 2 * 60, 1);
@@ -325,7 +323,7 @@ TEST_F(OfficialLayoutTest, ReadsSharedData) {
   ASSERT_EQ(frames.size(), 16u);  // 1, 6, ..., 36 of two cameras
   EXPECT_EQ(frames[0].sample_id, "S1/Directions 1/54138969/000001");
   EXPECT_EQ(frames[15].sample_id, "S1/Directions 1/55011271/000036");
-  const auto first = std::get<Annotation>(dataset->annotation(frames[0].label_key));
+  const auto first = *dataset->annotation(frames[0].label_key);
   // As numpy prints expected.npz: 309.5788, 437.9982; 480.4014, 308.1903, 482.39233.
   EXPECT_NEAR(first.persons[0].joints[0].at.x, 309.5788, 1e-4);
   EXPECT_NEAR(first.persons[0].joints[0].at.y, 437.9982, 1e-4);

@@ -82,16 +82,16 @@ constexpr const char* kDontCare =
 Annotation parsed(const std::string& text) {
   auto outcome = parse_kitti_label(text, "label_2/000008.txt");
   if (is_fault(outcome)) {
-    ADD_FAILURE() << std::get<SampleFault>(outcome).reason;
+    ADD_FAILURE() << outcome.fault().reason;
     return {};
   }
-  return std::get<Annotation>(outcome);
+  return *outcome;
 }
 
 /// The reason of the fault; empty if there is none.
 std::string fault(const std::string& text) {
   auto outcome = parse_kitti_label(text, "label_2/000008.txt");
-  return is_fault(outcome) ? std::get<SampleFault>(outcome).reason : "";
+  return is_fault(outcome) ? outcome.fault().reason : "";
 }
 
 /// kCar with its column `index` (from 0) replaced.

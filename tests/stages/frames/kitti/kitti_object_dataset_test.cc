@@ -150,8 +150,8 @@ TEST_F(KittiObjectDatasetTest, ReadsAnnotationsByKey) {
   const auto dataset = open();
   const auto annotation = dataset->annotation(dataset->labelled_frames()[0].label_key);
   ASSERT_FALSE(is_fault(annotation));
-  EXPECT_EQ(std::get<Annotation>(annotation).original, kLabel);
-  EXPECT_EQ(std::get<Annotation>(annotation).boxes.size(), 1u);
+  EXPECT_EQ(annotation->original, kLabel);
+  EXPECT_EQ(annotation->boxes.size(), 1u);
   EXPECT_EQ(dataset->label_place(dataset->labelled_frames()[0].label_key),
             "training/label_2/000000.txt");
 }
@@ -159,9 +159,9 @@ TEST_F(KittiObjectDatasetTest, ReadsAnnotationsByKey) {
 TEST_F(KittiObjectDatasetTest, AMalformedOrVanishedLabelIsAFaultThatNamesIt) {
   write("training/label_2/000001.txt", "Car 1 2\n");
   const auto dataset = open();
-  EXPECT_EQ(std::get<SampleFault>(dataset->annotation("label_2/000001.txt")).reason,
+  EXPECT_EQ(dataset->annotation("label_2/000001.txt").fault().reason,
             "expected 15 columns, got 3, in training/label_2/000001.txt:1");
-  EXPECT_THAT(std::get<SampleFault>(dataset->annotation("label_2/000009.txt")).reason,
+  EXPECT_THAT(dataset->annotation("label_2/000009.txt").fault().reason,
               HasSubstr("in training/label_2/000009.txt"));
 }
 
@@ -368,15 +368,15 @@ TEST_F(KittiObjectDatasetTest, TheCalibrationGivesTheProjection) {
   write("training/calib/000001.txt", "P2: 700 0 8\n");
   const auto dataset = open();
   const auto annotation = [&](const char* key) { return dataset->annotation(key); };
-  EXPECT_EQ(std::get<Annotation>(annotation("label_2/000000.txt")).projection,
+  EXPECT_EQ(annotation("label_2/000000.txt")->projection,
             (std::array<double, 12>{700, 0, 8, 40, 0, 700, 6, 2, 0, 0, 1, 4}));
-  EXPECT_EQ(std::get<SampleFault>(annotation("label_2/000001.txt")).reason,
+  EXPECT_EQ(annotation("label_2/000001.txt").fault().reason,
             "expected 12 numbers for P2, got 3, in training/calib/000001.txt:1");
   write("training/calib/000001.txt", "P2: 0 0 0 0 0 0 0 0 0 0 0 0\n");
-  EXPECT_EQ(std::get<SampleFault>(annotation("label_2/000001.txt")).reason,
+  EXPECT_EQ(annotation("label_2/000001.txt").fault().reason,
             "expected a matrix of full rank for P2, got 'P2: 0 0 0 0 0 0 0 0 0 0 0 0?', in "
             "training/calib/000001.txt:1");
-  EXPECT_FALSE(std::get<Annotation>(annotation("label_2/000002.txt")).projection);
+  EXPECT_FALSE(annotation("label_2/000002.txt")->projection);
   EXPECT_THAT(dataset->annotation_files(), Contains("training/calib/000000.txt"));
 }
 
@@ -405,8 +405,7 @@ TEST(KittiObjectData, RealFramesReachSixStepsThroughTheMapping) {
     EXPECT_EQ(labelled.fault, "");
     const auto annotation = dataset->annotation(labelled.label_key);
     ASSERT_FALSE(is_fault(annotation));
-    EXPECT_EQ(std::get<Annotation>(annotation).original,
-              read_file(data / "kitti_object/training" / labelled.label_key));
+    EXPECT_EQ(annotation->original, read_file(data / "kitti_object/training" / labelled.label_key));
   }
 }
 

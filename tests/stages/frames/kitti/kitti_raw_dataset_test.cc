@@ -60,7 +60,7 @@ class KittiRawDatasetTest : public ::testing::Test {
 };
 
 Annotation annotation_of(const Dataset& dataset, std::size_t frame) {
-  return std::get<Annotation>(dataset.annotation(dataset.labelled_frames().at(frame).label_key));
+  return *dataset.annotation(dataset.labelled_frames().at(frame).label_key);
 }
 
 TEST_F(KittiRawDatasetTest, EveryImageIsALabelledFrame) {
@@ -186,7 +186,7 @@ TEST_F(KittiRawDatasetTest, AMalformedTrackletIsAFaultOfItsFrame) {
         testing::tracklets_xml(tracklet_xml("Car", "1", pose_xml("x"))));
   const auto outcome = open()->annotation(kFirst + "#1");
   ASSERT_TRUE(is_fault(outcome));
-  EXPECT_THAT(std::get<SampleFault>(outcome).reason,
+  EXPECT_THAT(outcome.fault().reason,
               HasSubstr("in raw/" + kFirst + "/tracklet_labels.xml (tracklet 0)"));
 }
 
@@ -224,7 +224,7 @@ TEST_F(KittiRawDatasetTest, UnreadableTrackletsAreAFaultOfTheirDriveAloneAndNotN
     EXPECT_EQ(is_fault(dataset->annotation(frame.label_key)), frame.label_key.starts_with(kFirst))
         << frame.sample_id;
   }
-  EXPECT_THAT(std::get<SampleFault>(dataset->annotation(kFirst + "#1")).reason,
+  EXPECT_THAT(dataset->annotation(kFirst + "#1").fault().reason,
               HasSubstr("'Too many levels of symbolic links', in raw/" + kFirst));
 }
 

@@ -29,7 +29,7 @@ TEST(TrackingLabels, GivesAFrameItsOwnLinesByteForByte) {
   const TrackingLabels labels(first + second + third, "label_02/0001.txt");
   EXPECT_THAT(labels.frames(), ElementsAre(0, 12));
 
-  const auto annotation = std::get<Annotation>(labels.annotation(12));
+  const auto annotation = *labels.annotation(12);
   EXPECT_EQ(annotation.original, second + third);
   ASSERT_EQ(annotation.boxes.size(), 2u);
   EXPECT_TRUE(annotation.boxes[0].ignore);
@@ -48,12 +48,12 @@ TEST(TrackingLabels, TruncationTwoIsAnObjectToIgnore) {
     return TrackingLabels(text, "l.txt").annotation(0);
   };
   for (const char* level : {"0", "1", "2"}) {
-    const Box box = std::get<Annotation>(with_truncation(level)).boxes.at(0);
+    const Box box = with_truncation(level)->boxes.at(0);
     EXPECT_EQ(box.truncation, std::stof(level));
     EXPECT_EQ(box.ignore, std::string(level) == "2");
   }
   for (const char* level : {"3", "0.5", "-2"}) {
-    EXPECT_EQ(std::get<SampleFault>(with_truncation(level)).reason,
+    EXPECT_EQ(with_truncation(level).fault().reason,
               std::string("expected 0, 1, 2 or -1 for truncated, got '") + level + "', in l.txt:1");
   }
 }
@@ -65,7 +65,7 @@ TEST(TrackingLabels, DontCareHasTheUnknownThreeDimensionalBox) {
       "0 -1 DontCare -1 -1 -10.000000 219.310000 188.490000 245.500000 218.560000 -1000.000000 "
       "-1000.000000 -1000.000000 -10.000000 -1.000000 -1.000000 -1.000000\n",
       "l.txt");
-  const Box box = std::get<Annotation>(labels.annotation(0)).boxes.at(0);
+  const Box box = labels.annotation(0)->boxes.at(0);
   EXPECT_THAT(box.box3d, ElementsAre(-1, -1, -1, -1000, -1000, -1000, -10));
   EXPECT_TRUE(box.ignore);
 }
@@ -73,26 +73,25 @@ TEST(TrackingLabels, DontCareHasTheUnknownThreeDimensionalBox) {
 TEST(TrackingLabels, FindsLinesOfAFrameWhereverTheyStand) {
   const TrackingLabels labels(line("3", "0", "Car") + line("1", "0", "Car") + line("3", "1", "Car"),
                               "l.txt");
-  EXPECT_EQ(std::get<Annotation>(labels.annotation(3)).original,
-            line("3", "0", "Car") + line("3", "1", "Car"));
+  EXPECT_EQ(labels.annotation(3)->original, line("3", "0", "Car") + line("3", "1", "Car"));
 }
 
 TEST(TrackingLabels, AFrameWithoutLinesIsEmpty) {
   const TrackingLabels labels(line("3", "0", "Car"), "l.txt");
-  EXPECT_EQ(std::get<Annotation>(labels.annotation(4)), Annotation());
+  EXPECT_EQ(*labels.annotation(4), Annotation());
   EXPECT_THAT(TrackingLabels("", "l.txt").frames(), IsEmpty());
-  EXPECT_EQ(std::get<Annotation>(TrackingLabels("\n", "l.txt").annotation(0)), Annotation());
+  EXPECT_EQ(*TrackingLabels("\n", "l.txt").annotation(0), Annotation());
 }
 
 TEST(TrackingLabels, KeepsTheTextWhenMoved) {
   TrackingLabels labels(line("3", "0", "Car"), "l.txt");
   const TrackingLabels moved = std::move(labels);
-  EXPECT_EQ(std::get<Annotation>(moved.annotation(3)).original, line("3", "0", "Car"));
+  EXPECT_EQ(moved.annotation(3)->original, line("3", "0", "Car"));
 }
 
 std::string fault(const TrackingLabels& labels, std::int64_t frame) {
   const auto outcome = labels.annotation(frame);
-  return is_fault(outcome) ? std::get<SampleFault>(outcome).reason : "";
+  return is_fault(outcome) ? outcome.fault().reason : "";
 }
 
 TEST(TrackingLabels, AMalformedLineIsAFaultOfItsFrameOnly) {
@@ -163,9 +162,7 @@ TEST_F(KittiTrackingDatasetTest, EveryImageAndEveryLabelOfALabelledSequenceIsALa
 
 TEST_F(KittiTrackingDatasetTest, AnnotationsAreTheFramesLines) {
   const auto dataset = open();
-  const auto original = [&](const std::string& key) {
-    return std::get<Annotation>(dataset->annotation(key)).original;
-  };
+  const auto original = [&](const std::string& key) { return dataset->annotation(key)->original; };
   EXPECT_EQ(original("label_02/0001.txt#0"), kFirstLine);
   EXPECT_EQ(original("label_02/0001.txt#1"), "");
   EXPECT_EQ(original("label_02/0001.txt#2"), kThird);
@@ -178,7 +175,7 @@ TEST_F(KittiTrackingDatasetTest, AKeyOfAnotherFormIsAFault) {
                           "label_02/0001.txt#x"}) {
     const auto outcome = dataset->annotation(key);
     ASSERT_TRUE(is_fault(outcome)) << key;
-    EXPECT_THAT(std::get<SampleFault>(outcome).reason, HasSubstr("in tracking"));
+    EXPECT_THAT(outcome.fault().reason, HasSubstr("in tracking"));
   }
 }
 
@@ -251,7 +248,7 @@ TEST_F(KittiTrackingDatasetTest, AnUnreadableLabelFileIsAFaultOfItsSequenceAlone
     const auto annotation = dataset->annotation(frame.label_key);
     EXPECT_EQ(is_fault(annotation), frame.sequence == "0001") << frame.sample_id;
     if (!is_fault(annotation)) continue;
-    EXPECT_EQ(std::get<SampleFault>(annotation).reason,
+    EXPECT_EQ(annotation.fault().reason,
               "expected a readable file, got 'Too many levels of symbolic links', in "
               "tracking/label_02/0001.txt");
     ++faults;
@@ -260,7 +257,7 @@ TEST_F(KittiTrackingDatasetTest, AnUnreadableLabelFileIsAFaultOfItsSequenceAlone
 
   std::filesystem::remove(folder_ / "tracking/label_02/0001.txt");
   std::filesystem::create_directory(folder_ / "tracking/label_02/0001.txt");
-  EXPECT_THAT(std::get<SampleFault>(open()->annotation("label_02/0001.txt#2")).reason,
+  EXPECT_THAT(open()->annotation("label_02/0001.txt#2").fault().reason,
               HasSubstr("'Is a directory', in tracking/label_02/0001.txt"));
 }
 

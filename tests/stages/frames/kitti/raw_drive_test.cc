@@ -22,13 +22,13 @@ using testing::write_file;
 
 std::vector<double> parse(const std::string& text) {
   const auto outcome = parse_timestamps(text, "t.txt");
-  if (is_fault(outcome)) ADD_FAILURE() << std::get<SampleFault>(outcome).reason;
-  return is_fault(outcome) ? std::vector<double>() : std::get<std::vector<double>>(outcome);
+  if (is_fault(outcome)) ADD_FAILURE() << outcome.fault().reason;
+  return is_fault(outcome) ? std::vector<double>() : *outcome;
 }
 
 std::string fault(const std::string& text) {
   const auto outcome = parse_timestamps(text, "t.txt");
-  return is_fault(outcome) ? std::get<SampleFault>(outcome).reason : "";
+  return is_fault(outcome) ? outcome.fault().reason : "";
 }
 
 TEST(Timestamps, CountsFromTheFirstLine) {

@@ -43,7 +43,7 @@ Tracklets car_and_person() {
 TEST(Tracklets, GivesEachFrameThePosesOfItsTracklets) {
   const Tracklets tracklets = car_and_person();
   EXPECT_THAT(tracklets.frames(), ElementsAre(2, 3));
-  const auto third = std::get<TrackletFrame>(tracklets.frame(3));
+  const auto third = *tracklets.frame(3);
   ASSERT_EQ(third.poses.size(), 2u);
   const TrackletPose& car = third.poses[0];
   EXPECT_EQ(car.track, 0);
@@ -62,7 +62,7 @@ TEST(Tracklets, GivesEachFrameThePosesOfItsTracklets) {
 }
 
 TEST(Tracklets, TheJsonHoldsEveryField) {
-  const auto frame = std::get<TrackletFrame>(car_and_person().frame(3));
+  const auto frame = *car_and_person().frame(3);
   const auto json = nlohmann::json::parse(frame.json);
   ASSERT_EQ(json.size(), 2u);
   EXPECT_EQ(json[0], nlohmann::json::parse(R"({
@@ -74,7 +74,7 @@ TEST(Tracklets, TheJsonHoldsEveryField) {
 
 TEST(Tracklets, AFrameWithoutTrackletsIsAnEmptyArray) {
   for (const std::int64_t number : {-1, 1, 4}) {
-    const auto frame = std::get<TrackletFrame>(car_and_person().frame(number));
+    const auto frame = *car_and_person().frame(number);
     EXPECT_THAT(frame.poses, IsEmpty());
     EXPECT_EQ(frame.json, "[]");
   }
@@ -85,13 +85,13 @@ TEST(Tracklets, AFieldThatIsNoNumberIsAFaultOfItsFrame) {
   const Tracklets tracklets(
       tracklets_xml(tracklet_xml("Car", "0", pose_xml("10") + pose_xml("nan"))), "t.xml");
   EXPECT_FALSE(is_fault(tracklets.frame(0)));
-  EXPECT_EQ(std::get<SampleFault>(tracklets.frame(1)).reason,
+  EXPECT_EQ(tracklets.frame(1).fault().reason,
             "expected a finite number for tx, got 'nan', in t.xml (tracklet 0)");
 }
 
 TEST(Tracklets, AnUnknownTypeIsAFault) {
   const Tracklets tracklets(tracklets_xml(tracklet_xml("Lorry", "0", pose_xml("10"))), "t.xml");
-  EXPECT_THAT(std::get<SampleFault>(tracklets.frame(0)).reason,
+  EXPECT_THAT(tracklets.frame(0).fault().reason,
               AllOf(HasSubstr("got 'Lorry'"), HasSubstr("in t.xml (tracklet 0)")));
 }
 
@@ -101,7 +101,7 @@ TEST(Tracklets, ASizeThatIsNotAboveZeroIsAFault) {
     std::string xml = tracklets_xml(tracklet_xml("Car", "0", pose_xml("10")));
     xml.replace(xml.find(right), std::string(right).size(), wrong);
     EXPECT_THAT(
-        std::get<SampleFault>(Tracklets(xml, "t.xml").frame(0)).reason,
+        Tracklets(xml, "t.xml").frame(0).fault().reason,
         AllOf(HasSubstr("expected a size above 0 for "), HasSubstr("in t.xml (tracklet 0)")))
         << wrong;
   }
@@ -114,10 +114,10 @@ TEST(Tracklets, OcclusionHasItsRange) {
     return Tracklets(xml, "t.xml").frame(0);
   };
   for (const auto& [written, read] : {std::pair("0", 0), {"2", 2}, {"-1", -1}, {"255", -1}}) {
-    EXPECT_EQ(std::get<TrackletFrame>(with_occlusion(written)).poses.at(0).occlusion, read);
+    EXPECT_EQ(with_occlusion(written)->poses.at(0).occlusion, read);
   }
   for (const char* level : {"4", "-2", "99"}) {
-    EXPECT_EQ(std::get<SampleFault>(with_occlusion(level)).reason,
+    EXPECT_EQ(with_occlusion(level).fault().reason,
               std::string("expected a number from -1 to 3 for occlusion, got ") + level +
                   ", in t.xml (tracklet 0)");
   }
@@ -149,7 +149,7 @@ TEST(Tracklets, ACountThatIsNotThatOfTheItemsIsAnError) {
 TEST(Tracklets, BytesThatAreNotUtf8DoNotStopTheJson) {
   std::string xml = tracklets_xml(tracklet_xml("Car", "0", pose_xml("10")));
   xml.insert(xml.find("</poses>") + 8, "<remark>\xff</remark>");
-  const auto frame = std::get<TrackletFrame>(Tracklets(xml, "t.xml").frame(0));
+  const auto frame = *Tracklets(xml, "t.xml").frame(0);
   EXPECT_EQ(nlohmann::json::parse(frame.json)[0]["remark"], "\xEF\xBF\xBD");
 }
 

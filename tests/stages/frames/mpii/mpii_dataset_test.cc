@@ -81,7 +81,7 @@ TEST_F(MpiiDatasetTest, LabelsStayWithTheirImage) {
 
   const auto outcome = dataset->annotation(frame.label_key);
   ASSERT_FALSE(is_fault(outcome));
-  const auto& annotation = std::get<Annotation>(outcome);
+  const auto& annotation = *outcome;
   EXPECT_EQ(nlohmann::json::parse(annotation.original)["image"]["name"], "b.jpg");
   EXPECT_TRUE(annotation.boxes.empty());
   ASSERT_EQ(annotation.persons.size(), 2u);
@@ -103,7 +103,7 @@ TEST_F(MpiiDatasetTest, AMalformedEntryIsAFaultOfItsSampleOnly) {
   const auto dataset = open();
   const auto bad = dataset->annotation("annolist[0]");
   ASSERT_TRUE(is_fault(bad));
-  EXPECT_EQ(std::get<SampleFault>(bad).reason,
+  EXPECT_EQ(bad.fault().reason,
             "expected x, y and id, got 3 at annorect[0].annopoints.point[0], in "
             "m/mpii_human_pose_v1_u12_1.mat:annolist[0] (sample a)");
   EXPECT_FALSE(is_fault(dataset->annotation("annolist[1]")));
@@ -135,7 +135,7 @@ class MpiiFrameOfAnotherSize : public MpiiDatasetTest {
 };
 
 TEST_F(MpiiFrameOfAnotherSize, LabelsAreInPixelsOfTheFrame) {
-  const auto annotation = std::get<Annotation>(annotation_at({96, 128}));
+  const auto annotation = *annotation_at({96, 128});
   const Person& person = annotation.persons.at(0);
   // Twice as large: 711, 621 counted from 1 are 710, 620; (710 + 0.5) 2 - 0.5 = 1420.5.
   EXPECT_EQ(person.joints[0], (Joint{{1420.5, 1240.5}, 1}));
@@ -150,7 +150,7 @@ TEST_F(MpiiFrameOfAnotherSize, LabelsAreInPixelsOfTheFrame) {
 
 TEST_F(MpiiFrameOfAnotherSize, APixelOfRoundingIsNoOtherShape) {
   // 64x48 at 2/3 is 42.7x32: stored as 43x32.
-  const auto down = std::get<Annotation>(annotation_at({32, 43}));
+  const auto down = *annotation_at({32, 43});
   EXPECT_DOUBLE_EQ(down.persons.at(0).joints[0].at.x, 710.5 * 43 / 64 - 0.5);
   EXPECT_DOUBLE_EQ(down.persons.at(0).joints[0].at.y, 620.5 * 32 / 48 - 0.5);
   EXPECT_DOUBLE_EQ(down.persons.at(0).scale, 3.05 * std::sqrt(43.0 / 64 * 32 / 48));
@@ -162,7 +162,7 @@ TEST_F(MpiiFrameOfAnotherSize, AnotherShapeIsAFaultThatNamesBoth) {
     const auto annotation = annotation_at(size);
     ASSERT_TRUE(is_fault(annotation));
     EXPECT_EQ(
-        std::get<SampleFault>(annotation).reason,
+        annotation.fault().reason,
         "expected a frame of the shape of m/images/b.jpg, 64x48, where it was annotated, got " +
             std::to_string(size.width) + "x" + std::to_string(size.height) +
             ", in m/sequences/b/00000007.jpg (sample b)");
@@ -171,7 +171,7 @@ TEST_F(MpiiFrameOfAnotherSize, AnotherShapeIsAFaultThatNamesBoth) {
 
 TEST_F(MpiiFrameOfAnotherSize, WithoutTheImageNothingTells) {
   std::filesystem::remove(folder_ / "m/images/b.jpg");
-  const auto annotation = std::get<Annotation>(annotation_at({96, 128}));
+  const auto annotation = *annotation_at({96, 128});
   EXPECT_EQ(annotation.persons.at(0).joints[0].at, (Point{710, 620}));
   spec_.split = "train";
   EXPECT_THAT(open()->notes(),
@@ -183,7 +183,7 @@ TEST_F(MpiiFrameOfAnotherSize, AnImageThatCannotBeReadIsAFault) {
   testing::write_file(folder_ / "m/images/b.jpg", "no image");
   const auto annotation = annotation_at({48, 64});
   ASSERT_TRUE(is_fault(annotation));
-  EXPECT_THAT(std::get<SampleFault>(annotation).reason, HasSubstr("in m/images/b.jpg (sample b)"));
+  EXPECT_THAT(annotation.fault().reason, HasSubstr("in m/images/b.jpg (sample b)"));
 }
 
 TEST(MpiiDatasetOnSharedData, ReadsTheJuggler) {
@@ -205,7 +205,7 @@ TEST(MpiiDatasetOnSharedData, ReadsTheJuggler) {
   EXPECT_EQ(dataset->paired_frame(juggler, 7).state, State::kBeyond);
   EXPECT_EQ(dataset->paired_frame(juggler, -7).state, State::kBeyond);
 
-  const auto annotation = std::get<Annotation>(dataset->annotation(juggler.label_key));
+  const auto annotation = *dataset->annotation(juggler.label_key);
   ASSERT_EQ(annotation.persons.size(), 2u);
   const Person& person = annotation.persons[0];
   EXPECT_EQ(person.joints[0], (Joint{{710, 620}, 1}));         // x 711, y 621, is_visible 1

@@ -48,7 +48,7 @@ TEST_F(MpiiListDatasetTest, RowsOfOneImageAreOneSample) {
   ASSERT_EQ(dataset->labelled_frames().size(), 2u);
   const LabelledFrame& frame = dataset->labelled_frames()[1];
   EXPECT_EQ(frame.sample_id, "b");
-  const auto annotation = std::get<Annotation>(dataset->annotation(frame.label_key));
+  const auto annotation = *dataset->annotation(frame.label_key);
   EXPECT_EQ(annotation.original,
             R"([{"image":"b.jpg","scale":1},{"image":"b.jpg","scale":3,"center":[11,21]}])");
   ASSERT_EQ(annotation.persons.size(), 2u);
@@ -93,7 +93,7 @@ TEST_F(MpiiListDatasetTest, LabelsAreInPixelsOfTheFrame) {
                  mat::structs({{{"image", mat::image("b/00000004.jpg")}}}));
   testing::write_flat_image(folder_ / "m/images/b.jpg", {48, 64}, 100);
   testing::write_flat_image(folder_ / "v/b/00000004.jpg", {24, 32}, 100);
-  const auto half = std::get<Annotation>(open()->annotation("b.jpg"));
+  const auto half = *open()->annotation("b.jpg");
   // 11, 21 counted from 1 are 10, 20; half as large: (10 + 0.5) / 2 - 0.5.
   EXPECT_EQ(half.persons.at(1).center, (Point{4.75, 9.75}));
   EXPECT_DOUBLE_EQ(half.persons.at(1).scale, 1.5);
@@ -102,7 +102,7 @@ TEST_F(MpiiListDatasetTest, LabelsAreInPixelsOfTheFrame) {
   testing::write_flat_image(folder_ / "v/b/00000004.jpg", {32, 32}, 100);
   const auto square = open()->annotation("b.jpg");
   ASSERT_TRUE(is_fault(square));
-  EXPECT_THAT(std::get<SampleFault>(square).reason, HasSubstr("got 32x32, in v/b/00000004.jpg"));
+  EXPECT_THAT(square.fault().reason, HasSubstr("got 32x32, in v/b/00000004.jpg"));
 }
 
 TEST_F(MpiiListDatasetTest, AMalformedRowIsAFaultOfItsSampleOnly) {
@@ -112,7 +112,7 @@ TEST_F(MpiiListDatasetTest, AMalformedRowIsAFaultOfItsSampleOnly) {
   const auto dataset = open();
   const auto bad = dataset->annotation("b.jpg");
   ASSERT_TRUE(is_fault(bad));
-  EXPECT_EQ(std::get<SampleFault>(bad).reason,
+  EXPECT_EQ(bad.fault().reason,
             "expected a finite number, got \"x\" at scale of its person 1, in "
             "labels/list.json:b.jpg (sample b)");
   EXPECT_EQ(dataset->label_place("b.jpg"), "labels/list.json:b.jpg");
@@ -146,8 +146,8 @@ TEST(MpiiListDatasetOnSharedData, ListAndTableAgree) {
   int hidden_in_table = 0;
   for (const LabelledFrame& frame : list->labelled_frames()) {
     EXPECT_EQ(list->paired_frame(frame, 0).state, State::kPresent);
-    const auto listed = std::get<Annotation>(list->annotation(frame.label_key)).persons.at(0);
-    const auto tabled = std::get<Annotation>(table->annotation(frame.label_key)).persons.at(0);
+    const auto listed = list->annotation(frame.label_key)->persons.at(0);
+    const auto tabled = table->annotation(frame.label_key)->persons.at(0);
     for (int i = 0; i < 16; ++i) {
       if (listed.joints[i].at == kMissingPoint) {
         EXPECT_EQ(tabled.joints[i], listed.joints[i]);
@@ -163,9 +163,9 @@ TEST(MpiiListDatasetOnSharedData, ListAndTableAgree) {
     EXPECT_NEAR(tabled.scale, 1.25 * listed.scale, 1e-5);
   }
   EXPECT_EQ(hidden_in_table, 2);
-  const auto person = std::get<Annotation>(list->annotation("005808361.jpg")).persons.at(0);
+  const auto person = list->annotation("005808361.jpg")->persons.at(0);
   EXPECT_EQ(person.joints[0], (Joint{{803, 710}, 1}));  // 804, 711 in the file
-  const auto original = std::get<Annotation>(table->annotation("005808361.jpg")).original;
+  const auto original = table->annotation("005808361.jpg")->original;
   const auto row = nlohmann::json::parse(original).at(0);
   for (const char* field : {"center", "imgname", "index", "normalize", "part", "person", "scale",
                             "torsoangle", "visible"}) {

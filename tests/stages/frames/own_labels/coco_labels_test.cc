@@ -62,13 +62,12 @@ class CocoLabels : public ::testing::Test {
 
   Annotation annotation(const std::string& key) const {
     const auto read = open()->annotation(key);
-    return is_fault(read) ? Annotation{std::get<SampleFault>(read).reason, {}, {}}
-                          : std::get<Annotation>(read);
+    return is_fault(read) ? Annotation{read.fault().reason, {}, {}} : *read;
   }
 
   std::string fault(const std::string& key = "7") const {
     const auto read = open()->annotation(key);
-    return is_fault(read) ? std::get<SampleFault>(read).reason : "no fault";
+    return is_fault(read) ? read.fault().reason : "no fault";
   }
 
   void expect_refused(const std::string& why) const {

@@ -25,7 +25,7 @@ std::string mot_fault(const std::string& lines) {
   const auto frames = read_mot(lines + "2,1,1,1,1,1,1\n");
   EXPECT_FALSE(is_fault(frames.at(2)));  // of its frame alone
   const auto& frame = frames.at(1);
-  return is_fault(frame) ? std::get<SampleFault>(frame).reason : "no fault";
+  return is_fault(frame) ? frame.fault().reason : "no fault";
 }
 
 TEST(MotLabels, CountFrom1) {
@@ -33,14 +33,14 @@ TEST(MotLabels, CountFrom1) {
       "3,2,1,1,1920,1080,1,1,1\r\n1,5,10.5,20,4,8.25,1,3,0.25\r\n\r\n"
       "3,4, -9, 2, 30, 40, 0, 1, 0");
   ASSERT_THAT(frames, SizeIs(2));
-  const auto& third = std::get<ImageLabels>(frames.at(3));
+  const auto& third = *frames.at(3);
   EXPECT_EQ(third.original, "3,2,1,1,1920,1080,1,1,1\r\n3,4, -9, 2, 30, 40, 0, 1, 0");
   EXPECT_EQ(third.size, std::nullopt);
   ASSERT_THAT(third.boxes, SizeIs(2));
   EXPECT_EQ(third.boxes[0].class_name, "pedestrian");
   EXPECT_EQ(third.boxes[0].box, (Box{.xyxy = {0, 0, 1920, 1080}, .track_id = 2}));
   EXPECT_EQ(third.boxes[1].box, (Box{.xyxy = {-10, 1, 20, 41}, .track_id = 4, .ignore = true}));
-  const auto& first = std::get<ImageLabels>(frames.at(1));
+  const auto& first = *frames.at(1);
   EXPECT_EQ(first.boxes.at(0).class_name, "car");
   EXPECT_EQ(first.boxes.at(0).box, (Box{.xyxy = {9.5, 19, 13.5, 27.25}, .track_id = 5}));
   EXPECT_THAT(read_mot(""), IsEmpty());
@@ -60,7 +60,7 @@ TEST(MotLabels, ClassesOfDistractorsAndCrowdsAreToBeIgnored) {
     text += "1," + std::to_string(i) + ",1,1,2,2,1," + std::to_string(i) + ",1\n";
   }
   const auto frames = read_mot(text);
-  const auto& boxes = std::get<ImageLabels>(frames.at(1)).boxes;
+  const auto& boxes = frames.at(1)->boxes;
   ASSERT_EQ(boxes.size(), classes.size());
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     EXPECT_EQ(boxes[i].class_name, classes[i].first);
@@ -72,7 +72,7 @@ TEST(MotLabels, Of2015AndShorterOnesAreOfPedestrians) {
   const auto frames = read_mot(
       "1,1,1,1,2,2,1,-1,-1,-1\n1,2,1,1,2,2,0,-9.5,3.25,0\n1,3,1,1,2,2,1\n"
       "1,4,1,1,2,2,1,2\n");
-  const auto& boxes = std::get<ImageLabels>(frames.at(1)).boxes;
+  const auto& boxes = frames.at(1)->boxes;
   ASSERT_THAT(boxes, SizeIs(4));
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(boxes[i].class_name, "pedestrian");
@@ -187,8 +187,8 @@ TEST(MotLabels, OfMot17AreThoseThatAnotherProgramRead) {
     const std::string text = testing::read_file(folder / name / "gt.txt");
     std::size_t bytes = 0;
     for (const auto& [number, outcome] : parse_mot_labels(text, "gt.txt")) {
-      ASSERT_FALSE(is_fault(outcome)) << std::get<SampleFault>(outcome).reason;
-      const auto& labels = std::get<ImageLabels>(outcome);
+      ASSERT_FALSE(is_fault(outcome)) << outcome.fault().reason;
+      const auto& labels = *outcome;
       bytes += labels.original.size();
       const std::string image = name + ("/00000" + std::to_string(number)) + ".jpg";
       const auto& rows = expected.at(image);

@@ -47,8 +47,7 @@ class NamedLabels : public ::testing::Test {
 
 Annotation read(const Dataset& dataset, const std::string& key) {
   const auto annotation = dataset.annotation(key);
-  return is_fault(annotation) ? Annotation{std::get<SampleFault>(annotation).reason, {}, {}}
-                              : std::get<Annotation>(annotation);
+  return is_fault(annotation) ? Annotation{annotation.fault().reason, {}, {}} : *annotation;
 }
 
 TEST_F(NamedLabels, VocLiesInAnnotations) {

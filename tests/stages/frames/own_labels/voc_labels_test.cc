@@ -28,13 +28,13 @@ std::string object(const std::string& content) { return "<object>" + content + "
 
 ImageLabels read_voc(const std::string& xml) {
   const auto outcome = parse_voc_labels(xml, "a.xml");
-  EXPECT_FALSE(is_fault(outcome)) << std::get<SampleFault>(outcome).reason;
-  return std::get<ImageLabels>(outcome);
+  EXPECT_FALSE(is_fault(outcome)) << outcome.fault().reason;
+  return *outcome;
 }
 
 std::string voc_fault(const std::string& xml) {
   const auto outcome = parse_voc_labels(xml, "a.xml");
-  return is_fault(outcome) ? std::get<SampleFault>(outcome).reason : "no fault";
+  return is_fault(outcome) ? outcome.fault().reason : "no fault";
 }
 
 // As the development kit's own example, 2007_000027.xml, but for the size.

@@ -23,14 +23,14 @@ YoloSchema classes() { return parse_yolo_classes("cat\ndog\n", "classes.txt"); }
 
 std::string fault_of(const std::string& text, const YoloSchema& schema = classes()) {
   const auto read = parse_yolo_text(text, schema, kYoloImage, "a.txt");
-  return is_fault(read) ? std::get<SampleFault>(read).reason : "no fault";
+  return is_fault(read) ? read.fault().reason : "no fault";
 }
 
 TEST(YoloText, ABoxIsCentreAndSizeAsShares) {
   const std::string text = "1 0.5 0.5 0.25 0.2\r\n\n0 0 1 0.5 1";
   const auto read = parse_yolo_text(text, classes(), kYoloImage, "a.txt");
-  ASSERT_FALSE(is_fault(read)) << std::get<SampleFault>(read).reason;
-  const Annotation& annotation = std::get<Annotation>(read);
+  ASSERT_FALSE(is_fault(read)) << read.fault().reason;
+  const Annotation& annotation = *read;
   ASSERT_EQ(annotation.boxes.size(), 2u);
   EXPECT_EQ(annotation.boxes[0].class_id, 1);
   EXPECT_EQ(annotation.boxes[0].xyxy, (Rectangle{15, 12, 25, 18}));
@@ -67,8 +67,8 @@ TEST(YoloText, PoseLinesHaveJoints) {
   const auto read = parse_yolo_text(
       "0 0.5 0.5 1 1 0.25 0.5 2 0 0 0 1 0.2 1.000000\n0 0.5 0.5 1 1 0 0 0 0 0 0 0 0 0", schema,
       kYoloImage, "a.txt");
-  ASSERT_FALSE(is_fault(read)) << std::get<SampleFault>(read).reason;
-  const Annotation& annotation = std::get<Annotation>(read);
+  ASSERT_FALSE(is_fault(read)) << read.fault().reason;
+  const Annotation& annotation = *read;
   EXPECT_EQ(annotation.boxes.size(), 2u);
   ASSERT_EQ(annotation.persons.size(), 1u) << "nothing is annotated of the second";
   EXPECT_THAT(annotation.persons[0].joints,
@@ -86,7 +86,7 @@ TEST(YoloText, JointsWithoutVisibility) {
   EXPECT_THAT(schema.names.joint_names, ElementsAre("0", "1"));
   const auto read = parse_yolo_text("0 0.5 0.5 1 1 0.25 0.5 0 0", schema, kYoloImage, "a.txt");
   ASSERT_FALSE(is_fault(read));
-  EXPECT_THAT(std::get<Annotation>(read).persons.at(0).joints,
+  EXPECT_THAT(read->persons.at(0).joints,
               ElementsAre(Joint{{9.5, 14.5}, -1}, Joint{kMissingPoint, 0}));
 }
 
@@ -183,8 +183,8 @@ TEST_F(YoloLabels, LieWhereTheirPathsSay) {
     EXPECT_EQ(dataset->paired_frame(frame, 0).state, PairedFrame::State::kPresent) << layout.text;
     EXPECT_EQ(dataset->label_place(frame.label_key), layout.text);
     const auto read = dataset->annotation(frame.label_key);
-    ASSERT_FALSE(is_fault(read)) << std::get<SampleFault>(read).reason;
-    EXPECT_EQ(std::get<Annotation>(read).boxes.at(0).xyxy, (Rectangle{10, 7.5, 30, 22.5}));
+    ASSERT_FALSE(is_fault(read)) << read.fault().reason;
+    EXPECT_EQ(read->boxes.at(0).xyxy, (Rectangle{10, 7.5, 30, 22.5}));
     EXPECT_THAT(dataset->annotation_files(), ::testing::Contains(layout.text));
     EXPECT_THAT(dataset->annotation_files(), ::testing::SizeIs(2));
   }
@@ -202,7 +202,7 @@ TEST_F(YoloLabels, WhatIsOnOneSideAloneIsNotLost) {
   const auto& frames = dataset->labelled_frames();
   ASSERT_EQ(frames.size(), 3u);
   EXPECT_EQ(frames[1].sample_id, "2");
-  EXPECT_THAT(std::get<Annotation>(dataset->annotation(frames[1].label_key)).boxes, IsEmpty());
+  EXPECT_THAT(dataset->annotation(frames[1].label_key)->boxes, IsEmpty());
   EXPECT_EQ(frames[2].sample_id, "5");
   const PairedFrame missing = dataset->paired_frame(frames[2], 0);
   EXPECT_EQ(missing.state, PairedFrame::State::kMissing);
