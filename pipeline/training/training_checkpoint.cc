@@ -108,8 +108,7 @@ void check_resumable(std::map<std::string, std::string> before,
        {TrainingPhase::kFlow, TrainingPhase::kReconstruction, TrainingPhase::kGenerator}) {
     const std::int64_t steps = steps_of(manifest.steps, phase);
     const LossWeights& losses = manifest.losses;
-    const bool fades =
-        manifest.network.sensor && (losses.volume != 0 || losses.count != 0 || losses.overlap != 0);
+    const bool fades = manifest.network.sensor && has_loss(losses, LossKind::kDirect);
     const bool falls =
         manifest.optimizer.final_rate_fraction != 1 ||
         (phase == TrainingPhase::kGenerator && (manifest.network.output_slope != 0 || fades));

@@ -38,9 +38,8 @@ void check_batch(const TrainingManifest& manifest) {
 void check_generator_phase(const TrainingManifest& manifest) {
   const LossWeights& weights = manifest.losses;
   if (manifest.steps.generator == 0) return;
-  if (weights.adversarial == 0 && weights.flow == 0 && weights.reconstruction == 0 &&
-      weights.volume == 0 && weights.count == 0 && weights.overlap == 0 &&
-      weights.likelihood == 0 && weights.block_likelihood == 0) {
+  if (std::ranges::none_of(kLossTerms,
+                           [&](const LossTerm& term) { return weights.*term.weight != 0; })) {
     throw UsageError("expected a loss for the generator, got weight 0 for all, in " +
                      manifest.name);
   }
@@ -191,8 +190,10 @@ struct Trainer::Learners {
     if (!manifest.network.sensor) return weights;
     // Until the end, where the learning rate is low: before, the likelihood alone unlearns what
     // they have taught.
-    for (double* const direct : {&weights.volume, &weights.count, &weights.overlap}) {
-      *direct = faded(*direct, step, double(manifest.steps.generator));
+    for (const LossTerm& term : kLossTerms) {
+      if (term.kind != LossKind::kDirect) continue;
+      double& weight = weights.*term.weight;
+      weight = faded(weight, step, double(manifest.steps.generator));
     }
     return weights;
   }

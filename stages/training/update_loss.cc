@@ -3,6 +3,11 @@
 #include <ATen/Functions.h>
 #include <ATen/core/grad_mode.h>
 
+#include <algorithm>
+#include <array>
+#include <ranges>
+#include <string>
+
 #include "manifests/values/counter_random.h"
 #include "stages/training/losses.h"
 
@@ -39,6 +44,42 @@ at::Tensor flipped_labels(const at::Tensor& logits, const TrainingManifest& mani
   }
   return flipped.to(logits.device());
 }
+
+/// The functions of the losses that compare volumes, in the order of kLossTerms.
+struct VolumeLoss {
+  double LossWeights::*weight;
+  at::Tensor (*of)(const at::Tensor& volume, const TrainingBatch& batch,
+                   const LossWeights& weights);
+};
+constexpr std::array kVolumeLosses{
+    VolumeLoss{
+        &LossWeights::volume,
+        [](const at::Tensor& volume, const TrainingBatch& batch, const LossWeights& weights) {
+          return volume_loss(volume, batch.volume, weights.quantile);
+        }},
+    VolumeLoss{
+        &LossWeights::count,
+        [](const at::Tensor& volume, const TrainingBatch& batch, const LossWeights& weights) {
+          return count_loss(volume, batch.volume, weights.quantile);
+        }},
+    VolumeLoss{&LossWeights::overlap,
+               [](const at::Tensor& volume, const TrainingBatch& batch, const LossWeights&) {
+                 return overlap_loss(volume, batch.volume);
+               }},
+    VolumeLoss{&LossWeights::likelihood,
+               [](const at::Tensor& volume, const TrainingBatch& batch, const LossWeights&) {
+                 return likelihood_loss(volume, batch.expected);
+               }},
+    VolumeLoss{&LossWeights::block_likelihood,
+               [](const at::Tensor& volume, const TrainingBatch& batch, const LossWeights&) {
+                 return block_likelihood_loss(volume, batch.expected);
+               }}};
+static_assert(std::ranges::equal(kVolumeLosses,
+                                 kLossTerms | std::views::drop_while([](const LossTerm& term) {
+                                   return term.kind == LossKind::kPaper;
+                                 }),
+                                 {}, &VolumeLoss::weight, &LossTerm::weight),
+              "each loss of kLossTerms behind the paper's has its function here");
 
 }  // namespace
 
@@ -98,25 +139,12 @@ UpdateLoss generator_update(TrainingNetworks& networks, const TrainingBatch& bat
     loss.total = loss.total +
                  weights.reconstruction * add_reconstruction_loss(networks, batch, volume, loss);
   }
-  if (weights.volume != 0) {
-    loss.parts["volume"] = volume_loss(volume, batch.volume, weights.quantile);
-    loss.total = loss.total + weights.volume * loss.parts["volume"];
-  }
-  if (weights.count != 0) {
-    loss.parts["count"] = count_loss(volume, batch.volume, weights.quantile);
-    loss.total = loss.total + weights.count * loss.parts["count"];
-  }
-  if (weights.overlap != 0) {
-    loss.parts["overlap"] = overlap_loss(volume, batch.volume);
-    loss.total = loss.total + weights.overlap * loss.parts["overlap"];
-  }
-  if (weights.likelihood != 0) {
-    loss.parts["likelihood"] = likelihood_loss(volume, batch.expected);
-    loss.total = loss.total + weights.likelihood * loss.parts["likelihood"];
-  }
-  if (weights.block_likelihood != 0) {
-    loss.parts["block_likelihood"] = block_likelihood_loss(volume, batch.expected);
-    loss.total = loss.total + weights.block_likelihood * loss.parts["block_likelihood"];
+  for (const VolumeLoss& each : kVolumeLosses) {
+    if (weights.*each.weight == 0) continue;
+    const auto term = std::ranges::find(kLossTerms, each.weight, &LossTerm::weight);
+    const at::Tensor part = each.of(volume, batch, weights);
+    loss.parts[std::string(term->word)] = part;
+    loss.total = loss.total + weights.*each.weight * part;
   }
   loss.parts["generator.total"] = loss.total;
   return loss;
