@@ -1,5 +1,7 @@
 #include "manifests/documents/training_manifest.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "manifests/documents/detail/document_tables.h"
@@ -25,23 +27,23 @@ Numbers rates() { return numbers(1e-9, 1); }
 Numbers factors() { return numbers(0, 1e6); }
 Numbers shares() { return numbers(0, 1); }
 
-/// Recordings that may have frames: the first of all formats.
-constexpr std::array kFormatWords{kRecordingFormatWords[0], kRecordingFormatWords[1],
-                                  kRecordingFormatWords[2], kRecordingFormatWords[3],
-                                  kRecordingFormatWords[4]};
-static_assert(kFormatWords.back().value == RecordingFormat::kDsec);
+/// "mvsec: HDF5 as ... write it. eventgan: ..."
+std::string summaries() {
+  std::string text;
+  for (const RecordingFormatRow& row : kFrameFormats) {
+    text += fmt::format("{}{}: {}.", text.empty() ? "" : " ", row.word, row.summary);
+  }
+  return text;
+}
 
 void list_recording(Fields& fields, RecordingSpec& spec) {
-  using enum RecordingFormat;
   fields.at("path", spec.path, paths(), "The file; for ecd a folder.");
-  fields.kind_at("format", spec.format, words(kFormatWords),
-                 "mvsec: HDF5 as MVSEC and `eventgan simulate` write it. eventgan: HDF5 of the "
-                 "EventGAN authors. ecd: a folder with images.txt and events.txt. aedat4: of a "
-                 "DAVIS, with frames. dsec: DSEC's events.h5, with images of the events' view.");
-  fields.only_for({kMvsec}).find("camera", spec.options.camera, stereo_cameras(),
-                                 "which of the two cameras.");
-  fields.only_for({kDsec}).find("rectify", spec.options.rectify, booleans(),
-                                "moves events by its rectify_map.h5.");
+  RecordingFormat format = spec.format.value_or(RecordingFormat::kMvsec);
+  fields.kind_at("format", format, words(kFrameFormatWords), summaries());
+  spec.format = format;
+  Fields::Only some = fields.taken_by(kFrameFormats);
+  some.find("camera", spec.options.camera, stereo_cameras(), "which of the two cameras.");
+  some.find("rectify", spec.options.rectify, booleans(), "moves events by its rectify_map.h5.");
   fields.find("weight", spec.weight, numbers(1e-6, 1e6),
               "Relative chance of a sample to come from here.");
   fields.find("first_frame", spec.first_frame, integers(0, kMostFrames),

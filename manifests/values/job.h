@@ -97,12 +97,12 @@ struct EventFields {
   bool operator==(const EventFields&) const = default;
 };
 
-/// What a recording of events does not tell of itself.
+/// What a recording of events does not tell of itself; which counts, its format's row says.
 struct RecordingOptions {
-  std::string camera = "left";           ///< mvsec, m3ed: "left" or "right"
-  bool rectify = false;                  ///< dsec: events through its rectify_map.h5
-  std::optional<ImageSize> sensor = {};  ///< table, prophesee: where the file does not tell it
-  EventFields columns = {};              ///< table
+  std::string camera = "left";           ///< "left" or "right", of two
+  bool rectify = false;                  ///< events through a map of the lens
+  std::optional<ImageSize> sensor = {};  ///< where the file does not tell it
+  EventFields columns = {};
   bool operator==(const RecordingOptions&) const = default;
 };
 

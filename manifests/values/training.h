@@ -11,26 +11,15 @@
 
 #include "manifests/values/frames.h"
 #include "manifests/values/job.h"
+#include "manifests/values/recording_formats.h"
 #include "manifests/values/sensor_input.h"
 
 namespace eventgan {
 
-/// How an event recording lies on disk (manifests/guides/training.md).
-enum class RecordingFormat {
-  kMvsec,     ///< HDF5: davis/left/{events [N,4] x y t p, image_raw, image_raw_ts, ...}
-  kEventgan,  ///< HDF5 of the EventGAN authors: davis/{events/data, image_raw/...}
-  kEcd,       ///< folder with images.txt and events.txt
-  kAedat4,    ///< iniVation's AEDAT 4: events, and frames of a DAVIS
-  kDsec,      ///< HDF5: events/{x,y,t,p}, ms_to_idx, t_offset; images with timestamps.txt beside it
-  kM3ed,      ///< HDF5: prophesee/left/{x,y,t,p,ms_map_idx}, ovc/gray/data
-  kProphesee,  ///< RAW of EVT 2 or EVT 3, or DAT: no frames
-  kTable       ///< .npy, .npz or .csv with a row or an element for each event: no frames
-};
-
 /// A recording that training or validation draws frame pairs from.
 struct RecordingSpec {
-  std::string path;  ///< as written in the manifest
-  RecordingFormat format = RecordingFormat::kMvsec;
+  std::string path;                       ///< as written in the manifest
+  std::optional<RecordingFormat> format;  ///< none: found out
   RecordingOptions options;
   double weight = 1;                       ///< relative chance of a sample to come from here, > 0
   std::int64_t first_frame = 0;            ///< frames before are not used

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "manifests/values/job.h"
+#include "manifests/values/recording_formats.h"
 #include "manifests/values/simulation.h"
 #include "manifests/values/training.h"
 
@@ -107,15 +108,8 @@ inline constexpr std::array kSimulationMethodWords{
 
 // The training manifest's words, in the order in which messages list them.
 
-inline constexpr std::array kRecordingFormatWords{
-    Word<RecordingFormat>{"mvsec", RecordingFormat::kMvsec},
-    Word<RecordingFormat>{"eventgan", RecordingFormat::kEventgan},
-    Word<RecordingFormat>{"ecd", RecordingFormat::kEcd},
-    Word<RecordingFormat>{"aedat4", RecordingFormat::kAedat4},
-    Word<RecordingFormat>{"dsec", RecordingFormat::kDsec},
-    Word<RecordingFormat>{"m3ed", RecordingFormat::kM3ed},
-    Word<RecordingFormat>{"prophesee", RecordingFormat::kProphesee},
-    Word<RecordingFormat>{"table", RecordingFormat::kTable}};
+inline constexpr auto kRecordingFormatWords = words_of(kRecordingFormats);
+inline constexpr auto kFrameFormatWords = words_of(kFrameFormats);
 
 inline constexpr std::array kSpectralNormWords{
     Word<SpectralNormPlace>{"decoders", SpectralNormPlace::kDecoders},

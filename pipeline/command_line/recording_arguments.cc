@@ -1,31 +1,23 @@
 #include "pipeline/command_line/recording_arguments.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
-#include <filesystem>
+#include <map>
+#include <string_view>
 #include <utility>
 
 #include "manifests/documents/training_manifest.h"
 #include "manifests/values/faults.h"
-#include "manifests/values/words.h"
+#include "manifests/values/recording_formats.h"
+#include "pipeline/command_line/detail/usage.h"
 #include "pipeline/command_line/standard_streams.h"
 
 namespace eventgan {
 namespace {
-
-/// As told, else by what is there.
-RecordingFormat format_of(const RecordingArguments& arguments, const std::string& recording) {
-  for (const auto& [word, format] : kRecordingFormatWords) {
-    if (arguments.format == word) return format;
-  }
-  const bool is_folder = std::filesystem::is_directory(recording);
-  RecordingOptions options;
-  options.camera = arguments.camera;
-  return find_recording_format(recording, options)
-      .value_or(is_folder ? RecordingFormat::kEcd : RecordingFormat::kMvsec);
-}
 
 std::int64_t frame_in(const std::string& text, const std::string& expected) {
   std::int64_t value = 0;
@@ -51,11 +43,16 @@ void read_frame_range(const std::string& text, RecordingSpec& spec) {
 void add_recording_options(CLI::App& command, RecordingArguments& arguments,
                            const std::string& recordings_text) {
   command.add_option("RECORDING", arguments.recordings, recordings_text)->required();
+  std::map<std::string, RecordingFormat> formats;
+  std::vector<std::string_view> with_camera;
+  for (const RecordingFormatRow& row : kFrameFormats) {
+    formats.emplace(row.word, row.value);
+    if (takes(row, "camera")) with_camera.push_back(row.word);
+  }
+  take_one_of(command.add_option("--format", arguments.format, "Default: detected"), formats);
   command
-      .add_option("--format", arguments.format,
-                  "mvsec, eventgan, ecd, aedat4 or dsec; default: detected")
-      ->check(CLI::IsMember({"mvsec", "eventgan", "ecd", "aedat4", "dsec"}));
-  command.add_option("--camera", arguments.camera, "For mvsec: left (default) or right")
+      .add_option("--camera", arguments.camera,
+                  fmt::format("For {}: left (default) or right", fmt::join(with_camera, ", ")))
       ->check(CLI::IsMember({"left", "right"}));
   command.add_option("--frames", arguments.frames, "Range of frames, FIRST:LAST; default: all");
 }
@@ -83,7 +80,7 @@ std::vector<RecordingSpec> wanted_parts(const RecordingArguments& arguments) {
     }
     RecordingSpec& part = parts.emplace_back();
     part.path = argument;
-    part.format = format_of(arguments, argument);
+    part.format = arguments.format;
     part.options.camera = arguments.camera;
     if (!arguments.frames.empty()) read_frame_range(arguments.frames, part);
   }

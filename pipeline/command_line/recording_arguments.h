@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,7 @@ namespace eventgan {
 /// Recordings as commands that compare frames with events take them.
 struct RecordingArguments {
   std::vector<std::string> recordings;
-  std::string format;
+  std::optional<RecordingFormat> format;  ///< none: found out
   std::string camera = "left";
   std::string frames;
 };

@@ -132,10 +132,7 @@ int run(TradeoffArguments& arguments) {
                                         : manifest.directory / (manifest.name + "-tradeoff");
   std::filesystem::create_directories(out);  // before minutes of measuring
   for (const std::string& real : arguments.real) {
-    const bool is_folder = std::filesystem::is_directory(real);
-    options.real.push_back(open_recording(
-        real, find_recording_format(real).value_or(is_folder ? RecordingFormat::kEcd
-                                                             : RecordingFormat::kMvsec)));
+    options.real.push_back(open_recording(real));
     if (options.real.back()->frame_count() == 0) {
       throw InputError("expected a recording with frames, got one without, in " + real);
     }

@@ -44,9 +44,7 @@ Outcome<ColourFrame> decode_recorded(const fs::path& folder, const SourceSpec* s
         path.string()};
   }
   if (!last.recording || last.path != path || last.options != source->recording) {
-    const auto format =
-        find_recording_format(path, source->recording).value_or(RecordingFormat::kMvsec);
-    last = {path, source->recording, open_recording(path, format, source->recording)};
+    last = {path, source->recording, open_recording(path, {}, source->recording)};
   }
   const GreyImage grey = last.recording->frame(frame.video_frame);
   ColourFrame colour{grey.size, {}};

@@ -16,6 +16,7 @@
 #include "manifests/values/faults.h"
 #include "stages/recordings/detail/ecd_event_file.h"
 #include "stages/recordings/detail/frame_intervals.h"
+#include "stages/recordings/detail/recording_reader.h"
 
 namespace eventgan {
 namespace {
@@ -510,14 +511,6 @@ class Aedat4Frames final : public FrameStore {
 
 }  // namespace
 
-bool is_aedat4(const std::filesystem::path& path) try {
-  const RandomAccessFile file(path);
-  constexpr auto kLine = static_cast<std::int64_t>(kFirstLine.size());
-  return file.size_bytes() >= kLine && file.read(0, kLine) == kFirstLine;
-} catch (const InputError&) {
-  return false;
-}
-
 StoredParts open_aedat4(const std::filesystem::path& path) {
   const auto file = std::make_shared<Aedat4File>(path);
   const Header header = read_header(*file);
@@ -557,5 +550,12 @@ StoredParts open_aedat4(const std::filesystem::path& path) {
   if (!frames->times_s().empty()) parts.frames = std::move(frames);
   return parts;
 }
+
+constinit const RecordingReader kAedat4Reader{
+    .format = RecordingFormat::kAedat4,
+    .fits = [](const RecordingInput& input,
+               const RecordingOptions&) { return input.beginning().starts_with(kFirstLine); },
+    .open = [](const std::filesystem::path& path,
+               const RecordingOptions&) { return make_stored_recording(open_aedat4(path)); }};
 
 }  // namespace eventgan

@@ -12,11 +12,18 @@
 #include "manifests/values/text.h"
 #include "stages/base/files/input_file.h"
 #include "stages/recordings/detail/frame_intervals.h"
+#include "stages/recordings/detail/recording_reader.h"
 
 namespace eventgan {
 namespace {
 
 constexpr std::string_view kBlanks = " \t\r";
+constexpr char kEvents[] = "events.txt";
+
+std::filesystem::path event_file_of(const std::filesystem::path& path, const RecordingOptions&) {
+  std::error_code ignored;
+  return std::filesystem::exists(path / kEvents, ignored) ? path / kEvents : path;
+}
 
 /// A recording is one folder: what its list names lies in it.
 bool leaves_folder(const std::filesystem::path& path) {
@@ -100,7 +107,7 @@ EcdRecording::EcdRecording(const std::filesystem::path& folder)
 
 EcdRecording::EcdRecording(const std::filesystem::path& folder, const EcdImageList& images)
     : name_(folder.string()),
-      events_(folder / "events.txt"),
+      events_(folder / kEvents),
       frames_(files_of(folder, images), images.times_s),
       boundaries_(images.times_s.size()) {}
 
@@ -143,5 +150,21 @@ std::optional<FlowField> EcdRecording::flow(std::int64_t index) const {
 std::int64_t EcdRecording::first_byte_after(std::size_t frame) const {
   return boundaries_.at(frame, [&] { return events_.first_byte_after(frames_.times_s()[frame]); });
 }
+
+constinit const RecordingReader kEcdReader{
+    .format = RecordingFormat::kEcd,
+    .fits =
+        [](const RecordingInput& input, const RecordingOptions& options) {
+          return event_file_of(input.path(), options).filename() == kEvents;
+        },
+    .open = [](const std::filesystem::path& path,
+               const RecordingOptions&) -> std::unique_ptr<Recording> {
+      return std::make_unique<EcdRecording>(path.filename() == kEvents ? path.parent_path() : path);
+    },
+    .event_file = event_file_of,
+    .companions =
+        [](const std::filesystem::path& event_file, const RecordingOptions&) {
+          return std::vector{event_file.parent_path() / "images.txt"};
+        }};
 
 }  // namespace eventgan

@@ -15,6 +15,7 @@
 #include "stages/recordings/detail/frame_intervals.h"
 #include "stages/recordings/detail/hdf5_table.h"
 #include "stages/recordings/detail/image_frames.h"
+#include "stages/recordings/detail/recording_reader.h"
 #include "stages/recordings/detail/stored_recording.h"
 
 namespace eventgan {
@@ -214,10 +215,31 @@ std::vector<fs::path> images_in(const fs::path& folder) {
   return files;
 }
 
+/// SEQUENCE/events/left/events.h5, where `path` is SEQUENCE; else `path`.
+fs::path dsec_event_file(const fs::path& path, const RecordingOptions& options) {
+  fs::path file = path / "events" / options.camera / "events.h5";
+  std::error_code ignored;
+  return fs::is_regular_file(file, ignored) ? file : path;
+}
+
 /// The folder of a sequence, of its events/left/events.h5; empty for a file that lies elsewhere.
 fs::path sequence_of(const fs::path& events_file) {
   const fs::path side = events_file.parent_path();
   return side.parent_path().filename() == "events" ? side.parent_path().parent_path() : fs::path();
+}
+
+/// What of a sequence may be read beside its events.h5: timestamps.txt of the frames, if it is
+/// there, and rectify_map.h5, if the options ask for it.
+std::vector<fs::path> dsec_companions(const fs::path& events_file,
+                                      const RecordingOptions& options) {
+  std::vector<fs::path> files;
+  if (options.rectify) files.push_back(events_file.parent_path() / "rectify_map.h5");
+  const fs::path times = sequence_of(events_file) / "images" / "timestamps.txt";
+  std::error_code ignored;
+  if (!sequence_of(events_file).empty() && fs::is_regular_file(times, ignored)) {
+    files.push_back(times);
+  }
+  return files;
 }
 
 /// Images of the events' own view and size; where there are others, a note says why not.
@@ -284,28 +306,10 @@ ColumnLayout m3ed_layout(const std::string& camera) {
   return {group, group + "/ms_map_idx", "", {group + "/calib/resolution"}};
 }
 
-std::optional<fs::path> dsec_events_file(const fs::path& path, const std::string& camera) {
-  fs::path file = path / "events" / camera / "events.h5";
-  std::error_code ignored;
-  return fs::is_regular_file(file, ignored) ? std::optional(file) : std::nullopt;
-}
-
-std::vector<fs::path> dsec_companions(const fs::path& events_file,
-                                      const RecordingOptions& options) {
-  std::vector<fs::path> files;
-  if (options.rectify) files.push_back(events_file.parent_path() / "rectify_map.h5");
-  const fs::path times = sequence_of(events_file) / "images" / "timestamps.txt";
-  std::error_code ignored;
-  if (!sequence_of(events_file).empty() && fs::is_regular_file(times, ignored)) {
-    files.push_back(times);
-  }
-  return files;
-}
-
 std::unique_ptr<Recording> open_dsec_recording(const fs::path& path,
                                                const RecordingOptions& options) {
   constexpr ImageSize kDsecSize{480, 640};
-  const fs::path file = dsec_events_file(path, options.camera).value_or(path);
+  const fs::path file = dsec_event_file(path, options);
   StoredParts parts = open_columns(file, dsec_layout(), options.sensor.value_or(kDsecSize));
   const fs::path sequence = sequence_of(fs::absolute(file).lexically_normal());
   std::vector<fs::path> frames = find_frames(sequence, parts.size, options, parts.notes);
@@ -348,5 +352,24 @@ std::unique_ptr<Recording> open_m3ed_recording(const fs::path& path,
   }
   return make_stored_recording(std::move(parts));
 }
+
+constinit const RecordingReader kDsecReader{
+    .format = RecordingFormat::kDsec,
+    .fits =
+        [](const RecordingInput& input, const RecordingOptions& options) {
+          return input.is_folder() ? dsec_event_file(input.path(), options) != input.path()
+                                   : input.has_hdf5_object(dsec_layout().events + "/t");
+        },
+    .open = open_dsec_recording,
+    .event_file = dsec_event_file,
+    .companions = dsec_companions};
+
+constinit const RecordingReader kM3edReader{
+    .format = RecordingFormat::kM3ed,
+    .fits =
+        [](const RecordingInput& input, const RecordingOptions& options) {
+          return input.has_hdf5_object(m3ed_layout(options.camera).events + "/t");
+        },
+    .open = open_m3ed_recording};
 
 }  // namespace eventgan

@@ -12,6 +12,7 @@
 #include "stages/base/images/image_file.h"
 #include "stages/recordings/detail/frame_intervals.h"
 #include "stages/recordings/detail/hdf5_table.h"
+#include "stages/recordings/detail/recording_reader.h"
 #include "stages/recordings/detail/stored_recording.h"
 
 namespace eventgan {
@@ -219,5 +220,23 @@ std::unique_ptr<Recording> open_hdf5_recording(const std::filesystem::path& path
                                 .frames = std::make_unique<Frames>(tables, path.string()),
                                 .event_index = tables->event_index});
 }
+
+constinit const RecordingReader kMvsecReader{
+    .format = RecordingFormat::kMvsec,
+    .fits =
+        [](const RecordingInput& input, const RecordingOptions& options) {
+          return input.has_hdf5_object(mvsec_layout(options.camera).events);
+        },
+    .open =
+        [](const std::filesystem::path& path, const RecordingOptions& options) {
+          return open_hdf5_recording(path, mvsec_layout(options.camera));
+        }};
+
+constinit const RecordingReader kEventganReader{
+    .format = RecordingFormat::kEventgan,
+    .fits = [](const RecordingInput& input,
+               const RecordingOptions&) { return input.has_hdf5_object(eventgan_layout().events); },
+    .open = [](const std::filesystem::path& path,
+               const RecordingOptions&) { return open_hdf5_recording(path, eventgan_layout()); }};
 
 }  // namespace eventgan

@@ -12,6 +12,7 @@
 
 #include "manifests/values/faults.h"
 #include "stages/recordings/detail/ecd_event_file.h"
+#include "stages/recordings/detail/recording_reader.h"
 
 namespace eventgan {
 namespace {
@@ -99,25 +100,24 @@ void read_header_line(std::string_view key, std::string_view value, PropheseeHea
   throw InputError(fmt::format("{}, in {} (byte {})", fault, name, byte));
 }
 
+constexpr std::int64_t kMostHeaderBytes = std::int64_t{1} << 16;
+
 /// Lines "% key value", up to a line "% end" or to what is no such line.
-PropheseeHeader read_prophesee_header(const RandomAccessFile& file) {
-  constexpr std::int64_t kMostHeaderBytes = std::int64_t{1} << 16;
-  const std::string text = file.read(0, std::min(kMostHeaderBytes, file.size_bytes()));
+PropheseeHeader read_prophesee_header(std::string_view text, const std::string& name) {
   PropheseeHeader header;
   std::size_t at = 0;
   while (text.compare(at, 2, "% ") == 0) {
     const std::size_t end = text.find('\n', at);
     if (end == std::string::npos)
-      refuse_at("expected a line of text, got no end of it", file.name(),
-                static_cast<std::int64_t>(at));
-    std::string_view line(text.data() + at + 2, end - at - 2);
+      refuse_at("expected a line of text, got no end of it", name, static_cast<std::int64_t>(at));
+    std::string_view line = text.substr(at + 2, end - at - 2);
     if (line.ends_with('\r')) line.remove_suffix(1);
     const std::string_view key = line.substr(0, line.find(' '));
     const std::string_view value = line.substr(std::min(key.size() + 1, line.size()));
     try {
       read_header_line(key, value, header);
     } catch (const EventFault& fault) {
-      refuse_at(fault.what(), file.name(), static_cast<std::int64_t>(at));
+      refuse_at(fault.what(), name, static_cast<std::int64_t>(at));
     }
     at = end + 1;
     if (key == "end") break;
@@ -393,18 +393,20 @@ ImageSize sensor_size(const PropheseeHeader& header, const std::optional<ImageSi
       name);
 }
 
-}  // namespace
-
-bool is_prophesee(const std::filesystem::path& path) try {
-  return read_prophesee_header(RandomAccessFile(path)).encoding.has_value();
+/// Whether the file begins with the header of a recording of Prophesee's.
+bool is_prophesee(const RecordingInput& input, const RecordingOptions&) try {
+  return read_prophesee_header(input.beginning(), input.path().string()).encoding.has_value();
 } catch (const InputError&) {
   return false;
 }
 
+}  // namespace
+
 StoredParts open_prophesee(const std::filesystem::path& path,
                            const std::optional<ImageSize>& sensor) {
   const RandomAccessFile file(path);
-  PropheseeHeader header = read_prophesee_header(file);
+  PropheseeHeader header = read_prophesee_header(
+      file.read(0, std::min(kMostHeaderBytes, file.size_bytes())), file.name());
   if (!header.encoding) {
     throw InputError(
         "expected a header \"% Data file containing ...\", \"% evt 2.0\" or \"% evt 3.0\", got "
@@ -435,5 +437,12 @@ StoredParts open_prophesee(const std::filesystem::path& path,
   parts.events = std::move(events);
   return parts;
 }
+
+constinit const RecordingReader kPropheseeReader{
+    .format = RecordingFormat::kProphesee,
+    .fits = is_prophesee,
+    .open = [](const std::filesystem::path& path, const RecordingOptions& options) {
+      return make_stored_recording(open_prophesee(path, options.sensor));
+    }};
 
 }  // namespace eventgan

@@ -1,88 +1,101 @@
 #include "stages/recordings/recording.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <stdexcept>
+#include <string>
+#include <string_view>
 #include <system_error>
+#include <utility>
 
+#include "stages/base/files/input_file.h"
 #include "stages/base/hdf5/detail/hdf5.h"
-#include "stages/recordings/detail/aedat4_recording.h"
-#include "stages/recordings/detail/ecd_recording.h"
-#include "stages/recordings/detail/event_columns.h"
-#include "stages/recordings/detail/hdf5_recording.h"
-#include "stages/recordings/detail/prophesee_recording.h"
-#include "stages/recordings/detail/stored_recording.h"
-#include "stages/recordings/detail/table_recording.h"
+#include "stages/recordings/detail/recording_reader.h"
 
 namespace eventgan {
 
 namespace {
 
-constexpr char kEcdEvents[] = "events.txt";
+constexpr std::uint64_t kBeginningBytes = 1 << 16;
+
+/// At the file's start, or behind a user's block, at 512 bytes or twice, four times, ... as many.
+bool has_hdf5_signature(const InputFile& file) {
+  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
+  for (std::uint64_t at = 0; at + kSignature.size() <= file.size_bytes();
+       at = std::max<std::uint64_t>(2 * at, 512)) {
+    if (file.read(at, kSignature.size()) == kSignature) return true;
+  }
+  return false;
+}
+
+const RecordingReader& reader_of(RecordingFormat format) {
+  return **std::ranges::find(kRecordingReaders, format, &RecordingReader::format);
+}
 
 }  // namespace
 
+struct RecordingInput::Hdf5File {
+  Hdf5Handle file;
+};
+
+RecordingInput::RecordingInput(std::filesystem::path path) : path_(std::move(path)) {
+  std::error_code ignored;
+  is_folder_ = std::filesystem::is_directory(path_, ignored);
+  if (is_folder_) return;
+  try {
+    std::string nobody_asks;
+    const auto file = InputFile::open(path_, nobody_asks);
+    if (!file) return;
+    beginning_ = file->read(0, std::min(file->size_bytes(), kBeginningBytes));
+    if (!has_hdf5_signature(*file)) return;
+    const Hdf5Lock lock;
+    hdf5_ = std::make_unique<Hdf5File>(open_hdf5_file(path_));
+  } catch (const std::runtime_error&) {  // who opens it says why
+  }
+}
+
+RecordingInput::~RecordingInput() = default;
+
+bool RecordingInput::has_hdf5_object(const std::string& object) const {
+  const Hdf5Lock lock;
+  return hdf5_ && has_object(hdf5_->file, object);
+}
+
 std::optional<RecordingFormat> find_recording_format(const std::filesystem::path& path,
                                                      const RecordingOptions& options) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) {
-    if (std::filesystem::exists(path / kEcdEvents, ignored)) return RecordingFormat::kEcd;
-    if (dsec_events_file(path, options.camera)) return RecordingFormat::kDsec;
-    return std::nullopt;
-  }
-  if (!std::filesystem::is_regular_file(path, ignored)) return std::nullopt;
-  if (is_aedat4(path)) return RecordingFormat::kAedat4;
-  if (is_prophesee(path)) return RecordingFormat::kProphesee;
-  if (path.filename() == kEcdEvents) return RecordingFormat::kEcd;
-  if (is_event_table(path, options.columns)) return RecordingFormat::kTable;
-  const Hdf5Lock lock;
-  try {
-    const Hdf5Handle file = open_hdf5_file(path);
-    if (has_object(file, mvsec_layout(options.camera).events)) return RecordingFormat::kMvsec;
-    if (has_object(file, eventgan_layout().events)) return RecordingFormat::kEventgan;
-    if (has_object(file, m3ed_layout(options.camera).events + "/t")) return RecordingFormat::kM3ed;
-    if (has_object(file, dsec_layout().events + "/t")) return RecordingFormat::kDsec;
-  } catch (const Hdf5Error&) {  // who opens it says why
+  const RecordingInput input(path);
+  for (const RecordingReader* reader : kRecordingReaders) {
+    if (reader->fits(input, options)) return reader->format;
   }
   return std::nullopt;
 }
 
 std::filesystem::path event_file(const std::filesystem::path& path,
                                  const RecordingOptions& options) {
-  std::error_code ignored;
-  if (std::filesystem::exists(path / kEcdEvents, ignored)) return path / kEcdEvents;
-  return dsec_events_file(path, options.camera).value_or(path);
+  for (const RecordingReader* reader : kRecordingReaders) {
+    if (!reader->event_file) continue;
+    if (auto file = reader->event_file(path, options); file != path) return file;
+  }
+  return path;
 }
 
 std::vector<std::filesystem::path> event_companions(const std::filesystem::path& event_file,
                                                     const RecordingOptions& options) {
-  if (event_file.filename() == kEcdEvents) return {event_file.parent_path() / "images.txt"};
-  if (find_recording_format(event_file, options) == RecordingFormat::kDsec) {
-    return dsec_companions(event_file, options);
-  }
-  return {};
+  const auto format = find_recording_format(event_file, options);
+  const auto companions = format ? reader_of(*format).companions : nullptr;
+  return companions ? companions(event_file, options) : std::vector<std::filesystem::path>();
 }
 
-std::unique_ptr<Recording> open_recording(const std::filesystem::path& path, RecordingFormat format,
+std::unique_ptr<Recording> open_recording(const std::filesystem::path& path,
+                                          std::optional<RecordingFormat> format,
                                           const RecordingOptions& options) {
-  switch (format) {
-    case RecordingFormat::kMvsec:
-      return open_hdf5_recording(path, mvsec_layout(options.camera));
-    case RecordingFormat::kEventgan:
-      return open_hdf5_recording(path, eventgan_layout());
-    case RecordingFormat::kEcd:
-      return std::make_unique<EcdRecording>(path.filename() == kEcdEvents ? path.parent_path()
-                                                                          : path);
-    case RecordingFormat::kAedat4:
-      return make_stored_recording(open_aedat4(path));
-    case RecordingFormat::kProphesee:
-      return make_stored_recording(open_prophesee(path, options.sensor));
-    case RecordingFormat::kDsec:
-      return open_dsec_recording(path, options);
-    case RecordingFormat::kM3ed:
-      return open_m3ed_recording(path, options);
-    case RecordingFormat::kTable:
-      return open_table_recording(path, options);
+  if (!format) format = find_recording_format(path, options);
+  if (!format) {  // who opens it says why
+    std::error_code ignored;
+    format = std::filesystem::is_directory(path, ignored) ? RecordingFormat::kEcd
+                                                          : RecordingFormat::kMvsec;
   }
-  throw std::logic_error("unknown recording format");
+  return reader_of(*format).open(path, options);
 }
 
 }  // namespace eventgan

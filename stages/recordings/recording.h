@@ -73,7 +73,7 @@ class Recording {
 /// What lies at `path`, told by what is in it: a folder with events.txt (or this file) is ECD's,
 /// one with events/left/events.h5 DSEC's, an HDF5 file or an array tells by its fields' names, a
 /// CSV by its header, a file of AEDAT4 or Prophesee's by how it begins; none if it is nothing of
-/// that.
+/// that. The first format of kRecordingFormats that fits counts.
 std::optional<RecordingFormat> find_recording_format(const std::filesystem::path& path,
                                                      const RecordingOptions& options = {});
 
@@ -87,10 +87,12 @@ std::filesystem::path event_file(const std::filesystem::path& path,
 std::vector<std::filesystem::path> event_companions(const std::filesystem::path& event_file,
                                                     const RecordingOptions& options = {});
 
-/// Opens a recording: reads the frames' times and checks that everything is there and fits
-/// together; where a frame's events end is looked up when first asked for. Throws InputError
-/// "expected X, got Y, in PATH" if it is absent or not of this format.
-std::unique_ptr<Recording> open_recording(const std::filesystem::path& path, RecordingFormat format,
+/// Opens a recording of the format, or of what is found without one: reads the frames' times and
+/// checks that everything is there and fits together; where a frame's events end is looked up when
+/// first asked for. Throws InputError "expected X, got Y, in PATH" if it is absent or not of this
+/// format.
+std::unique_ptr<Recording> open_recording(const std::filesystem::path& path,
+                                          std::optional<RecordingFormat> format = std::nullopt,
                                           const RecordingOptions& options = {});
 
 }  // namespace eventgan

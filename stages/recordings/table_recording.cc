@@ -21,6 +21,7 @@
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/archives/zip_archive.h"
 #include "stages/base/files/input_file.h"
+#include "stages/recordings/detail/recording_reader.h"
 #include "stages/recordings/detail/stored_recording.h"
 
 namespace eventgan {
@@ -310,10 +311,10 @@ class TableStore final : public EventStore {
   std::int64_t count_;
 };
 
-}  // namespace
-
-bool is_event_table(const fs::path& path, const EventFields& columns) try {
-  const std::array<std::string, kColumns> names = names_of(columns);
+/// By its header.
+bool is_event_table(const RecordingInput& input, const RecordingOptions& options) try {
+  const fs::path& path = input.path();
+  const std::array<std::string, kColumns> names = names_of(options.columns);
   if (path.extension() == ".npz") {
     const ZipArchive archive(path);
     return std::ranges::all_of(
@@ -321,23 +322,22 @@ bool is_event_table(const fs::path& path, const EventFields& columns) try {
   }
   const bool is_npy = path.extension() == ".npy";
   if (!is_npy && path.extension() != ".csv") return false;
-  constexpr std::uint64_t kLongestHeader = 1 << 16;
-  const InputFile file(path);
-  const std::vector<std::byte> bytes =
-      file.read_bytes(0, std::min(file.size_bytes(), kLongestHeader));
+  const std::string_view text = input.beginning();
   if (is_npy) {
     std::size_t begin = 0;
-    const NumpyLayout layout = parse_npy_header(bytes, path.string(), begin);
+    const NumpyLayout layout =
+        parse_npy_header(std::as_bytes(std::span(text)), path.string(), begin);
     if (layout.fields.empty()) return layout.shape.size() == 2 && layout.shape[1] == kColumns;
     return std::ranges::all_of(names, [&](const std::string& name) {
       return std::ranges::find(layout.fields, name, &NumpyField::name) != layout.fields.end();
     });
   }
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  return find_columns(text.substr(0, text.find('\n')), columns).has_value();
+  return find_columns(text.substr(0, text.find('\n')), options.columns).has_value();
 } catch (const std::runtime_error&) {  // who opens it says why
   return false;
 }
+
+}  // namespace
 
 std::unique_ptr<Recording> open_table_recording(const fs::path& path,
                                                 const RecordingOptions& options) {
@@ -351,5 +351,8 @@ std::unique_ptr<Recording> open_table_recording(const fs::path& path,
                                 .size = *options.sensor,
                                 .events = std::make_unique<TableStore>(path, options.columns)});
 }
+
+constinit const RecordingReader kTableReader{
+    .format = RecordingFormat::kTable, .fits = is_event_table, .open = open_table_recording};
 
 }  // namespace eventgan

@@ -1,6 +1,6 @@
 #include "stages/frames/events/recording_dataset.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +11,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <string>
 #include <string_view>
@@ -259,10 +260,10 @@ class RecordingDataset final : public Dataset {
       return;
     }
     const auto refuse = [&] {
-      throw InputError(
-          "expected a recording of an event camera (AEDAT4, RAW, DAT, DSEC, ECD, EventGAN, M3ED, "
-          "MVSEC, a table of events), or a folder of them, got none, in " +
-          root.string());
+      const auto titles = kRecordingFormats | std::views::transform(&RecordingFormatRow::title);
+      throw InputError(fmt::format(
+          "expected a recording of an event camera ({}), or a folder of them, got none, in {}",
+          fmt::join(titles, ", "), root.string()));
     };
     if (fs::is_regular_file(root)) refuse();
     const SourceRoot folder(spec.root, base);
@@ -357,8 +358,7 @@ class RecordingDataset final : public Dataset {
       if (beside.has_parent_path()) written = written.lexically_normal();  // left/../../images
       annotation_files_.push_back(written.generic_string());
     }
-    const auto format = find_recording_format(path, options_);
-    recorded.recording = open_recording(path, format.value_or(RecordingFormat::kMvsec), options_);
+    recorded.recording = open_recording(path, {}, options_);
     const Recording& recording = *recorded.recording;
     for (std::int64_t i = 0; i < recording.frame_count(); ++i) {
       recorded.frame_times_s.push_back(recording.frame_time_s(i));

@@ -6,9 +6,6 @@
 
 namespace eventgan {
 
-/// Whether the file begins as AEDAT 4.0 does. Thread safe.
-bool is_aedat4(const std::filesystem::path& path);
-
 /// A recording in AEDAT 4.0, as iniVation's DV and dv-processing write it: one stream of events, at
 /// most one of frames; others (IMU, triggers) are passed over. Packets are unpacked one at a time
 /// (LZ4, Zstandard or not packed); only where they are stays in memory.

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,15 +26,6 @@ ColumnLayout dsec_layout();
 
 /// M3ED's, of one camera: "left" or "right".
 ColumnLayout m3ed_layout(const std::string& camera);
-
-/// SEQUENCE/events/left/events.h5 of DSEC, where `path` is SEQUENCE; else none.
-std::optional<std::filesystem::path> dsec_events_file(const std::filesystem::path& path,
-                                                      const std::string& camera);
-
-/// What of a DSEC sequence may be read beside its events.h5: timestamps.txt of the frames, if it is
-/// there, and rectify_map.h5, if the options ask for it.
-std::vector<std::filesystem::path> dsec_companions(const std::filesystem::path& events_file,
-                                                   const RecordingOptions& options);
 
 /// `path` is a sequence's folder, or its events.h5. The sensor is what the file says, else the
 /// options', else 640x480.

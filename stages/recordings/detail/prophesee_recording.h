@@ -7,9 +7,6 @@
 
 namespace eventgan {
 
-/// Whether the file begins with the header of a recording of Prophesee's. Thread safe.
-bool is_prophesee(const std::filesystem::path& path);
-
 /// The events of a recording of Prophesee's cameras, without frames: DAT of version 2, or RAW in
 /// EVT 2.0 or EVT 3.0, little-endian, as docs.prophesee.ai describes them.
 ///

@@ -7,12 +7,9 @@
 
 namespace eventgan {
 
-/// Whether the file is a table of events by its header: .npy with a structured array that has the
-/// fields t, x, y and p, or [N, 4] numbers; .npz with arrays of these names; .csv whose header line
-/// has them. The names are the options'.
-bool is_event_table(const std::filesystem::path& path, const EventFields& columns);
-
-/// Such a table: an element, or a line, for each event, in time order. Of an array [N, 4] the
+/// A table of events: .npy with a structured array that has the fields t, x, y and p, or [N, 4]
+/// numbers; .npz with arrays of these names; .csv whose header line has them. The names are the
+/// options'. There is an element, or a line, for each event, in time order. Of an array [N, 4] the
 /// columns are t, x, y and p; a name in the options that is a number 0..3 is another column.
 /// Everything else in the file is passed over. The sensor's size is the options'. There are no
 /// frames.
