@@ -32,7 +32,6 @@ class TableRecordingTest : public ::testing::Test {
 
   void holds_the_events(const std::string& name) {
     SCOPED_TRACE(name);
-    EXPECT_TRUE(is_event_table(folder_ / name, options_.columns));
     EXPECT_EQ(find_recording_format(folder_ / name, options_), RecordingFormat::kTable);
     const auto recording = open(name);
     EXPECT_EQ(recording->size(), (ImageSize{3, 4}));
@@ -101,7 +100,7 @@ TEST_F(TableRecordingTest, IsAnArchiveOfArrays) {
   const std::string p = npy_file("|u1", {3}, std::vector<std::uint8_t>{1, 0, 1});
   testing::write_zip(folder_ / "a.npz",
                      {{"t_us.npy", t, true}, {"x.npy", x}, {"y.npy", y}, {"p.npy", p}});
-  EXPECT_FALSE(is_event_table(folder_ / "a.npz", options_.columns));
+  EXPECT_EQ(find_recording_format(folder_ / "a.npz", options_), std::nullopt);
   EXPECT_THAT([&] { open("a.npz"); },
               ThrowsMessage<InputError>(HasSubstr("expected an array \"t\", got none")));
   options_.columns.t = "t_us";
@@ -127,7 +126,7 @@ TEST_F(TableRecordingTest, IsATextWithAHeader) {
 }
 
 TEST_F(TableRecordingTest, LabelsAndOtherArraysAreNoTables) {
-  const EventFields columns;
+  const RecordingOptions options;
   testing::write_file(folder_ / "labels.csv", "time_s,left,top,right,bottom,class\n");
   testing::write_file(folder_ / "twice.csv", "t,x,y,p,t\n");
   testing::write_file(folder_ / "matrix.npy",
@@ -136,7 +135,7 @@ TEST_F(TableRecordingTest, LabelsAndOtherArraysAreNoTables) {
   testing::write_file(folder_ / "broken.npz", "PK");
   for (const char* name :
        {"labels.csv", "twice.csv", "matrix.npy", "broken.npy", "broken.npz", "absent.npy"}) {
-    EXPECT_FALSE(is_event_table(folder_ / name, columns)) << name;
+    EXPECT_EQ(find_recording_format(folder_ / name, options), std::nullopt) << name;
   }
 }
 
