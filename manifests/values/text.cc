@@ -21,8 +21,8 @@ std::string plural_of(const std::string& noun) {
 
 }  // namespace
 
-std::string count_text(std::int64_t count, const std::string& noun) {
-  return std::to_string(count) + " " + (count == 1 ? noun : plural_of(noun));
+std::string count_text(std::int64_t count, const std::string& noun, const std::string& rest) {
+  return std::to_string(count) + " " + (count == 1 ? noun : plural_of(noun)) + rest;
 }
 
 std::string bytes_text(std::int64_t bytes) {

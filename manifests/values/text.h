@@ -15,8 +15,8 @@ namespace eventgan {
 // How messages and pages write what many of them have. Thread safe.
 
 /// "1 pair", "2 pairs"; "2 boxes", "2 batches", "2 entries". Every count in a message goes through
-/// it; what follows the noun stands behind: count_text(count, "file") + " left out".
-std::string count_text(std::int64_t count, const std::string& noun);
+/// it. `rest` follows the noun: count_text(2, "file", " left out") is "2 files left out".
+std::string count_text(std::int64_t count, const std::string& noun, const std::string& rest = "");
 
 /// "12.3 MB": three digits, in the largest of TB, GB, MB and kB that is not above it; below 1 kB
 /// "45 bytes".

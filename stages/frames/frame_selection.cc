@@ -84,8 +84,8 @@ FrameSelection select_frames(const std::vector<LabelledFrame>& frames, const Sou
   const auto alone = std::ranges::count_if(
       selected, [](const LabelledFrame& frame) { return frame.sequence.empty(); });
   if (alone > 0 && (first > 0 || last < 1)) {
-    result.notes.push_back(std::to_string(alone) +
-                           " labelled frames without a sequence count by themselves (fraction)");
+    result.notes.push_back(count_text(alone, "labelled frame",
+                                      " without a sequence, each drawn by itself (fraction)"));
   }
   std::erase_if(selected, [&, first = first, last = last](const LabelledFrame& frame) {
     const double place = random.keyed(group_of(spec.dataset, frame)).uniform(0);

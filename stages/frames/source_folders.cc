@@ -9,8 +9,9 @@
 
 namespace eventgan {
 
-std::string counted(const std::vector<std::string>& names, const std::string& what) {
-  const std::string text = std::to_string(names.size()) + " " + what;
+std::string counted(const std::vector<std::string>& names, const std::string& noun,
+                    const std::string& rest) {
+  const std::string text = count_text(std::ssize(names), noun, rest);
   return names.empty() ? text : text + ": " + some_of(names, 20);
 }
 

@@ -17,8 +17,9 @@ struct FolderListing {
 };
 
 /// What a note says of some files: "2 labels without an image in clip: a.json, b.json". After
-/// twenty names "..." stands for the others. `what` is what they are, and where.
-std::string counted(const std::vector<std::string>& names, const std::string& what);
+/// twenty names "..." stands for the others. `noun` and `rest` as in count_text.
+std::string counted(const std::vector<std::string>& names, const std::string& noun,
+                    const std::string& rest);
 
 /// Lists a folder, once; nothing if it is absent. Throws InputError if it cannot be listed.
 FolderListing list_folder(const std::filesystem::path& folder);

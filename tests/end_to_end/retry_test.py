@@ -237,7 +237,7 @@ class ChangedInputs(program.InFolder):
             json.dumps(program.manifest([{"dataset": "frames", "root": "clips", "pairs": program.pairs([1])}])))
         out = self.folder / "out"
         subprocess.run([program.PROGRAM, "convert", manifest, "--output", out], check=True, capture_output=True)
-        self.assertIn("1 files left out in clips/a: caf\ufffd.txt", run("status", out)[0])
+        self.assertIn("1 file left out in clips/a: caf\ufffd.txt", run("status", out)[0])
         foreign.unlink()
         save_image(self.folder / "clips" / "b" / "000.png", random)
         _, err = run("convert", manifest, "--output", out, expect=64)

@@ -285,7 +285,7 @@ class RecordingDataset final : public Dataset {
     }
     if (recordings_.empty()) refuse();
     if (!left_out.empty()) {
-      notes_.push_back(counted(left_out, "files and folders left out in " + folder.written("")));
+      notes_.push_back(counted(left_out, "entry", " left out in " + folder.written("")));
     }
     default_labels_ = root;
   }
@@ -330,7 +330,7 @@ class RecordingDataset final : public Dataset {
       return true;
     });
     if (!without.empty()) {
-      notes_.push_back(counted(without, "recordings without labels left out in " + spec.root));
+      notes_.push_back(counted(without, "recording", " without labels left out in " + spec.root));
     }
   }
 

@@ -15,6 +15,7 @@
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/archives/zip_archive.h"
 #include "stages/frames/human36m/detail/human36m_dataset.h"
@@ -260,7 +261,7 @@ std::map<std::string, NumberedSequence> stored_in(const SourceRoot& root, const 
     left_out.push_back(file);
   }
   if (!left_out.empty()) {
-    dataset.add_note(counted(left_out, "images left out in " + root.written(folder)));
+    dataset.add_note(counted(left_out, "image", " left out in " + root.written(folder)));
   }
   std::map<std::string, NumberedSequence> sequences;
   for (const auto& [sequence, files] : names) {
@@ -292,8 +293,8 @@ void add_videos(const SourceRoot& root, const std::map<std::string, Video>& vide
     }
   }
   if (!without_labels.empty()) {
-    dataset.add_note(std::to_string(without_labels.size()) +
-                     " folders of images without labels, the first " + without_labels.front());
+    dataset.add_note(count_text(std::ssize(without_labels), "folder",
+                                " of images without labels, the first " + without_labels.front()));
   }
 }
 
@@ -306,8 +307,8 @@ std::unique_ptr<Dataset> open_human36m_extracted(const SourceSpec& spec,
   const Annotations annotations = choose_annotations(spec, base, root);
   auto dataset = std::make_unique<IndexedDataset>();
   if (!annotations.left_out.empty()) {  // one that is damaged may be the one that was meant
-    dataset->add_note(
-        counted(annotations.left_out, "annotation files left out beside " + annotations.written));
+    dataset->add_note(counted(annotations.left_out, "annotation file",
+                              " left out beside " + annotations.written));
   }
 
   auto table = std::make_unique<NpzTable>(annotations.on_disk, annotations.written,

@@ -12,6 +12,7 @@
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "stages/base/archives/detail/typed_array.h"
 #include "stages/base/archives/hdf5_arrays.h"
 #include "stages/frames/human36m/detail/camera_book.h"
@@ -173,7 +174,7 @@ std::vector<std::string> add_action(const SourceRoot& root, const std::string& a
     const std::string folder = images + "/" + camera;
     auto stored = NumberedSequence::list(root.on_disk(folder), kPrefix);
     if (const auto& others = stored.left_out(); !others.empty()) {
-      dataset.add_note(counted(others, "files left out in " + root.written(folder)));
+      dataset.add_note(counted(others, "file", " left out in " + root.written(folder)));
     }
     dataset.add_take(action + "/" + camera,
                      std::make_unique<FrameFolder>(root.written(folder), kPrefix, std::move(stored),
@@ -207,8 +208,8 @@ std::unique_ptr<Dataset> open_human36m_fetch(const SourceSpec& spec,
     }
   }
   if (!without_labels.empty()) {
-    dataset->add_note(std::to_string(without_labels.size()) +
-                      " folders of images without labels, the first " + without_labels.front());
+    dataset->add_note(count_text(std::ssize(without_labels), "folder",
+                                 " of images without labels, the first " + without_labels.front()));
   }
   if (dataset->annotation_files().empty()) {
     throw InputError("expected SUBJECT/ACTION/annot.h5 files, got none, in " + root.written(""));

@@ -186,14 +186,15 @@ class OfficialLayout {
     for (const std::string& subject : root_.folders_in("")) {
       if (subject.starts_with('S')) add_subject(subject);
     }
-    const auto note = [this](const std::vector<std::string>& files, const std::string& what) {
-      if (!files.empty()) dataset_->add_note(counted(files, what));
+    const auto note = [this](const std::vector<std::string>& files, const char* noun,
+                             const char* rest) {
+      if (!files.empty()) dataset_->add_note(counted(files, noun, rest));
     };
-    note(videos_alone_, "videos without poses left out");
-    note(poses_alone_, "files of poses without a video left out");
-    note(unreadable_, "videos whose samples will be quarantined");
-    note(beyond_end_, "labelled frames beyond the end of their video left out");
-    note(without_3d_, "videos without joints in 3-D");
+    note(videos_alone_, "video", " without poses left out");
+    note(poses_alone_, "file", " of poses without a video left out");
+    note(unreadable_, "video", " whose samples will be quarantined");
+    note(beyond_end_, "video", " with labelled frames beyond the end, left out");
+    note(without_3d_, "video", " without joints in 3-D");
     if (!without_camera_.empty()) dataset_->add_note(no_intrinsics_note(without_camera_));
     if (dataset_->annotation_files().empty()) {
       throw InputError(

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "manifests/values/text.h"
 #include "stages/base/images/image_file.h"
 #include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"
@@ -110,7 +111,7 @@ class KittiObjectDataset : public Dataset {
     std::ranges::sort(annotation_files_);
     note(std::ranges::count_if(images_.labelled().frames(),
                                [&](const auto& frame) { return !labels.contains(frame.first); }),
-         "images without labels in " + root_.written("image_2"));
+         "image", " without labels in " + root_.written("image_2"));
   }
 
   const LabelSchema& label_schema() const override { return kitti_label_schema(); }
@@ -202,9 +203,9 @@ class KittiObjectDataset : public Dataset {
                                ? place->second->time_s(raw_frame->number)
                                : static_cast<double>(raw_frame->number) * kKittiFrameSeconds;
     }
-    note(unmapped, "labelled frames that " + devkit.written(kMappingFile) + " does not know");
+    note(unmapped, "labelled frame", " that " + devkit.written(kMappingFile) + " does not know");
     if (raw) {
-      note(without_drive, "labelled frames whose raw drive is missing in " + raw->written(""));
+      note(without_drive, "labelled frame", " whose raw drive is missing in " + raw->written(""));
     }
   }
 
@@ -225,8 +226,8 @@ class KittiObjectDataset : public Dataset {
         notes_.push_back("no frame of " + drive + " can be used: " + *fault);
       }
     }
-    note(std::ranges::count_if(faults, [](const auto& drive) { return !drive.second; }),
-         "drives of which no image could be compared with what " + mapping_path + " says");
+    note(std::ranges::count_if(faults, [](const auto& drive) { return !drive.second; }), "drive",
+         " of which no image could be compared with what " + mapping_path + " says");
     for (LabelledFrame& frame : frames_) {
       const auto found = faults.find(frame.sequence);
       if (found != faults.end()) frame.fault = found->second.value_or("");
@@ -285,13 +286,13 @@ class KittiObjectDataset : public Dataset {
     return parse_number<std::int64_t>(frame.sample_id).value();
   }
 
-  void note(std::int64_t count, const std::string& what) {
-    if (count > 0) notes_.push_back(std::to_string(count) + " " + what);
+  void note(std::int64_t count, const std::string& noun, const std::string& rest) {
+    if (count > 0) notes_.push_back(count_text(count, noun, rest));
   }
 
   void note_left_out(const std::vector<std::string>& names, const std::string& folder) {
     if (names.empty()) return;
-    notes_.push_back(counted(names, "files left out in " + root_.written(folder)));
+    notes_.push_back(counted(names, "file", " left out in " + root_.written(folder)));
   }
 
   SourceRoot root_;

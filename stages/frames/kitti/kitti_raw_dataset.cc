@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "manifests/values/text.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/raw_drive.h"
 #include "stages/frames/kitti/tracklets.h"
@@ -40,7 +41,7 @@ class KittiRawDataset : public Dataset {
         others.push_back(date);
       }
     }
-    note(others, "folders that are no date left out in", "");
+    note(others, "folder", " without a date's name left out in ", "");
     if (drives_.empty()) {
       throw InputError("expected DATE/DATE_drive_NNNN_sync folders, got none, in " +
                        root_.written(""));
@@ -99,7 +100,7 @@ class KittiRawDataset : public Dataset {
     const auto others =
         std::stable_partition(names.begin(), names.end(),
                               [&](const std::string& name) { return is_drive_of(name, date); });
-    note({others, names.end()}, "folders that are no drive left out in", date);
+    note({others, names.end()}, "folder", " without a drive's name left out in ", date);
     names.erase(others, names.end());
     if (names.empty()) return;
 
@@ -151,7 +152,7 @@ class KittiRawDataset : public Dataset {
     if (!drive.frames.fault().empty()) {
       notes_.push_back("no frame of " + name + " can be used: " + drive.frames.fault());
     }
-    note(drive.frames.images().left_out(), "files left out in", folder + "/image_02/data");
+    note(drive.frames.images().left_out(), "file", " left out in ", folder + "/image_02/data");
     const bool has_tracklets = drive.tracklets.has_value();
     drives_.emplace(name, std::move(drive));
     return has_tracklets;
@@ -174,13 +175,12 @@ class KittiRawDataset : public Dataset {
       return drive.frames.frame(frame).state == PairedFrame::State::kBeyond;
     });
     if (beyond == 0) return;
-    notes_.push_back(std::to_string(beyond) + " frames beyond the drive's images left out in " +
-                     path);
+    notes_.push_back(count_text(beyond, "frame", " beyond the drive's images left out in " + path));
   }
 
-  void note(const std::vector<std::string>& names, const std::string& what,
+  void note(const std::vector<std::string>& names, const std::string& noun, const std::string& rest,
             const std::string& folder) {
-    if (!names.empty()) notes_.push_back(counted(names, what + " " + root_.written(folder)));
+    if (!names.empty()) notes_.push_back(counted(names, noun, rest + root_.written(folder)));
   }
 
   SourceRoot root_;

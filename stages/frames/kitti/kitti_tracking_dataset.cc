@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "manifests/values/text.h"
 #include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/raw_drive.h"
@@ -95,8 +96,8 @@ class KittiTrackingDataset : public Dataset {
     const auto unlabelled = std::ranges::count_if(
         images, [&](const std::string& name) { return !sequences_.contains(name); });
     if (unlabelled > 0) {
-      notes_.push_back(std::to_string(unlabelled) + " sequences without labels in " +
-                       root_.written("image_02"));
+      notes_.push_back(
+          count_text(unlabelled, "sequence", " without labels in " + root_.written("image_02")));
     }
   }
 
@@ -168,7 +169,7 @@ class KittiTrackingDataset : public Dataset {
 
   void note_left_out(const std::vector<std::string>& names, const std::string& folder) {
     if (names.empty()) return;
-    notes_.push_back(counted(names, "files left out in " + root_.written(folder)));
+    notes_.push_back(counted(names, "file", " left out in " + root_.written(folder)));
   }
 
   FrameRef frame_ref(const std::string& sequence, const NumberedSequence::Place& place) const {

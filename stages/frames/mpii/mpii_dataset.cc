@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "stages/frames/mpii/detail/mpii_annotations.h"
 #include "stages/frames/mpii/mpii_frames.h"
 #include "stages/frames/source_folders.h"
@@ -89,15 +90,15 @@ class MpiiDataset final : public Dataset {
       entries_.emplace(frame.label_key, std::move(entry));
       labelled_.push_back(std::move(frame));
     }
-    const auto note = [this](std::size_t count, const std::string& what) {
-      if (count > 0) notes_.push_back(std::to_string(count) + " " + what);
+    const auto note = [this](std::int64_t count, const std::string& noun, const std::string& rest) {
+      if (count > 0) notes_.push_back(count_text(count, noun, rest));
     };
-    note(unlabelled, "images without annotation in " + places_.annotations);
-    note(other_split, "annotated images left out, not of split " + split);
-    note(alone, "annotated images without a sequence folder: they have no neighbours");
-    note(unsized, kWithoutImage);
-    note(misnamed,
-         "keyframes in a sequence not named as their image (first: " + first_misnamed + ")");
+    note(unlabelled, "image", " without annotation in " + places_.annotations);
+    note(other_split, "annotated image", " left out, not of split " + split);
+    note(alone, "annotated image", " without a sequence folder, so without neighbours");
+    note(unsized, "labelled frame", kWithoutImage);
+    note(misnamed, "keyframe",
+         " in a sequence not named as its image (first: " + first_misnamed + ")");
   }
 
   MpiiPlaces places_;

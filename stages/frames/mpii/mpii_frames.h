@@ -49,10 +49,9 @@ inline constexpr DraftHabits kMpiiHabits{
         "Images come in many shapes; letterboxing keeps each one's shape and adds borders.",
     .size = R"("width": 640, "height": 480, "fit": "letterbox")"};
 
-/// The note for the labelled frames of which is_without_image is true.
+/// What the note says of labelled frames of which is_without_image is true, after their number.
 inline constexpr const char* kWithoutImage =
-    "labelled frames of a sequence whose image is not in images: their labels are taken to be in "
-    "pixels of the frame";
+    " of a sequence whose image is not in images: labels are taken to be in pixels of the frame";
 
 /// How many pixels of the labelled frame one of the annotated image is.
 struct LabelScale {

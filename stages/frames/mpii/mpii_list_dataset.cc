@@ -16,6 +16,7 @@
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "stages/base/archives/detail/typed_array.h"
 #include "stages/base/archives/hdf5_arrays.h"
 #include "stages/base/files/input_file.h"
@@ -238,10 +239,10 @@ class MpiiListDataset final : public Dataset {
     }
     sort_samples(labelled_, file_);
     if (alone > 0) {
-      notes_.push_back(std::to_string(alone) +
-                       " images whose frame is in no sequence: they have no neighbours");
+      notes_.push_back(
+          count_text(alone, "image", " whose frame is in no sequence, so without neighbours"));
     }
-    if (unsized > 0) notes_.push_back(std::to_string(unsized) + " " + kWithoutImage);
+    if (unsized > 0) notes_.push_back(count_text(unsized, "labelled frame", kWithoutImage));
   }
 
   const LabelSchema& label_schema() const override { return mpii_label_schema(); }

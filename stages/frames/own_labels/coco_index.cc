@@ -13,6 +13,7 @@
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/source_folders.h"
 
@@ -282,7 +283,8 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
 void refuse_any(const std::vector<std::string>& names, const std::string& expected,
                 const std::string& got, const std::string& written) {
   if (names.empty()) return;
-  throw InputError("expected " + expected + ", got " + counted(names, got) + ", in " + written);
+  throw InputError("expected " + expected + ", got " + std::to_string(names.size()) + " " + got +
+                   ": " + some_of(names, 20) + ", in " + written);
 }
 
 void check_categories(CocoIndex& index, const std::string& written) {

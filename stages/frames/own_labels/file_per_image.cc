@@ -139,7 +139,7 @@ void FilePerImage::note_unused(const std::string& folder, const std::set<std::st
   }
   if (unused.empty()) return;
   notes_.push_back(
-      counted(unused, "folders of labels without images left out in " + root_.written(folder)));
+      counted(unused, "folder", " of labels without images left out in " + root_.written(folder)));
 }
 
 void FilePerImage::find_of_videos() {

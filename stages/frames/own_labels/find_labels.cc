@@ -198,7 +198,7 @@ void note_other_images(const std::vector<fs::path>& with_frames, const fs::path&
   }
   FoundSource& found = sources.front();
   if (!left_out.empty()) {
-    found.remarks.push_back("warning: " + counted(left_out, "folders of images left out"));
+    found.remarks.push_back("warning: " + counted(left_out, "folder", " of images left out"));
   }
   const std::vector<std::string> folders = frames_in(found.root, files).folders;
   if (std::ranges::find(folders, "train") == folders.end()) return;

@@ -209,7 +209,7 @@ class MotLabels : public ReadLabels {
     }
     if (!without.empty()) {
       notes_.push_back(
-          counted(without, "sequences without gt/gt.txt or gt.txt in " + root_.written("")));
+          counted(without, "sequence", " without gt/gt.txt or gt.txt in " + root_.written("")));
     }
     std::vector<std::string> unused;
     for (const std::string& name : is_file ? std::vector<std::string>() : root_.folders_in("")) {
@@ -217,8 +217,8 @@ class MotLabels : public ReadLabels {
       if (is_other && find_file(name)) unused.push_back(name);
     }
     if (!unused.empty()) {
-      notes_.push_back(
-          counted(unused, "sequences of labels without images left out in " + root_.written("")));
+      notes_.push_back(counted(unused, "sequence",
+                               " of labels without images left out in " + root_.written("")));
     }
     schema_.class_names = classes_.names();
     std::ranges::sort(annotation_files_);

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "manifests/values/text.h"
 #include "stages/frames/decoding/frame_decoder.h"
 
 namespace eventgan {
@@ -34,7 +35,7 @@ void OwnLabels::refuse_bare_names(const std::vector<std::string>& names,
                                   const std::string& labels_path) const {
   if (names.empty()) return;
   throw InputError("expected images' paths below " + source_.root.written("") + ", got " +
-                   counted(names, "bare names that several of its folders have") + ", in " +
+                   counted(names, "bare name", " that several of its folders have") + ", in " +
                    labels_path);
 }
 
@@ -42,8 +43,9 @@ void OwnLabels::note_without_label(const std::string& labels_path) {
   std::size_t without = 0;
   for (const FrameLabel& label : labels_) without += label.key.empty();
   if (without == 0) return;
-  notes_.push_back(std::to_string(without) + " of " + std::to_string(labels_.size()) +
-                   " frames have no label in " + labels_path + ": no samples, but paired frames");
+  notes_.push_back("no label for " + std::to_string(without) + " of " +
+                   count_text(std::ssize(labels_), "frame") + " in " + labels_path +
+                   ": no samples, but paired frames");
 }
 
 Outcome<ImageSize> OwnLabels::image_size(const std::string& label_key,

@@ -10,6 +10,7 @@
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "stages/frames/own_labels/detail/absent_frames.h"
 #include "stages/frames/own_labels/own_labels.h"
 #include "stages/frames/sequences/frames_dataset.h"
@@ -32,9 +33,9 @@ class ImagesDataset final : public Dataset {
   ImagesDataset(const SourceSpec& spec, const fs::path& base)
       : root_(spec.root, base), frames_per_second_(spec.frames_per_second) {
     ImageFolder top = list_image_folder(root_.on_disk(""));
-    const auto note = [this](std::size_t count, const std::string& what) {
+    const auto note = [this](std::int64_t count, const char* noun, const std::string& rest) {
       if (count == 0) return;
-      notes_.push_back(std::to_string(count) + " " + what + " in " + root_.written(""));
+      notes_.push_back(count_text(count, noun, rest + " in " + root_.written("")));
     };
     std::map<std::string, ListedSequence> listed;
     std::size_t without_images = 0;
@@ -64,9 +65,9 @@ class ImagesDataset final : public Dataset {
     } else {
       for (const auto& [sequence, folder] : listed) add_all(sequence, folder.images);
     }
-    note(is_flat ? folders.size() : 0, "folders beside the images left out");
+    note(is_flat ? std::ssize(folders) : 0, "folder", " beside the images left out");
     for (const auto& [sequence, folder] : listed) note_unused(sequence, folder);
-    note(without_images, "folders without images");
+    note(without_images, "folder", " without images");
     std::ranges::sort(labelled_, {}, &LabelledFrame::sample_id);
     std::ranges::sort(annotation_files_);
   }
@@ -198,11 +199,11 @@ class ImagesDataset final : public Dataset {
       });
       std::ranges::sort(left_out);
     }
-    if (!alone.empty()) notes_.push_back(counted(alone, "labels without an image" + place));
+    if (!alone.empty()) notes_.push_back(counted(alone, "label", " without an image" + place));
     if (!sequence.empty() && !folder.folders.empty()) {
-      notes_.push_back(counted(folder.folders, "folders left out" + place));
+      notes_.push_back(counted(folder.folders, "folder", " left out" + place));
     }
-    if (!left_out.empty()) notes_.push_back(counted(left_out, "files left out" + place));
+    if (!left_out.empty()) notes_.push_back(counted(left_out, "file", " left out" + place));
   }
 
   SourceRoot root_;

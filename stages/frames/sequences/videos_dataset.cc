@@ -16,6 +16,7 @@
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "stages/base/files/input_file.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/own_labels/detail/absent_frames.h"
@@ -103,7 +104,7 @@ class VideosDataset final : public Dataset {
       if (clips_.empty()) throw InputError(unreadable_.front());
       if (spec.labels) add_labelled(*spec.labels, base, folder);
       note_left_out(folder, std::move(left_out));
-      if (!unreadable_.empty()) notes_.push_back(counted(unreadable_, "videos left out"));
+      if (!unreadable_.empty()) notes_.push_back(counted(unreadable_, "video", " left out"));
     } else {
       const std::string name = root.filename().string();
       add_clip(folder, name, measure_video(folder.on_disk(name)), labels[root.stem().string()]);
@@ -190,8 +191,7 @@ class VideosDataset final : public Dataset {
     });
     if (names.empty()) return;
     std::ranges::sort(names);
-    notes_.insert(notes_.begin(),
-                  counted(names, "files and folders left out in " + folder.written("")));
+    notes_.insert(notes_.begin(), counted(names, "entry", " left out in " + folder.written("")));
   }
 
   std::optional<VideoClip> measure(const SourceRoot& folder, const std::string& name) try {
@@ -257,7 +257,7 @@ class VideosDataset final : public Dataset {
                    LabelledClip& clip) {
     for (const std::string& name : files) {
       if (!clip.sidecar.empty()) {
-        notes_.push_back("1 labels left out, since " + clip.sidecar + " counts: " + name);
+        notes_.push_back("a file of labels left out, since " + clip.sidecar + " counts: " + name);
         continue;
       }
       auto labels = read_video_labels(folder.on_disk(name), clip.path);
@@ -284,7 +284,7 @@ class VideosDataset final : public Dataset {
     }
     const auto first_beyond = clip.labels.lower_bound(video.frame_count);
     if (const auto count = std::distance(first_beyond, clip.labels.end()); count > 0) {
-      notes_.push_back(std::to_string(count) + " labels for frames beyond the video's " +
+      notes_.push_back(count_text(count, "label", " for frames beyond the video's ") +
                        std::to_string(video.frame_count) + " left out, in " + clip.sidecar);
     }
   }

@@ -222,9 +222,9 @@ TEST(PlanJson, RefusesNamesThatAreNotUtf8) {
 
 TEST(PlanJson, ANoteMayNameAFileThatIsNotUtf8) {
   Plan plan = small_plan();
-  plan.sources[0].notes = {"1 files left out in a: caf\xe9.txt"};
+  plan.sources[0].notes = {"1 file left out in a: caf\xe9.txt"};
   EXPECT_THAT(parse_plan(to_json(plan), "plan.json").sources[0].notes,
-              ::testing::ElementsAre("1 files left out in a: caf\xef\xbf\xbd.txt"));
+              ::testing::ElementsAre("1 file left out in a: caf\xef\xbf\xbd.txt"));
 }
 
 TEST(FingerprintDifferences, NameTheFieldAndBothValues) {

@@ -13,6 +13,8 @@ TEST(Text, CountsOneAndMany) {
   EXPECT_EQ(count_text(0, "pair"), "0 pairs");
   EXPECT_EQ(count_text(1, "pair"), "1 pair");
   EXPECT_EQ(count_text(12, "pair"), "12 pairs");
+  EXPECT_EQ(count_text(1, "file", " left out"), "1 file left out");
+  EXPECT_EQ(count_text(2, "file", " left out"), "2 files left out");
   EXPECT_EQ(count_text(2, "box"), "2 boxes");
   EXPECT_EQ(count_text(2, "batch"), "2 batches");
   EXPECT_EQ(count_text(2, "class"), "2 classes");

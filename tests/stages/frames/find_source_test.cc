@@ -334,7 +334,7 @@ TEST_F(FindSource, SplitsWithLabelsOfTheirOwnAreSources) {
   write("yolo/data.yaml");
   EXPECT_EQ(splits("yolo"), (Splits{{"", "images/train", "."}, {"val", "images/valid", "."}}));
   EXPECT_THAT(find("yolo").remarks,
-              ::testing::ElementsAre("warning: 1 folders of images left out: images/test"));
+              ::testing::ElementsAre("warning: 1 folder of images left out: images/test"));
   EXPECT_EQ(splits("yolo/images").size(), 2u);
   EXPECT_EQ(splits("voc"),
             (Splits{{"", "train", "train"}, {"val", "valid", "valid"}, {"test", "test", "test"}}));

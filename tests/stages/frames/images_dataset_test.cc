@@ -169,14 +169,14 @@ TEST_F(ImagesDatasetTest, EachFolderIsASequence) {
   EXPECT_EQ(last.frame.path, "clip/a/2.png");
   EXPECT_EQ(dataset->paired_frame(last, -1).frame.path, "clip/a/1.png");
   EXPECT_EQ(dataset->paired_frame(last, 1).state, State::kBeyond);  // never into the next folder
-  EXPECT_THAT(dataset->notes(), ElementsAre("1 files left out in clip/empty: readme.txt",
-                                            "1 folders without images in clip"));
+  EXPECT_THAT(dataset->notes(), ElementsAre("1 file left out in clip/empty: readme.txt",
+                                            "1 folder without images in clip"));
 }
 
 TEST_F(ImagesDatasetTest, ImagesBesideFoldersCount) {
   touch({"1.png", "a/1.png"});
   EXPECT_THAT(ids(), ElementsAre("1"));
-  EXPECT_THAT(open()->notes(), ElementsAre("1 folders beside the images left out in clip"));
+  EXPECT_THAT(open()->notes(), ElementsAre("1 folder beside the images left out in clip"));
 }
 
 TEST_F(ImagesDatasetTest, WhatIsLeftOutIsCountedAndNamed) {
@@ -184,12 +184,12 @@ TEST_F(ImagesDatasetTest, WhatIsLeftOutIsCountedAndNamed) {
          "b/11.json", "b/deeper/1.png", "readme.md"});
   const auto dataset = open();
   EXPECT_THAT(ids(), ElementsAre("a/001", "a/002", "b/1"));
-  EXPECT_THAT(dataset->notes(), ElementsAre("1 files left out in clip: readme.md",
-                                            "1 labels without an image in clip/a: 009.json",
-                                            "1 files left out in clip/a: 002.jpg",
+  EXPECT_THAT(dataset->notes(), ElementsAre("1 file left out in clip: readme.md",
+                                            "1 label without an image in clip/a: 009.json",
+                                            "1 file left out in clip/a: 002.jpg",
                                             "2 labels without an image in clip/b: 10.json, 11.json",
-                                            "1 folders left out in clip/b: deeper",
-                                            "1 files left out in clip/b: 1.txt"));
+                                            "1 folder left out in clip/b: deeper",
+                                            "1 file left out in clip/b: 1.txt"));
 }
 
 TEST_F(ImagesDatasetTest, PassesSidecarsThroughByteForByte) {

@@ -295,7 +295,7 @@ TEST_F(VideoDatasetTest, ALabelFilesExtensionMayBeInCapitals) {
   testing::write_file(folder_ / "v/clip.json", "{}");
   EXPECT_THAT(open()->annotation_files(), ElementsAre("v/clip.JSON"));
   EXPECT_THAT(open()->notes(),
-              ElementsAre("1 labels left out, since v/clip.JSON counts: clip.json"));
+              ElementsAre("a file of labels left out, since v/clip.JSON counts: clip.json"));
 }
 
 TEST_F(VideoDatasetTest, AManifestNamedAsTheVideoHoldsNoLabels) {
@@ -347,7 +347,7 @@ TEST_F(VideoFolderTest, NotesWhatItLeavesOut) {
     testing::write_file(folder_ / name, "");
   }
   std::filesystem::create_directory(folder_ / "v/more");
-  EXPECT_THAT(open()->notes(), ElementsAre("4 files and folders left out in v: clip.mkv, more, "
+  EXPECT_THAT(open()->notes(), ElementsAre("4 entries left out in v: clip.mkv, more, "
                                            "other.json, readme.txt"));
 }
 
@@ -355,7 +355,7 @@ TEST_F(VideoFolderTest, AVideoThatCannotBeReadIsLeftOutWithItsReason) {
   testing::write_file(folder_ / "v/a.mp4", "no video");
   EXPECT_EQ(open()->labelled_frames().size(), 7u);
   EXPECT_THAT(open()->notes(),
-              ElementsAre(AllOf(HasSubstr("1 videos left out: "),
+              ElementsAre(AllOf(HasSubstr("1 video left out: "),
                                 HasSubstr("expected a video, got a file that cannot "
                                           "be read as one"),
                                 HasSubstr("v/a.mp4"))));

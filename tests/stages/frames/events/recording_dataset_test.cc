@@ -247,14 +247,14 @@ TEST_F(RecordingDatasetTest, AFolderHoldsRecordingsOfAnyLayout) {
   EXPECT_EQ(dataset->sensor_size("a/2"), (ImageSize{1, 2}));
   EXPECT_EQ(dataset->labelled_frames()[0].frame.path, "all/a/events.txt");
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("all/a/images.txt"));
-  EXPECT_THAT(dataset->notes(), ElementsAre("1 files and folders left out in all: b_gt.hdf5"));
+  EXPECT_THAT(dataset->notes(), ElementsAre("1 entry left out in all: b_gt.hdf5"));
   // With labels of one of them the others are left out.
   testing::write_file(folder_ / "labels/b.csv", std::string(kLabelHeader) + "1.75,0,0,1,1,car,\n");
   spec_.annotations = "labels";
   dataset = open();
   EXPECT_THAT(ids(*dataset), ElementsAre("b/0000000001.750000"));
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("labels/b.csv"));
-  EXPECT_THAT(dataset->notes(), Contains("1 recordings without labels left out in all: a"));
+  EXPECT_THAT(dataset->notes(), Contains("1 recording without labels left out in all: a"));
 }
 
 TEST_F(RecordingDatasetTest, RefusesWhatDoesNotFit) {

@@ -306,7 +306,7 @@ TEST_F(ExtractedLayoutTest, TellsOfImagesWithoutLabels) {
   add_images(
       {"S1/" + kVideo + "/" + kVideo + "_000001.jpg", "S1/S1_Eating.7/S1_Eating.7_000001.jpg"});
   add_npz(members({kVideo + "_000001.jpg"}));
-  EXPECT_THAT(open()->notes(), ::testing::Contains("1 folders of images without labels, the first "
+  EXPECT_THAT(open()->notes(), ::testing::Contains("1 folder of images without labels, the first "
                                                    "h36m/S1/S1_Eating.7"));
 }
 

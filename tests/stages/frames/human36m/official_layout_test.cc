@@ -205,7 +205,7 @@ TEST_F(OfficialLayoutTest, PosesBeyondTheVideosEndAreTold) {
   add_poses("Walking 1", 11);
   EXPECT_EQ(open(1)->labelled_frames().size(), 20u);
   EXPECT_THAT(open(1)->notes()[0],
-              "2 labelled frames beyond the end of their video left out: 1 of "
+              "2 videos with labelled frames beyond the end, left out: 1 of "
               "h36m/S1/Videos/Walking 1.54138969.mp4 (11 poses, 10 frames), 2 of "
               "h36m/S1/Videos/Walking.54138969.mp4 (12 poses, 10 frames)");
   const auto thinned = open(5);  // frames 1 and 6 of both, and 11
@@ -225,9 +225,9 @@ TEST_F(OfficialLayoutTest, FilesWithoutTheirCounterpartsAreTold) {
   EXPECT_THAT(dataset->notes(),
               ElementsAre("2 videos without poses left out: h36m/S1/Videos/Eating.54138969.mp4, "
                           "h36m/S1/Videos/_ALL 1.54138969.mp4",
-                          "1 files of poses without a video left out: "
+                          "1 file of poses without a video left out: "
                           "h36m/S1/MyPoseFeatures/D2_Positions/Posing.54138969.cdf",
-                          "1 videos without joints in 3-D: h36m/S1/Videos/Walking.54138969.mp4",
+                          "1 video without joints in 3-D: h36m/S1/Videos/Walking.54138969.mp4",
                           HasSubstr("no intrinsics")));
   const auto outcome = dataset->annotation(dataset->labelled_frames()[0].label_key);
   EXPECT_THAT(outcome->persons[0].joints3d_mm, IsEmpty());

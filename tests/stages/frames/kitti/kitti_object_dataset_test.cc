@@ -173,7 +173,7 @@ TEST_F(KittiObjectDatasetTest, ALabelWithoutAnImageIsAMissingFrameAndTheOtherWay
   const PairedFrame itself = dataset->paired_frame(dataset->labelled_frames()[3], 0);
   EXPECT_EQ(itself.state, State::kMissing);
   EXPECT_EQ(itself.frame.path, "training/image_2/000007.png");
-  EXPECT_THAT(dataset->notes(), ElementsAre("1 images without labels in training/image_2"));
+  EXPECT_THAT(dataset->notes(), ElementsAre("1 image without labels in training/image_2"));
 }
 
 TEST_F(KittiObjectDatasetTest, TheMappingGivesSequenceNumbersAndPairedFramesOnBothSides) {
@@ -309,9 +309,9 @@ TEST_F(KittiObjectDatasetTest, FilesLeftOutAreCountedAndNamed) {
   const auto dataset = open();
   EXPECT_EQ(dataset->labelled_frames().size(), 3u);
   EXPECT_THAT(dataset->notes(),
-              ElementsAre("1 files left out in training/label_2: img_000007.txt",
+              ElementsAre("1 file left out in training/label_2: img_000007.txt",
                           "2 files left out in training/image_2: 000002.jpg, img_000007.png",
-                          "1 files left out in training/prev_2: 000000_04.png"));
+                          "1 file left out in training/prev_2: 000000_04.png"));
 }
 
 TEST_F(KittiObjectDatasetTest, WithoutItsDriveAFrameFallsBackOnThePreviousFrames) {
@@ -327,8 +327,8 @@ TEST_F(KittiObjectDatasetTest, WithoutItsDriveAFrameFallsBackOnThePreviousFrames
   EXPECT_EQ(dataset->paired_frame(frame, 1).state, State::kBeyond);
   EXPECT_EQ(dataset->paired_frame(dataset->labelled_frames()[3], 1).state, State::kBeyond);
   EXPECT_THAT(dataset->notes(),
-              ElementsAre("1 labelled frames that devkit/mapping/train_mapping.txt does not know",
-                          "1 labelled frames whose raw drive is missing in raw"));
+              ElementsAre("1 labelled frame that devkit/mapping/train_mapping.txt does not know",
+                          "1 labelled frame whose raw drive is missing in raw"));
 }
 
 TEST_F(KittiObjectDatasetTest, NeedsItsFolders) {

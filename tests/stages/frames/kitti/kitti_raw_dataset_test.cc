@@ -129,7 +129,7 @@ TEST_F(KittiRawDatasetTest, TrackletsBeyondTheImagesAreNoted) {
   write_calibration();
   const auto dataset = open();
   EXPECT_THAT(dataset->labelled_frames(), SizeIs(6));
-  EXPECT_THAT(dataset->notes(), ElementsAre("1 frames beyond the drive's images left out in raw/" +
+  EXPECT_THAT(dataset->notes(), ElementsAre("1 frame beyond the drive's images left out in raw/" +
                                             kFirst + "/tracklet_labels.xml"));
 }
 
@@ -175,10 +175,10 @@ TEST_F(KittiRawDatasetTest, FilesAndFoldersLeftOutAreCountedAndNamed) {
   EXPECT_THAT(dataset->labelled_frames(), SizeIs(6));
   EXPECT_THAT(
       dataset->notes(),
-      ElementsAre("1 folders that are no drive left out in raw/2011_09_26: "
+      ElementsAre("1 folder without a drive's name left out in raw/2011_09_26: "
                   "2011_09_26_drive_0001_extract",
                   "2 files left out in raw/" + kFirst + "/image_02/data: 0000000001.jpg, left.png",
-                  "1 folders that are no date left out in raw: devkit"));
+                  "1 folder without a date's name left out in raw: devkit"));
 }
 
 TEST_F(KittiRawDatasetTest, AMalformedTrackletIsAFaultOfItsFrame) {

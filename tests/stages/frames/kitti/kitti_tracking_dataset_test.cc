@@ -157,7 +157,7 @@ TEST_F(KittiTrackingDatasetTest, EveryImageAndEveryLabelOfALabelledSequenceIsALa
   EXPECT_DOUBLE_EQ(frame.frame.time_s, 0.2);
   EXPECT_THAT(dataset->annotation_files(),
               ElementsAre("tracking/label_02/0001.txt", "tracking/label_02/0002.txt"));
-  EXPECT_THAT(dataset->notes(), ElementsAre("1 sequences without labels in tracking/image_02"));
+  EXPECT_THAT(dataset->notes(), ElementsAre("1 sequence without labels in tracking/image_02"));
 }
 
 TEST_F(KittiTrackingDatasetTest, AnnotationsAreTheFramesLines) {
@@ -226,8 +226,8 @@ TEST_F(KittiTrackingDatasetTest, FilesLeftOutAreCountedAndNamed) {
   write_file(folder_ / "tracking/image_02/0001/000002.jpg", "");
   EXPECT_THAT(open()->notes(),
               ElementsAre("2 files left out in tracking/image_02/0001: 000002.jpg, frame_7.png",
-                          "1 files left out in tracking/label_02: 0003.csv",
-                          "1 sequences without labels in tracking/image_02"));
+                          "1 file left out in tracking/label_02: 0003.csv",
+                          "1 sequence without labels in tracking/image_02"));
 }
 
 TEST_F(KittiTrackingDatasetTest, NeedsItsFolders) {

@@ -56,9 +56,9 @@ TEST_F(MpiiDatasetTest, TheSplitChoosesByImgTrain) {
   spec_.split = "train";
   EXPECT_THAT(mpii_ids(*open()), ElementsAre("a", "b"));
   EXPECT_THAT(open()->notes(),
-              ElementsAre("1 images without annotation in m/mpii_human_pose_v1_u12_1.mat",
-                          "1 annotated images left out, not of split train",
-                          "1 annotated images without a sequence folder: they have no neighbours"));
+              ElementsAre("1 image without annotation in m/mpii_human_pose_v1_u12_1.mat",
+                          "1 annotated image left out, not of split train",
+                          "1 annotated image without a sequence folder, so without neighbours"));
   spec_.split = "test";
   EXPECT_THAT(mpii_ids(*open()), ElementsAre("c"));
   spec_.split = "everything";
@@ -120,7 +120,7 @@ TEST_F(MpiiDatasetTest, NotesKeyframesInASequenceOfAnotherName) {
   mat::write_mpii(folder_ / "m", {{"a.jpg", mat::two_persons(), true, "b/00000008.jpg"}});
   testing::write_flat_image(folder_ / "m/images/a.jpg", {48, 64}, 100);
   EXPECT_THAT(open()->notes(),
-              ElementsAre("1 keyframes in a sequence not named as their image (first: a.jpg in "
+              ElementsAre("1 keyframe in a sequence not named as its image (first: a.jpg in "
                           "b/00000008.jpg)"));
 }
 
@@ -174,9 +174,8 @@ TEST_F(MpiiFrameOfAnotherSize, WithoutTheImageNothingTells) {
   const auto annotation = *annotation_at({96, 128});
   EXPECT_EQ(annotation.persons.at(0).joints[0].at, (Point{710, 620}));
   spec_.split = "train";
-  EXPECT_THAT(open()->notes(),
-              ::testing::Contains(::testing::StartsWith(
-                  "1 labelled frames of a sequence whose image is not in images")));
+  EXPECT_THAT(open()->notes(), ::testing::Contains(::testing::StartsWith(
+                                   "1 labelled frame of a sequence whose image is not in images")));
 }
 
 TEST_F(MpiiFrameOfAnotherSize, AnImageThatCannotBeReadIsAFault) {

@@ -78,7 +78,7 @@ TEST_F(MpiiListDatasetTest, TheKeyframesFileTellsTheFrame) {
   EXPECT_THAT(dataset->annotation_files(),
               ElementsAre("labels/list.json", "mpii_human_pose_v1_sequences_keyframes.mat"));
   EXPECT_THAT(dataset->notes(),
-              ElementsAre("1 images whose frame is in no sequence: they have no neighbours"));
+              ElementsAre("1 image whose frame is in no sequence, so without neighbours"));
 }
 
 TEST_F(MpiiListDatasetTest, WithoutTheKeyframesFileTheBytesTell) {

@@ -101,7 +101,7 @@ TEST_F(CocoLabels, OfTheImagesThatTheyName) {
   EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("person"));
   EXPECT_THAT(dataset->label_schema().joint_names, IsEmpty());
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("instances.json"));
-  EXPECT_THAT(dataset->notes(), ElementsAre("1 of 3 frames have no label in instances.json: no "
+  EXPECT_THAT(dataset->notes(), ElementsAre("no label for 1 of 3 frames in instances.json: no "
                                             "samples, but paired frames"));
   const auto& frames = dataset->labelled_frames();
   ASSERT_EQ(frames.size(), 2u);
@@ -202,7 +202,7 @@ TEST_F(CocoLabels, ABareNameMayBeInAFolder) {
   EXPECT_EQ(frames[2].sample_id, "b/y");
   write(image(1, "z.png"), "");
   EXPECT_THAT([&] { open("clips"); },
-              ThrowsMessage<InputError>(HasSubstr("got 1 bare names that several of its folders "
+              ThrowsMessage<InputError>(HasSubstr("got 1 bare name that several of its folders "
                                                   "have: z.png, in instances.json")));
 }
 
@@ -376,8 +376,8 @@ TEST_F(CocoLabels, LabelsBesideTheImagesAreNoLeftOvers) {
       folder_ / "images/_annotations.coco.json",
       "{\"images\": [" + image(1, "000001.png") + "], \"annotations\": [], \"categories\": []}");
   EXPECT_THAT(open_frames_dataset(spec, folder_.path())->notes(),
-              ElementsAre(HasSubstr("2 of 3 frames have no label"),
-                          "1 files left out in images: 000001.json"));
+              ElementsAre(HasSubstr("no label for 2 of 3 frames"),
+                          "1 file left out in images: 000001.json"));
 }
 
 }  // namespace

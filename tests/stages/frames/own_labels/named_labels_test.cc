@@ -116,8 +116,8 @@ TEST_F(NamedLabels, MotLiesInTheSequence) {
   EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("car", "pedestrian"));
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("m/s/gt/gt.txt", "m/s/seqinfo.ini"));
   EXPECT_THAT(dataset->notes(),
-              ElementsAre("1 sequences without gt/gt.txt or gt.txt in m: t",
-                          "4 of 6 frames have no label in m: no samples, but paired frames"));
+              ElementsAre("1 sequence without gt/gt.txt or gt.txt in m: t",
+                          "no label for 4 of 6 frames in m: no samples, but paired frames"));
   const auto& frames = dataset->labelled_frames();
   ASSERT_EQ(frames.size(), 3u);
   EXPECT_EQ(frames[0].sample_id, "s/000002");
@@ -147,7 +147,7 @@ TEST_F(NamedLabels, MotOfOneSequenceMayBeAFile) {
   text("gt/gt.txt", "1,1,1,1,5,5,1\n");
   auto dataset = open(LabelFormat::kMot, "clip", "gt/gt.txt");
   EXPECT_THAT(dataset->notes(), ElementsAre("frame 1 of gt/gt.txt is clip/00000.png",
-                                            HasSubstr("1 of 2 frames have no label")));
+                                            HasSubstr("no label for 1 of 2 frames")));
   ASSERT_EQ(dataset->labelled_frames().size(), 1u);
   EXPECT_EQ(dataset->labelled_frames()[0].sample_id, "00000");
   EXPECT_TRUE(std::isnan(dataset->labelled_frames()[0].frame.time_s));
@@ -214,7 +214,7 @@ TEST_F(NamedLabels, MotOfImagesWithoutNumbersNeedsAllOfThem) {
   EXPECT_EQ(open(LabelFormat::kMot, "n", "n")->labelled_frames().at(0).frame.path, "n/04.png");
   text("n/gone/gt/gt.txt", "1,1,1,1,5,5,1\n");
   EXPECT_THAT(open(LabelFormat::kMot, "n", "n")->notes(),
-              ::testing::Contains("1 sequences of labels without images left out in n: gone"));
+              ::testing::Contains("1 sequence of labels without images left out in n: gone"));
 }
 
 TEST_F(NamedLabels, ATableNamesItsImages) {
@@ -242,7 +242,7 @@ TEST_F(NamedLabels, ATableNamesItsImages) {
   EXPECT_EQ(frames[3].sample_id, "gone");
   text("t.csv", header + "2.png,cat,0,1,2,3\n");
   EXPECT_THAT([&] { open(LabelFormat::kCsv, "i", "t.csv"); },
-              ThrowsMessage<InputError>(HasSubstr("got 1 bare names")));
+              ThrowsMessage<InputError>(HasSubstr("got 1 bare name")));
   // Right in the root, and not the image of that name in a folder of it.
   text("t.csv", header + "i/1.png,cat,0,1,2,3\n");
   const auto absent = open(LabelFormat::kCsv, "i", "t.csv");
@@ -273,8 +273,8 @@ TEST_F(NamedLabels, OfVideosTheFrameNumberStandsForTheImage) {
   EXPECT_THAT(read(*dataset, (*frames)[3].label_key).original,
               HasSubstr("expected a box within the image of 64x48"));
   EXPECT_THAT(dataset->notes(),
-              ElementsAre("1 files and folders left out in v: other.json",
-                          HasSubstr("6 of 9 frames have no label in v/boxes.csv")));
+              ElementsAre("1 entry left out in v: other.json",
+                          HasSubstr("no label for 6 of 9 frames in v/boxes.csv")));
 
   text("v/labels/classes.txt", "cat");
   text("v/labels/clip_000003.txt", "0 0.5 0.5 1 1");

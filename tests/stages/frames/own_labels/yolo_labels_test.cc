@@ -208,8 +208,8 @@ TEST_F(YoloLabels, WhatIsOnOneSideAloneIsNotLost) {
   EXPECT_EQ(missing.state, PairedFrame::State::kMissing);
   EXPECT_EQ(missing.frame.path, "d/images/5.png");
   EXPECT_THAT(dataset->notes(),
-              ElementsAre("1 folders of labels without images left out in d/labels: old",
-                          "1 of 3 frames have no label in d/labels: no samples, but paired "
+              ElementsAre("1 folder of labels without images left out in d/labels: old",
+                          "no label for 1 of 3 frames in d/labels: no samples, but paired "
                           "frames"));
 }
 
