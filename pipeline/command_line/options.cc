@@ -101,7 +101,7 @@ namespace {
 namespace fs = std::filesystem;
 
 void refuse_output_folder(const ProfiledCommand& command) {
-  std::error_code error;  // of a path that leads nowhere; TraceFile has a word for it
+  std::error_code error;  // of a path that leads nowhere, which TraceFile reports
   const fs::path file = fs::weakly_canonical(fs::absolute(command.file.value(), error), error);
   const fs::path output = fs::weakly_canonical(fs::absolute(command.output, error), error);
   if (error || file.parent_path() != output) return;

@@ -29,7 +29,7 @@ JobManifest frozen_manifest(const fs::path& folder, const PlanOutline& plan) {
   const std::string name = "the manifest in " + (folder / "plan.json").string();
   try {
     return parse_job_manifest(plan.manifest_text, folder, name);
-  } catch (const UsageError&) {  // of whoever wrote the plan, not of who finalizes
+  } catch (const UsageError&) {  // a fault of the plan, not of the command line
     std::throw_with_nested(std::runtime_error("expected a plan with a valid manifest"));
   }
 }

@@ -44,7 +44,7 @@ inline constexpr int kHeldOutPairs = 8;
 struct CalibrationOptions {
   int pairs = kDefaultCalibrationPairs;  ///< ≥ 1
   int held_out = kHeldOutPairs;          ///< other pairs, on which the error is measured
-  std::function<bool()> stop_requested;  ///< none: nobody asks
+  std::function<bool()> stop_requested;  ///< none: never
   /// Called with the number of pairs to work on; shows progress. None: silent.
   std::function<std::unique_ptr<Progress>(std::int64_t)> make_progress;
 };

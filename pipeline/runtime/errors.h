@@ -19,7 +19,7 @@ enum ExitCode : int {
 /// arguments. No std::exception, so that nobody on the way takes it for a failure.
 struct HandOver {
   const char* program;  ///< "eventgan-torch"
-  const char* advice;   ///< for who does not have it
+  const char* advice;   ///< what to do where it is missing
 };
 
 /// The message of an exception and of those nested in it, outermost first, one per line and

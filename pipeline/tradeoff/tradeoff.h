@@ -28,7 +28,7 @@ struct TradeoffOptions {
   int rounds = 5;                                ///< of measuring cost, ≥ 1
   int threads = 0;                               ///< 0: all cores
   std::vector<std::unique_ptr<Recording>> real;  ///< to score the configurations by, too
-  std::function<bool()> stop_requested;          ///< none: nobody asks
+  std::function<bool()> stop_requested;          ///< none: never
   /// Told before the first pair how many configurations there are and how long it will take. None:
   /// silent.
   std::function<void(const std::string&)> tell;

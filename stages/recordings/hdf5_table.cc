@@ -40,7 +40,7 @@ Hdf5Handle open_dataset(hid_t file, const std::string& path) {
   Hdf5Handle dataset(H5Dopen2(file, path.c_str(), H5P_DEFAULT), H5Dclose, "open", path);
   const std::size_t bytes = bytes_of_a_layer(dataset, path);
   if (bytes <= kUsualCacheBytes) return dataset;
-  dataset = {};  // the cache is set up by who opens first
+  dataset = {};  // the first to open it sets the cache up
   const Hdf5Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose, "create", "access properties");
   checked(H5Pset_chunk_cache(access, kChunkCacheSlots, bytes, kPreferReadChunks), "set",
           "the chunk cache");

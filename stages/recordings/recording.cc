@@ -50,7 +50,7 @@ RecordingInput::RecordingInput(std::filesystem::path path) : path_(std::move(pat
     if (!has_hdf5_signature(*file)) return;
     const Hdf5Lock lock;
     hdf5_ = std::make_unique<Hdf5File>(open_hdf5_file(path_));
-  } catch (const std::runtime_error&) {  // who opens it says why
+  } catch (const std::runtime_error&) {  // reported when it is opened
   }
 }
 
@@ -90,7 +90,7 @@ std::unique_ptr<Recording> open_recording(const std::filesystem::path& path,
                                           std::optional<RecordingFormat> format,
                                           const RecordingOptions& options) {
   if (!format) format = find_recording_format(path, options);
-  if (!format) {  // who opens it says why
+  if (!format) {  // reported when it is opened
     std::error_code ignored;
     format = std::filesystem::is_directory(path, ignored) ? RecordingFormat::kEcd
                                                           : RecordingFormat::kMvsec;

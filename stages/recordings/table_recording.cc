@@ -333,7 +333,7 @@ bool is_event_table(const RecordingInput& input, const RecordingOptions& options
     });
   }
   return find_columns(text.substr(0, text.find('\n')), options.columns).has_value();
-} catch (const std::runtime_error&) {  // who opens it says why
+} catch (const std::runtime_error&) {  // reported when it is opened
   return false;
 }
 

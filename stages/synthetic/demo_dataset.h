@@ -8,7 +8,7 @@
 namespace eventgan {
 
 /// The text of the manifest that converts the demo dataset beside it, with comments for a reader
-/// who wants to write one of his own. With `sequences` about a fifth of KITTI's and MPII's is for
+/// who wants to write another. With `sequences` about a fifth of KITTI's and MPII's is for
 /// validation, of two at least one of each; a single street is to train on.
 std::string demo_manifest(std::uint64_t seed, int sequences = 0);
 

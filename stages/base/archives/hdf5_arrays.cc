@@ -20,7 +20,7 @@ struct NotAnArray {
   std::string reason;
 };
 
-constexpr char kTheValues[] = "the values";  // the dataset is named by who calls
+constexpr char kTheValues[] = "the values";  // the caller names the dataset
 
 std::vector<std::int64_t> read_wide_integers(hid_t dataset) {
   auto values = read_elements<std::int64_t>(dataset, kTheValues, element_type<std::int64_t>());

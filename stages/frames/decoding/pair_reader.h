@@ -62,7 +62,7 @@ class SharedImages {
 class FilesAhead {
  public:
   /// Opens the file, unless it is open here already. Of one that cannot be opened nothing is kept,
-  /// nor told: who reads it says why. Beyond kMost, the one that has waited longest is closed.
+  /// nor reported: reading it says why. Beyond kMost, the one that has waited longest is closed.
   void expect(const std::filesystem::path& file);
 
   /// The file, which is forgotten here; opened now if it was not expected. Throws as

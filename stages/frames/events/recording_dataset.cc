@@ -83,7 +83,7 @@ bool is_manifest(const fs::path& file) try {
   const nlohmann::ordered_json document =
       parse_json_data(read_text_file(file), file.filename().string(), JsonComments::kPassedOver);
   return document.is_object() && document.value("format", "") == "eventgan-manifest";
-} catch (const std::exception&) {  // who reads it as labels says why
+} catch (const std::exception&) {  // reported when it is read as labels
   return false;
 }
 

@@ -20,7 +20,7 @@ struct LayerNumbers {
   std::vector<float> output_scales;
 };
 
-/// The bias for who adds it to what the scales have made: times output_scales. [out], or empty.
+/// The bias, to be added to what the scales have made: times output_scales. [out], or empty.
 std::vector<float> bias_behind_scales(const LayerNumbers& layer);
 
 /// The network's layers. Names are those of network_layout(), but each decoder has

@@ -16,7 +16,7 @@ struct StoredEvent {
   double polarity = 0;
 };
 
-/// "expected X, got Y"; the place is added by who knows it.
+/// "expected X, got Y"; the caller adds the place.
 class EventFault : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

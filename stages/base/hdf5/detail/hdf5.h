@@ -40,8 +40,7 @@ std::string hdf5_version();
 
 // ---- Errors
 
-/// What HDF5 reports, as text "cannot ACTION OBJECT: REASON"; the file's name is added by who knows
-/// it.
+/// What HDF5 reports, as text "cannot ACTION OBJECT: REASON"; the caller adds the file's name.
 class Hdf5Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -130,8 +130,8 @@ class PlanCache {
   /// `layers` must outlive it.
   explicit PlanCache(NetworkLayers& layers) : layers_(layers) {}
 
-  /// Builds the plan if it is not there; who asks for one that another thread builds waits for it,
-  /// and gets its exception if there is one. Throws dnnl::error; the next call tries again.
+  /// Builds the plan if it is not there; a thread that asks for one that another builds waits for
+  /// it, and gets its exception if there is one. Throws dnnl::error; the next call tries again.
   std::shared_ptr<const NetworkPlan> plan(ImageSize size);
 
  private:
