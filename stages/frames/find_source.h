@@ -21,7 +21,7 @@ struct FoundSource {
   DatasetKind dataset = DatasetKind::kFrames;
   std::string_view layout;  ///< the manifest's word; empty where the dataset has only one
   /// For a person: "KITTI object", "recording of an event camera (AEDAT4)".
-  std::string_view title;
+  std::string title;
   std::filesystem::path root;
   std::string_view split = {};  ///< frames: "val" or "test" where its folder says so; empty: train
   std::optional<std::filesystem::path> raw_root, devkit, annotations, sequences;

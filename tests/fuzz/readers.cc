@@ -253,7 +253,7 @@ void read_table_input(std::span<const std::uint8_t> input, const std::filesystem
     file += extension;
     std::ofstream(file, std::ios::binary) << text_of(input);
     try {
-      is_event_table(file, options.columns);
+      find_recording_format(file, options);
       const auto recording = open_table_recording(file, options);
       for (const Event& event : recording->events_around(0, 1000, 1000)) {
         if (event.x < 0 || event.x > 3 || event.y < 0 || event.y > 2) std::abort();

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <filesystem>
@@ -6,7 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/values/words.h"
+#include "manifests/values/datasets.h"
+#include "manifests/values/recording_formats.h"
 #include "stages/frames/dataset_kinds.h"
 #include "stages/frames/events/recording_dataset.h"
 #include "stages/frames/sequences/frames_dataset.h"
@@ -19,20 +22,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kRecordingTitles{
-    Word<RecordingFormat>{"recording of an event camera (MVSEC)", RecordingFormat::kMvsec},
-    Word<RecordingFormat>{"recording of an event camera (EventGAN)", RecordingFormat::kEventgan},
-    Word<RecordingFormat>{"recording of an event camera (ECD)", RecordingFormat::kEcd},
-    Word<RecordingFormat>{"recording of an event camera (AEDAT4)", RecordingFormat::kAedat4},
-    Word<RecordingFormat>{"recording of an event camera (DSEC)", RecordingFormat::kDsec},
-    Word<RecordingFormat>{"recording of an event camera (M3ED)", RecordingFormat::kM3ed},
-    Word<RecordingFormat>{"recording of an event camera (Prophesee)", RecordingFormat::kProphesee},
-    Word<RecordingFormat>{"recording of an event camera (table)", RecordingFormat::kTable}};
-
 bool may_be_recording(const fs::path& file) {
-  constexpr std::array kExtensions = {".aedat4", ".csv", ".dat", ".h5",
-                                      ".hdf5",   ".npy", ".npz", ".raw"};
-  return std::ranges::find(kExtensions, lower_extension(file)) != kExtensions.end();
+  const std::string extension = lower_extension(file);
+  return std::ranges::any_of(kRecordingFormats, [&](const RecordingFormatRow& row) {
+    return !extension.empty() &&
+           std::ranges::find(row.extensions, extension) != row.extensions.end();
+  });
 }
 
 struct FoundRecording {
@@ -75,9 +70,8 @@ bool is_recording(const fs::path& root) {
 
 std::vector<FoundSource> complete_recording(FoundSource found) {
   const FoundRecording recording = *first_recording(found.root);
-  const auto title =
-      std::ranges::find(kRecordingTitles, recording.format, &Word<RecordingFormat>::value);
-  found.title = title->word;
+  found.title = fmt::format("{} ({})", dataset_row(DatasetKind::kRecording).title,
+                            recording_format_row(recording.format).title);
   found.columns = recording.columns;
   return {std::move(found)};
 }

@@ -40,8 +40,8 @@ TEST(FolderListing, AnAbsentFolderHoldsNothingButAFileIsNone) {
 }
 
 TEST(Counted, NamesTwentyAtMost) {
-  EXPECT_EQ(counted({"a", "b"}, "files left out in clip"), "2 files left out in clip: a, b");
-  const std::string many = counted(std::vector<std::string>(21, "a"), "files");
+  EXPECT_EQ(counted({"a", "b"}, "file", " left out in clip"), "2 files left out in clip: a, b");
+  const std::string many = counted(std::vector<std::string>(21, "a"), "file", "");
   EXPECT_TRUE(many.starts_with("21 files: a, a, "));
   EXPECT_TRUE(many.ends_with("a, ..."));
   EXPECT_EQ(std::ranges::count(many, 'a'), 20);
