@@ -97,7 +97,7 @@ void add_export_command(CLI::App& app, int& exit_code) {
     formats.emplace(format.word, formats.size());
     list += fmt::format("{}: {}\n", format.word, format.title);
   }
-  command->footer(list);
+  command->footer(list + "\n" + command->get_footer());  // the exit codes
   take_one_of(command->add_option("--to", arguments->format,
                                   "Format of the export (manifests/guides/exports.md)"),
               formats)

@@ -20,6 +20,7 @@ ENGINE = f"_engine{sysconfig.get_config_var('EXT_SUFFIX')}"
 HEAVY = {"torch", "h5py", "cv2", "matplotlib", "tqdm"}
 VOLUME = """
 import eventgan
+import numpy as np
 random = np.random.default_rng(7)
 volume = eventgan.Generator("untrained:2")(*random.integers(0, 256, (2, 16, 24), np.uint8))
 """
