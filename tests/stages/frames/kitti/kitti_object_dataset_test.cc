@@ -270,7 +270,7 @@ TEST_F(KittiObjectDatasetTest, ADriveOfWhichNothingCanBeComparedIsNoted) {
   }
   const auto dataset = open();
   EXPECT_EQ(dataset->labelled_frames()[0].fault, "");
-  EXPECT_THAT(dataset->notes(), Contains("1 drives of which no image could be compared with what "
+  EXPECT_THAT(dataset->notes(), Contains("1 drive of which no image could be compared with what "
                                          "devkit/mapping/train_mapping.txt says"));
 }
 
