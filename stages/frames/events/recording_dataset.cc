@@ -11,7 +11,6 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <ranges>
 #include <span>
 #include <string>
 #include <string_view>
@@ -260,7 +259,8 @@ class RecordingDataset final : public Dataset {
       return;
     }
     const auto refuse = [&] {
-      const auto titles = kRecordingFormats | std::views::transform(&RecordingFormatRow::title);
+      std::vector<std::string_view> titles;
+      for (const RecordingFormatRow& row : kRecordingFormats) titles.push_back(row.title);
       throw InputError(fmt::format(
           "expected a recording of an event camera ({}), or a folder of them, got none, in {}",
           fmt::join(titles, ", "), root.string()));

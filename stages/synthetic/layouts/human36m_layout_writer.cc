@@ -1,5 +1,3 @@
-#include "stages/synthetic/layouts/layout_writers.h"
-
 #include <array>
 #include <stdexcept>
 #include <string>
@@ -7,6 +5,7 @@
 
 #include "stages/base/hdf5/detail/hdf5.h"
 #include "stages/synthetic/figure_scene.h"
+#include "stages/synthetic/layouts/layout_writers.h"
 #include "stages/synthetic/layouts/output_files.h"
 
 namespace eventgan {

@@ -1,10 +1,9 @@
-#include "stages/synthetic/layouts/layout_writers.h"
-
 #include <fmt/core.h>
 
 #include <map>
 #include <string>
 
+#include "stages/synthetic/layouts/layout_writers.h"
 #include "stages/synthetic/layouts/output_files.h"
 #include "stages/synthetic/road_scene.h"
 

@@ -1,4 +1,4 @@
-#include "stages/synthetic/layouts/layout_writers.h"
+#include "stages/synthetic/layouts/detail/mpii_layout_writer.h"
 
 #include <string.h>
 
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "stages/synthetic/figure_scene.h"
-#include "stages/synthetic/layouts/detail/mpii_layout_writer.h"
+#include "stages/synthetic/layouts/layout_writers.h"
 #include "stages/synthetic/layouts/output_files.h"
 
 namespace eventgan {
