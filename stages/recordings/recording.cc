@@ -49,7 +49,7 @@ RecordingInput::RecordingInput(std::filesystem::path path) : path_(std::move(pat
     beginning_ = file->read(0, std::min(file->size_bytes(), kBeginningBytes));
     if (!has_hdf5_signature(*file)) return;
     const Hdf5Lock lock;
-    hdf5_ = std::make_unique<Hdf5File>(open_hdf5_file(path_));
+    hdf5_ = std::make_unique<Hdf5File>(Hdf5File{open_hdf5_file(path_)});
   } catch (const std::runtime_error&) {  // reported when it is opened
   }
 }
