@@ -285,8 +285,8 @@ def ssim_map(image: np.ndarray, reference: np.ndarray) -> np.ndarray:
     photograph than the true image with noise.
 
     Means, variances and covariance are weighted by a Gaussian of 11 x 11 pixels, sigma 1.5, and not corrected for the
-    sample size; C1 = 0.01², C2 = 0.03². Only windows wholly inside count, so the map lacks five pixels at each border,
-    as with scikit-image in EVREAL.
+    sample size; C1 = 0.01², C2 = 0.03². Only windows wholly inside count, so the map lacks five pixels at each
+    border, as with scikit-image in EVREAL.
 
     Parameters
     ----------

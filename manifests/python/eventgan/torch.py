@@ -453,8 +453,8 @@ class PoseDataset(Dataset):
 
 
 def _crop(center: np.ndarray, scale: float, rotation: float, height: int, width: int) -> np.ndarray:
-    """[2, 3], volume → input: 200 x scale px around `center` fill the width, and the centre goes to (W / 2, H / 2), as
-    in Simple Baselines' get_affine_transform.
+    """[2, 3], volume → input: 200 x scale px around `center` fill the width, and the centre goes to (W / 2, H / 2),
+    as in Simple Baselines' get_affine_transform.
     """
     turn = math.radians(rotation)
     zoom = width / (200 * scale)
@@ -464,8 +464,8 @@ def _crop(center: np.ndarray, scale: float, rotation: float, height: int, width:
 
 def heatmaps(joints: np.ndarray, annotated: np.ndarray, height: int,
              width: int, sigma: float) -> tuple[np.ndarray, np.ndarray]:
-    """Targets of joints as in generate_target of Simple Baselines: for each joint, rounded to a pixel, exp(-d² / 2σ²)
-    within 3 σ.
+    """Targets of joints as in generate_target of Simple Baselines: for each joint, rounded to a pixel,
+    exp(-d² / 2σ²) within 3 σ.
 
     Parameters
     ----------
@@ -520,8 +520,8 @@ def mixture(datasets: Iterable[Dataset], shares: Sequence[float], length: int | 
     joined = ConcatDataset(datasets)
     sizes = np.diff([0, *joined.cumulative_sizes])
     if len(shares) != len(sizes) or min(shares) < 0 or min(sizes) < 1:
-        raise ValueError(f"expected a share ≥ 0 for each of {len(sizes)} datasets that hold items, got {list(shares)} "
-                         f"for {list(sizes)}")
+        raise ValueError(f"expected a share ≥ 0 for each of {len(sizes)} datasets that hold items, got "
+                         f"{list(shares)} for {list(sizes)}")
     weights = np.repeat(np.asarray(shares, float) / sizes, sizes)
     return joined, WeightedRandomSampler(torch.from_numpy(weights), length or len(joined), generator=generator)
 
