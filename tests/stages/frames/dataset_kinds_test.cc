@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <iterator>
 #include <regex>
 #include <set>
 #include <string>
@@ -13,13 +11,13 @@
 #include "manifests/values/words.h"
 #include "stages/frames/find_source.h"
 #include "stages/frames/own_labels/own_labels.h"
+#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
 std::string page(const char* path) {
-  std::ifstream file(std::filesystem::path(EVENTGAN_SOURCE_DIR) / path);
-  return {std::istreambuf_iterator<char>(file), {}};
+  return testing::read_file(std::filesystem::path(EVENTGAN_SOURCE_DIR) / path);
 }
 
 /// What the first group of `pattern` is, at each place where it fits.

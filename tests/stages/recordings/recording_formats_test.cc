@@ -4,22 +4,19 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <regex>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "manifests/values/words.h"
 #include "stages/recordings/detail/recording_reader.h"
+#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
 std::string page(const char* path) {
-  std::ifstream file(std::filesystem::path(EVENTGAN_SOURCE_DIR) / path);
-  return {std::istreambuf_iterator<char>(file), {}};
+  return testing::read_file(std::filesystem::path(EVENTGAN_SOURCE_DIR) / path);
 }
 
 /// The lines of the table behind the one whose cells begin with `head`.
