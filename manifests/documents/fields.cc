@@ -97,8 +97,8 @@ void Fields::needs(std::string_view second, std::string_view first) {
   }
 }
 
-void Fields::rule(Schema schema) {
-  if (schema_) (*schema_)["allOf"].push_back(std::move(schema));
+void Fields::rule(const Schema& schema) {
+  if (schema_) (*schema_)["allOf"].push_back(schema);
 }
 
 Fields::Schema Fields::schema() const {

@@ -131,7 +131,7 @@ class Fields {
   void rule(const char* schema) {
     if (schema_) rule(Schema::parse(schema));
   }
-  void rule(Schema schema);
+  void rule(const Schema& schema);
 
   /// The value of a key that is read apart, if it is there; no key is a fault by that.
   std::optional<StrictValue> peek(std::string_view key) {
