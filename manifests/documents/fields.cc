@@ -49,7 +49,7 @@ bool Fields::has_format(std::string_view format, int version) {
   return true;
 }
 
-void Fields::describe(std::string_view key, Schema schema, std::string_view what,
+void Fields::describe(std::string_view key, const Schema& schema, std::string_view what,
                       bool is_required) {
   Schema property = {{"description", what}};
   property.update(schema);

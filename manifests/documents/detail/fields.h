@@ -204,7 +204,8 @@ class Fields {
   static bool is_empty(const Schema& value) {
     return value.is_null() || value.empty() || value == "";
   }
-  void describe(std::string_view key, Schema schema, std::string_view what, bool is_required);
+  void describe(std::string_view key, const Schema& schema, std::string_view what,
+                bool is_required);
   void state_default(std::string_view key, const Schema& value);
   void set_kind(std::string_view key, std::string_view word, std::string_view fallback);
   bool is_of(const std::vector<std::string_view>& owners) const;
