@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -9,26 +11,30 @@
 #include <string_view>
 #include <vector>
 
+#include "manifests/values/training.h"
 #include "pipeline/training/csv_table.h"
 #include "pipeline/training/training_checkpoint.h"
 
 namespace eventgan {
 
-/// The losses that a training reports, in the columns' order (see StepLosses).
-inline constexpr std::array<std::string_view, 14> kLossNames{"flow",
-                                                             "flow.photometric",
-                                                             "flow.smoothness",
-                                                             "reconstruction",
-                                                             "volume",
-                                                             "count",
-                                                             "overlap",
-                                                             "likelihood",
-                                                             "block_likelihood",
-                                                             "generator",
-                                                             "generator.total",
-                                                             "discriminator",
-                                                             "discriminator.real_accuracy",
-                                                             "discriminator.fake_accuracy"};
+/// The losses that a training reports, in the columns' order (see StepLosses): those of kLossTerms
+/// that are not the paper's stand among the paper's own.
+inline constexpr auto kLossNames = [] {
+  constexpr std::array<std::string_view, 4> kCycle{"flow", "flow.photometric", "flow.smoothness",
+                                                   "reconstruction"};
+  constexpr std::array<std::string_view, 5> kAdversarial{
+      "generator", "generator.total", "discriminator", "discriminator.real_accuracy",
+      "discriminator.fake_accuracy"};
+  constexpr std::size_t kOwn = std::ranges::count_if(
+      kLossTerms, [](const LossTerm& term) { return term.kind != LossKind::kPaper; });
+  std::array<std::string_view, kCycle.size() + kOwn + kAdversarial.size()> names{};
+  auto end = std::ranges::copy(kCycle, names.begin()).out;
+  for (const LossTerm& term : kLossTerms) {
+    if (term.kind != LossKind::kPaper) *end++ = term.word;
+  }
+  std::ranges::copy(kAdversarial, end);
+  return names;
+}();
 
 /// One step as it is logged. NaN: the step did not compute this loss.
 struct LossRow {
