@@ -23,20 +23,24 @@ using namespace std::string_view_literals;
 constexpr std::string_view kExif = "Exif\0\0"sv;
 constexpr std::uint32_t kMostExifBytes = 1 << 24;  // a JPEG has no room for more than 64 KiB
 
-/// The block of EXIF in a file's chunk, where the file is open at.
-Buffer exif_block(std::FILE* file, std::uint32_t size_bytes) {
-  if (size_bytes > kMostExifBytes) throw std::runtime_error("more than 16 MiB of EXIF");
-  Buffer block(size_bytes);
-  if (std::fread(block.data(), 1, block.size(), file) != block.size()) {
-    throw std::runtime_error("one that ends early");
-  }
-  // The name is JPEG's alone, but some write it into WebP too.
+/// With the name that is JPEG's alone, but that some write into PNG and WebP too.
+Buffer named(Buffer block) {
   const bool is_named =
       block.size() >= kExif.size() &&
       std::ranges::equal(
           kExif, std::string_view(reinterpret_cast<const char*>(block.data()), kExif.size()));
   if (!is_named) block.insert(block.begin(), kExif.begin(), kExif.end());
   return block;
+}
+
+/// So many bytes of EXIF, from where the file is open at.
+Buffer exif_block(std::FILE* file, std::uint32_t size_bytes) {
+  if (size_bytes > kMostExifBytes) throw std::runtime_error("more than 16 MiB of EXIF");
+  Buffer block(size_bytes);
+  if (std::fread(block.data(), 1, block.size(), file) != block.size()) {
+    throw std::runtime_error("one that ends early");
+  }
+  return named(std::move(block));
 }
 
 std::uint32_t png_number(const std::uint8_t* bytes) {
@@ -64,25 +68,31 @@ int exif_orientation(const Buffer& block) {
   return orientation >= 1 && orientation <= 8 ? orientation : 1;
 }
 
-// Every chunk of a PNG: length and type, as many bytes, a checksum of type and bytes.
+// Every chunk of a PNG: length and type, as many bytes, a checksum of type and bytes. It is
+// compared in every chunk but the pixels', whose decoder does: a damaged type would hide the
+// orientation.
 int png_orientation(std::FILE* file) {
   std::array<std::uint8_t, 8> head;
   std::fseek(file, head.size(), SEEK_SET);  // the signature
   while (std::fread(head.data(), 1, head.size(), file) == head.size()) {
     const std::uint32_t length = png_number(head.data());
     const std::string_view type(reinterpret_cast<const char*>(head.data()) + 4, 4);
-    if (type == "eXIf") {
-      const Buffer block = exif_block(file, length);
-      std::array<std::uint8_t, 4> checksum{};
-      const std::size_t read = std::fread(checksum.data(), 1, checksum.size(), file);
-      const std::uint32_t start = libdeflate_crc32(0, head.data() + 4, 4);
-      if (read != checksum.size() || libdeflate_crc32(start, block.data() + block.size() - length,
-                                                      length) != png_number(checksum.data())) {
-        throw std::runtime_error("damaged EXIF");
-      }
-      return exif_orientation(block);
+    if (type == "IDAT") {
+      if (std::fseek(file, static_cast<long>(length) + 4, SEEK_CUR) != 0) break;
+      continue;
     }
-    if (type == "IEND" || std::fseek(file, static_cast<long>(length) + 4, SEEK_CUR) != 0) break;
+    if (length > kMostExifBytes) throw std::runtime_error("more than 16 MiB of metadata");
+    Buffer chunk(std::size_t{length} + 4);
+    if (std::fread(chunk.data(), 1, chunk.size(), file) != chunk.size()) {
+      throw std::runtime_error("one that ends early");
+    }
+    const std::uint32_t start = libdeflate_crc32(0, head.data() + 4, 4);
+    if (libdeflate_crc32(start, chunk.data(), length) != png_number(chunk.data() + length)) {
+      throw std::runtime_error(type == "eXIf" ? "damaged EXIF" : "a damaged chunk of metadata");
+    }
+    chunk.resize(length);
+    if (type == "eXIf") return exif_orientation(named(std::move(chunk)));
+    if (type == "IEND") break;
   }
   return 1;
 }

@@ -224,9 +224,15 @@ TEST_F(ImageOrientationTest, DamageIsNamed) {
   EXPECT_EQ(why_not_upright(file), "expected a whole PNG, got damaged EXIF");
   EXPECT_NO_THROW(decode_image_file(file));
   damaged = png;
+  damaged[kPngHeader + 5] ^= 0x20;  // eXIf becomes exIf, which nobody knows
+  write_file(file, damaged);
+  EXPECT_EQ(why_not_upright(file), "expected a whole PNG, got a damaged chunk of metadata");
+  EXPECT_THROW(image_file_size(file, ImageOrientation::kUpright), std::runtime_error);
+  EXPECT_NO_THROW(decode_image_file(file));
+  damaged = png;
   damaged.replace(kPngHeader, 4, "\x7f\xff\xff\xff");
   write_file(file, damaged);
-  EXPECT_EQ(why_not_upright(file), "expected a whole PNG, got more than 16 MiB of EXIF");
+  EXPECT_EQ(why_not_upright(file), "expected a whole PNG, got more than 16 MiB of metadata");
   write_file(file, png.substr(0, kPngHeader + 20));
   EXPECT_EQ(why_not_upright(file), "expected a whole PNG, got one that ends early");
   for (const char* ending : {"jpg", "png", "webp"}) {
