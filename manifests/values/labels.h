@@ -121,7 +121,7 @@ struct LabelSchema {
 
 /// A box in volume pixels, beside the annotation it comes from.
 struct VolumeBox {
-  Rectangle clipped;    ///< cut to the volume
+  Rectangle clipped;    ///< cut to what the volume shows of the image
   Rectangle unclipped;  ///< as mapped
   bool ignore = false;  ///< as annotated, or because a crop left nothing of the box
 };

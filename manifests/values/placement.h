@@ -28,8 +28,6 @@ struct Placement {
   /// What is left of the source without its borders.
   ImageSize cut() const { return {source.height - 2 * border_y, source.width - 2 * border_x}; }
 
-  bool has_borders() const { return border_x > 0 || border_y > 0; }
-
   double scale_x() const { return static_cast<double>(scaled.width) / cut().width; }
   double scale_y() const { return static_cast<double>(scaled.height) / cut().height; }
 

@@ -58,7 +58,7 @@ class CocoFile {
 struct OriginalIds {
   std::int64_t image = 0;
   std::vector<std::int64_t> annotations, categories;
-  std::vector<std::int64_t> persons;  ///< of the annotations that are persons as well
+  std::vector<std::size_t> persons;  ///< which of the annotations are persons as well
 };
 
 /// None if the sample's labels are not COCO's, or some have no ids.
@@ -74,7 +74,7 @@ std::optional<OriginalIds> original_ids(const ExportSource& source, const Annota
       const nlohmann::json joints = object.value("keypoints", nlohmann::json::array());
       bool is_person = false;
       for (std::size_t i = 2; i < joints.size(); i += 3) is_person = is_person || joints[i] > 0;
-      if (is_person) ids.persons.push_back(ids.annotations.back());
+      if (is_person) ids.persons.push_back(ids.annotations.size() - 1);
     }
     if (ids.annotations.size() != annotation.boxes.size() ||
         ids.persons.size() != annotation.persons.size()) {
@@ -96,19 +96,29 @@ class KeptIds {
       Split& split = splits_[source.split];
       if (!source.has_coco_labels) {
         split.is_kept = false;
+        persons_agree_ = persons_agree_ && !source.has_joints();
         continue;
       }
       const ShardReader reader = input.open(shard);
       for (int slot = 0; slot < reader.header().sample_count; ++slot) {
         const ShardSample sample = reader.sample(slot);
-        if (sample.valid) add(source, sample.annotation, split);
+        if (sample.valid) add(source, reader.header().label_schema, sample.annotation, split);
       }
     }
     for (auto& [name, split] : splits_) split.images = split.annotations = {};
+    if (!persons_agree_) persons_.clear();
   }
 
   /// Whether a split's samples and annotations keep their ids: all have one, each another.
   bool in(const std::string& split) const { return splits_.at(split).is_kept; }
+
+  /// Categories of persons by their numbers, if the labels of all sources with joints have them.
+  struct PersonCategory {
+    std::string name;
+    std::vector<std::string> joints;
+    bool operator==(const PersonCategory&) const = default;
+  };
+  const std::map<std::int64_t, PersonCategory>& person_categories() const { return persons_; }
 
   /// The classes' numbers, of those that some annotation is of; empty if two do not agree.
   std::map<std::string, int> categories() const {
@@ -124,11 +134,20 @@ class KeptIds {
     std::set<std::int64_t> images, annotations;
   };
 
-  void add(const ExportSource& source, const Annotation& annotation, Split& split) {
+  void add(const ExportSource& source, const LabelSchema& schema, const Annotation& annotation,
+           Split& split) {
     const auto ids = original_ids(source, annotation);
     if (!ids) {
-      agree_ = split.is_kept = false;
+      agree_ = persons_agree_ = split.is_kept = false;
       return;
+    }
+    for (const std::size_t i : ids->persons) {
+      const std::int64_t category = ids->categories[i];
+      const auto class_id = static_cast<std::size_t>(annotation.boxes[i].class_id);
+      const PersonCategory found{source.class_names.at(class_id), choose_joints(schema).names};
+      persons_agree_ = persons_agree_ && category >= 0 &&
+                       category <= std::numeric_limits<int>::max() &&
+                       persons_.emplace(category, found).first->second == found;
     }
     split.is_kept = split.is_kept && split.images.insert(ids->image).second;
     for (std::size_t i = 0; i < annotation.boxes.size(); ++i) {
@@ -148,7 +167,9 @@ class KeptIds {
 
   std::map<std::string, Split> splits_;
   std::map<std::string, int> categories_;
+  std::map<std::int64_t, PersonCategory> persons_;
   bool agree_ = true;
+  bool persons_agree_ = true;
 };
 
 /// instances_SPLIT.json, person_keypoints_SPLIT.json, volumes/SPLIT/NAME.npy.
@@ -198,11 +219,7 @@ class CocoExporter : public Exporter {
         [&](const std::string& why) { ++left_out[why]; });
     const ShardHeader& header = sample.reader.header();
     const JointChoice choice = choose_joints(header.label_schema);
-    for (const VolumePerson& person : sample.labels.labels.persons) {
-      if (!person_box(person, choice, header.volume.size)) {
-        ++left_out["persons of whom nothing is left in the volume"];
-      }
-    }
+    account_persons(sample.labels, choice, header.volume.size, left_out);
   }
 
  private:
@@ -246,19 +263,24 @@ class CocoExporter : public Exporter {
     for_each_box(sample, numbers_, keep_ignored_, take, [](const std::string&) {});
   }
 
-  /// The joints' names of each category of persons.
-  using Skeletons = std::vector<std::vector<std::string>>;
+  using PersonCategories = std::map<std::int64_t, KeptIds::PersonCategory>;
 
-  /// Of all splits, so that a category is the same in all of their files.
-  static Skeletons skeletons_of(const ExportInput& input) {
-    Skeletons skeletons;
+  /// Of all splits, so that a category is the same in all of their files: the labels' own, else one
+  /// for each list of joints.
+  PersonCategories person_categories(const ExportInput& input) const {
+    if (kept_ids_ && !kept_ids_->person_categories().empty()) {
+      return kept_ids_->person_categories();
+    }
+    PersonCategories categories;
     for (const LabelSchema& schema : input.joint_schemas()) {
       std::vector<std::string> names = choose_joints(schema).names;
-      if (std::ranges::find(skeletons, names) == skeletons.end()) {
-        skeletons.push_back(std::move(names));
-      }
+      const auto is_same = [&](const auto& known) { return known.second.joints == names; };
+      if (std::ranges::any_of(categories, is_same)) continue;
+      const auto number = static_cast<std::int64_t>(categories.size()) + 1;
+      categories[number] = {number == 1 ? "person" : fmt::format("person-{}", number),
+                            std::move(names)};
     }
-    return skeletons;
+    return categories;
   }
 
   void write_file(const ExportWork& work, const std::vector<const ExportShard*>& shards,
@@ -271,7 +293,8 @@ class CocoExporter : public Exporter {
     }
     ExportFolder::Step step(work.folder, name, persons ? hash.hex() : input_hash(shards));
     if (step.is_done()) return;
-    const Skeletons skeletons = persons ? skeletons_of(work.input) : Skeletons();
+    const PersonCategories categories =
+        persons ? person_categories(work.input) : PersonCategories();
     CocoFile file(step.file(name));
     // Unless it keeps its own, an image's number is its place in the split, in both of its files.
     std::int64_t place = 0;
@@ -289,7 +312,7 @@ class CocoExporter : public Exporter {
       ++place;
       if (!is_for(sample.shard, work, persons)) return;
       if (persons) {
-        add_persons(sample, place, id, skeletons, file);
+        add_persons(sample, place, id, categories, file);
       } else {
         add_boxes(sample, place, id, file);
       }
@@ -300,32 +323,39 @@ class CocoExporter : public Exporter {
         file.add(coco_category(number, class_name));
       }
     }
-    for (std::size_t i = 0; i < skeletons.size(); ++i) {
+    for (const auto& [number, category] : categories) {
       std::vector<std::pair<int, int>> limbs;
-      for (const Limb& limb : limbs_of(skeletons[i])) limbs.emplace_back(limb.from, limb.to);
-      const int number = static_cast<int>(i) + 1;
-      file.add(coco_person_category(number,
-                                    number == 1 ? "person" : "person-" + std::to_string(number),
-                                    skeletons[i], limbs));
+      for (const Limb& limb : limbs_of(category.joints)) limbs.emplace_back(limb.from, limb.to);
+      file.add(
+          coco_person_category(static_cast<int>(number), category.name, category.joints, limbs));
     }
     file.publish();
     step.finish();
   }
 
   void add_persons(const OutgoingSample& sample, std::int64_t place, std::int64_t& id,
-                   const Skeletons& skeletons, CocoFile& file) const {
-    const auto ids = ids_of(sample);
+                   const PersonCategories& categories, CocoFile& file) const {
+    const ShardSample& labels = sample.labels;
     const ShardHeader& header = sample.reader.header();
     const JointChoice choice = choose_joints(header.label_schema);
-    const auto known = std::ranges::find(skeletons, choice.names) - skeletons.begin();
-    const ShardSample& labels = sample.labels;
+    const auto ids = ids_of(sample);
+    const auto originals = kept_ids_ && !kept_ids_->person_categories().empty()
+                               ? original_ids(sample.source, labels.annotation)
+                               : std::nullopt;
+    const auto same_joints = std::ranges::find_if(
+        categories, [&](const auto& known) { return known.second.joints == choice.names; });
     for (std::size_t p = 0; p < labels.labels.persons.size(); ++p) {
-      const VolumePerson& person = labels.labels.persons[p];
-      const auto box = person_box(person, choice, header.volume.size);
+      const auto box = person_box(labels, p, choice, header.volume.size);
       if (!box) continue;
-      const std::int64_t own = ids ? ids->persons[p] : ++id;
-      file.add(coco_person({own, ids ? ids->image : place, static_cast<int>(known) + 1}, *box,
-                           exported_joints(labels, p, choice)));
+      const std::int64_t own = ids ? ids->annotations[ids->persons[p]] : ++id;
+      const std::int64_t category =
+          originals ? originals->categories[originals->persons[p]] : same_joints->first;
+      const auto& annotated = labels.annotation.persons[p].box;
+      const bool is_crowd = std::ranges::any_of(labels.annotation.boxes, [&](const Box& one) {
+        return one.ignore && annotated && one.xyxy == *annotated;
+      });
+      file.add(coco_person({own, ids ? ids->image : place, static_cast<int>(category)}, *box,
+                           is_crowd, exported_joints(labels, p, choice), header.volume.size));
     }
   }
 

@@ -15,6 +15,8 @@
 #include "stages/base/files/input_file.h"
 #include "stages/base/files/sha256.h"
 #include "stages/events/images/preview_image.h"
+#include "stages/labels/label_mapping.h"
+#include "stages/shards/sample_check.h"
 
 namespace eventgan {
 namespace {
@@ -111,8 +113,9 @@ void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut
   if (largest > full_scale) ++left_out["samples' values above the full scale (cut to it)"];
 }
 
-std::optional<Rectangle> person_box(const VolumePerson& person, const JointChoice& choice,
-                                    ImageSize volume) {
+std::optional<Rectangle> person_box(const ShardSample& sample, std::size_t index,
+                                    const JointChoice& choice, ImageSize volume) {
+  const VolumePerson& person = sample.labels.persons.at(index);
   constexpr double kFar = std::numeric_limits<double>::infinity();
   Rectangle box{kFar, kFar, -kFar, -kFar};
   const auto include = [&](const Rectangle& part) {
@@ -132,7 +135,7 @@ std::optional<Rectangle> person_box(const VolumePerson& person, const JointChoic
     if (person.head_box) include(*person.head_box);
   }
   if (box.left > box.right) return std::nullopt;
-  const Rectangle cut = clip(box, volume);
+  const Rectangle cut = clip(box, shown_area(sample, volume));
   return is_empty(cut) ? std::nullopt : std::optional(cut);
 }
 
@@ -144,6 +147,21 @@ std::vector<ExportedJoint> exported_joints(const ShardSample& sample, std::size_
                       sample.annotation.persons.at(person).joints.at(i).visible});
   }
   return joints;
+}
+
+void account_persons(const ShardSample& sample, const JointChoice& choice, ImageSize volume,
+                     LeftOut& left_out) {
+  for (std::size_t i = 0; i < sample.labels.persons.size(); ++i) {
+    if (!person_box(sample, i, choice, volume)) {
+      ++left_out["persons of whom nothing is left in the volume"];
+      continue;
+    }
+    for (const ExportedJoint& joint : exported_joints(sample, i, choice)) {
+      if (joint.at != kMissingPoint && !is_within(joint, volume)) {
+        ++left_out["joints outside the volume (as not annotated)"];
+      }
+    }
+  }
 }
 
 ClassNumbers::ClassNumbers(const ExportInput& input, const ExportOptions& options, int first) {

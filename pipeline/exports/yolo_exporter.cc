@@ -83,18 +83,7 @@ class YoloExporter : public Exporter {
         [&](const std::string& why) { ++left_out[why]; });
     const ShardHeader& header = sample.reader.header();
     const JointChoice choice = choose_joints(header.label_schema);
-    const std::vector<VolumePerson>& persons = sample.labels.labels.persons;
-    for (std::size_t i = 0; i < persons.size(); ++i) {
-      if (!person_box(persons[i], choice, header.volume.size)) {
-        ++left_out["persons of whom nothing is left in the volume"];
-        continue;
-      }
-      for (const ExportedJoint& joint : exported_joints(sample.labels, i, choice)) {
-        if (joint.at != kMissingPoint && !is_within(joint, header.volume.size)) {
-          ++left_out["joints outside the volume (as not annotated)"];
-        }
-      }
-    }
+    account_persons(sample.labels, choice, header.volume.size, left_out);
   }
 
  private:
@@ -128,7 +117,7 @@ class YoloExporter : public Exporter {
     const JointChoice choice = choose_joints(header.label_schema);
     std::string text;
     for (std::size_t i = 0; i < sample.labels.labels.persons.size(); ++i) {
-      const auto box = person_box(sample.labels.labels.persons[i], choice, header.volume.size);
+      const auto box = person_box(sample.labels, i, choice, header.volume.size);
       if (!box) continue;
       text +=
           yolo_pose_line(0, *box, exported_joints(sample.labels, i, choice), header.volume.size) +

@@ -108,14 +108,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json annotation(const CocoPlace& place, const Rectangle& box) {
+Json annotation(const CocoPlace& place, const Rectangle& box, bool is_crowd) {
   const double width = box.right - box.left;
   const double height = box.bottom - box.top;
   return {{"id", place.id},
           {"image_id", place.image_id},
           {"category_id", place.category_id},
           {"bbox", {box.left, box.top, width, height}},
-          {"area", width * height}};
+          {"area", width * height},
+          {"iscrowd", is_crowd ? 1 : 0}};
 }
 
 }  // namespace
@@ -130,19 +131,16 @@ std::string coco_image(std::int64_t id, const std::string& file_name, ImageSize 
 }
 
 std::string coco_box(const CocoPlace& place, const Rectangle& box, bool is_crowd) {
-  Json json = annotation(place, box);
-  json["iscrowd"] = is_crowd ? 1 : 0;
-  return dump_json(json);
+  return dump_json(annotation(place, box, is_crowd));
 }
 
-std::string coco_person(const CocoPlace& place, const Rectangle& box,
-                        const std::vector<ExportedJoint>& joints) {
-  Json json = annotation(place, box);
-  json["iscrowd"] = 0;
+std::string coco_person(const CocoPlace& place, const Rectangle& box, bool is_crowd,
+                        const std::vector<ExportedJoint>& joints, ImageSize volume) {
+  Json json = annotation(place, box, is_crowd);
   int annotated = 0;
   Json keypoints = Json::array();
   for (const ExportedJoint& joint : joints) {
-    if (joint.at == kMissingPoint) {
+    if (!is_within(joint, volume)) {
       for (int i = 0; i < 3; ++i) keypoints.push_back(0);
       continue;
     }

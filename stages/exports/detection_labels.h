@@ -63,9 +63,10 @@ struct CocoPlace {
 std::string coco_box(const CocoPlace& place, const Rectangle& box, bool is_crowd);
 
 /// An entry for a person: COCO counts an image from its left edge, so each joint is moved by half
-/// a pixel; visibility 0 not annotated (then x = y = 0), 1 hidden, 2 visible or not known.
-std::string coco_person(const CocoPlace& place, const Rectangle& box,
-                        const std::vector<ExportedJoint>& joints);
+/// a pixel; visibility 0 not annotated or outside the volume (then x = y = 0), 1 hidden, 2 visible
+/// or not known.
+std::string coco_person(const CocoPlace& place, const Rectangle& box, bool is_crowd,
+                        const std::vector<ExportedJoint>& joints, ImageSize volume);
 
 /// An entry of `categories`.
 std::string coco_category(int id, const std::string& name);

@@ -77,34 +77,24 @@ std::array<double, 12> to_volume(const Placement& placement,
   return mapped;
 }
 
-namespace {
-
 Rectangle clip(const Rectangle& box, const Rectangle& area) {
   return {std::clamp(box.left, area.left, area.right), std::clamp(box.top, area.top, area.bottom),
           std::clamp(box.right, area.left, area.right),
           std::clamp(box.bottom, area.top, area.bottom)};
 }
 
-Rectangle whole(ImageSize size) {
-  return {0, 0, static_cast<double>(size.width), static_cast<double>(size.height)};
-}
-
-/// What labels are clipped to. A border that was cut away would lie in the border of a letterbox.
-Rectangle area_of(const Placement& placement) {
-  const Rectangle volume = whole(placement.volume);
-  if (!placement.has_borders()) return volume;
-  const double left = placement.offset_x;
-  const double top = placement.offset_y;
-  return clip({left, top, left + placement.scaled.width, top + placement.scaled.height}, volume);
-}
-
-}  // namespace
-
-Rectangle clip(const Rectangle& box, ImageSize size) { return clip(box, whole(size)); }
-
 bool is_empty(const Rectangle& box) { return !(box.left < box.right && box.top < box.bottom); }
 
 namespace {
+
+/// What the volume shows of the image, which labels are clipped to.
+Rectangle area_of(const Placement& placement) {
+  const double left = placement.offset_x;
+  const double top = placement.offset_y;
+  return clip({left, top, left + placement.scaled.width, top + placement.scaled.height},
+              {0, 0, static_cast<double>(placement.volume.width),
+               static_cast<double>(placement.volume.height)});
+}
 
 // Each check returns what was expected and what was got, or nothing if all is well.
 using Complaint = std::optional<std::string>;

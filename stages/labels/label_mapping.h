@@ -24,15 +24,15 @@ Intrinsics to_volume(const Placement& placement, const Intrinsics& camera);
 std::array<double, 12> to_volume(const Placement& placement,
                                  const std::array<double, 12>& projection);
 
-/// `box` cut to [0, width] x [0, height]; a box wholly outside becomes empty (zero width or height)
-/// at the border nearest to it, never inside out.
-Rectangle clip(const Rectangle& box, ImageSize size);
+/// `box` cut to `area`; a box wholly outside becomes empty (zero width or height) at the border
+/// nearest to it, never inside out.
+Rectangle clip(const Rectangle& box, const Rectangle& area);
 
 /// True if the rectangle has no area.
 bool is_empty(const Rectangle& box);
 
-/// Maps every label into the volume; boxes are clipped to it, those of a still without its borders
-/// to what is seen of the image. A fault if a label cannot belong to the image: a place, a
+/// Maps every label into the volume; boxes are clipped to what it shows of the image (not to a
+/// letterbox's borders). A fault if a label cannot belong to the image: a place, a
 /// camera or a scale beyond 1e6 (px), another number that is not finite (a joint in 3-D may be
 /// unknown), a projection that is not in the volume, a box with right < left or bottom < top or
 /// without any overlap with the source image (a box to ignore may lie anywhere within those 1e6

@@ -87,19 +87,6 @@ std::array<double, 4> cut(Row box, const std::array<double, 4>& area) {
           std::clamp(box[2], area[0], area[2]), std::clamp(box[3], area[1], area[3])};
 }
 
-/// What boxes are cut to: the volume, or what it shows of a still's image.
-std::array<double, 4> area_of(const ShardSample& sample, const SourceToVolume& map,
-                              const std::array<double, 4>& volume) {
-  const auto [height, width] = sample.source_size;
-  const auto border = sample.pair.motion ? still_border(sample.source_size, sample.pair)
-                                         : std::optional<ImageSize>();
-  if (!border || *border == ImageSize{}) return volume;
-  const auto [rows, columns] = *border;
-  const double seen[] = {static_cast<double>(columns), static_cast<double>(rows),
-                         static_cast<double>(width - columns), static_cast<double>(height - rows)};
-  return cut(map(Mapped::kEdges, seen), volume);
-}
-
 /// The rows of one sample in the columns of floats that a shard has.
 class SampleRows {
  public:
@@ -190,6 +177,19 @@ std::string part_name(const ColumnSpec& spec, const std::string& name, std::size
 
 }  // namespace
 
+Rectangle shown_area(const ShardSample& sample, ImageSize volume) {
+  const auto border = sample.pair.motion ? still_border(sample.source_size, sample.pair)
+                                         : std::optional<ImageSize>();
+  const auto [rows, columns] = border.value_or(ImageSize{});
+  const auto [height, width] = sample.source_size;
+  const double seen[] = {static_cast<double>(columns), static_cast<double>(rows),
+                         static_cast<double>(width - columns), static_cast<double>(height - rows)};
+  const std::array<double, 4> shown =
+      cut(SourceToVolume(sample.source_to_volume)(Mapped::kEdges, seen),
+          {0, 0, static_cast<double>(volume.width), static_cast<double>(volume.height)});
+  return {shown[0], shown[1], shown[2], shown[3]};
+}
+
 std::vector<std::string> label_faults(const ShardHeader& header, const ShardTables& tables,
                                       int slot, const ShardSample& sample) {
   std::vector<std::string> faults;
@@ -229,12 +229,13 @@ std::vector<std::string> label_faults(const ShardHeader& header, const ShardTabl
   const SourceToVolume map(sample.source_to_volume);
   const std::array<double, 4> volume{0, 0, static_cast<double>(header.volume.size.width),
                                      static_cast<double>(header.volume.size.height)};
-  const std::array<double, 4> area = area_of(sample, map, volume);
+  const Rectangle shown = shown_area(sample, header.volume.size);
+  const std::array<double, 4> area{shown.left, shown.top, shown.right, shown.bottom};
   rows.visit([&](const ColumnSpec& spec, const std::string& name, std::size_t k, Row row) {
     if (spec.path == std::string_view("/labels/boxes/xyxy")) {
       expect(near(row, cut(rows.row(spec.group(), "xyxy_unclipped", k), area)) &&
                  std::ranges::equal(row, cut(row, volume)),
-             name + " to be xyxy_unclipped cut to the volume");
+             name + " to be xyxy_unclipped cut to what the volume shows of the image");
     }
     if (spec.mapped.how == Mapped::kNot || !is_checked(spec)) return;
     const std::string of = spec.mapped.source;

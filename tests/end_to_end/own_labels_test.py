@@ -106,7 +106,7 @@ class OwnLabels(program.InFolder):
         boxes = [(f"{name}.png", label, *edges) for name, edges in squares.items() for label in ("person", "car")]
         keypoints = [7, 12, 2, 0, 0, 0, 13.5, 19, 1]
         given = self.coco({f"{name}.png": (64, 48) for name in squares}, boxes,
-                          lambda i: {"iscrowd": int(i == 3),
+                          lambda i: {"iscrowd": int(i in (3, 4)),
                                      **({"keypoints": keypoints, "num_keypoints": 2} if i % 2 == 0 else {})},
                           {"keypoints": JOINTS, "skeleton": [[1, 2]]})
         self.job({"format": "coco", "path": "instances.json"})
@@ -123,11 +123,15 @@ class OwnLabels(program.InFolder):
         self.assert_same_coco(given, instances)
         people = json.loads((folder / "person_keypoints_train.json").read_text())
         originals = {entry["id"]: entry for entry in given["annotations"]}
-        self.assertEqual(people["categories"][0]["keypoints"], JOINTS)
+        self.assertEqual([(entry["id"], entry["name"], entry["keypoints"]) for entry in people["categories"]],
+                         [(number, name, JOINTS) for number, name in CATEGORIES.items() if name == "person"])
         self.assertEqual(len(people["annotations"]), 5)
         for person in people["annotations"]:
             np.testing.assert_allclose(person["keypoints"], keypoints, atol=PIXELS)
-            self.assertEqual((person["image_id"], person["num_keypoints"]), (originals[person["id"]]["image_id"], 2))
+            self.assertEqual(person["num_keypoints"], 2)
+            for key in ("image_id", "category_id", "iscrowd"):
+                self.assertEqual(person[key], originals[person["id"]][key])
+        self.assertEqual(sum(person["iscrowd"] for person in people["annotations"]), 1)
 
     def assert_same_coco(self, given, exported, scale=1.0, shift=(0, 0)):
         images = {entry["id"]: entry for entry in given["images"]}

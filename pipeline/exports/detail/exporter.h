@@ -115,14 +115,18 @@ void write_image_pair(const OutgoingSample& sample, const std::string& folder, d
 /// Counts a sample that has values above the full scale.
 void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut& left_out);
 
-/// The person's box: as annotated, else around its chosen joints and its head; cut to the volume.
-/// None if nothing is left.
-std::optional<Rectangle> person_box(const VolumePerson& person, const JointChoice& choice,
-                                    ImageSize volume);
+/// A person's box: as annotated, else around its chosen joints and its head; cut to what the volume
+/// shows of the image. None if nothing is left.
+std::optional<Rectangle> person_box(const ShardSample& sample, std::size_t person,
+                                    const JointChoice& choice, ImageSize volume);
 
 /// The chosen joints of a person of a sample.
 std::vector<ExportedJoint> exported_joints(const ShardSample& sample, std::size_t person,
                                            const JointChoice& choice);
+
+/// Counts the persons without a person_box, and of the others the joints outside the volume.
+void account_persons(const ShardSample& sample, const JointChoice& choice, ImageSize volume,
+                     LeftOut& left_out);
 
 /// values [channel, pixel] as [pixel, channel].
 template <class Value>

@@ -83,11 +83,19 @@ TEST(CocoBox, IsLeftTopWidthHeight) {
 TEST(CocoPerson, JointsAreMovedByHalfAPixelAndSayHowVisible) {
   const std::vector<ExportedJoint> joints{
       {{10, 20}, 1}, {{11, 21}, 0}, {{12, 22}, -1}, {kMissingPoint, 0}};
-  const Json json = Json::parse(coco_person({1, 2, 1}, {0, 0, 4, 5}, joints));
+  const Json json = Json::parse(coco_person({1, 2, 1}, {0, 0, 4, 5}, false, joints, {40, 30}));
   EXPECT_EQ(json["keypoints"], Json({10.5, 20.5, 2, 11.5, 21.5, 1, 12.5, 22.5, 2, 0, 0, 0}));
   EXPECT_EQ(json["num_keypoints"], 3);
   EXPECT_EQ(json["iscrowd"], 0);
   EXPECT_EQ(json["area"], 20.0);
+}
+
+TEST(CocoPerson, JointsThatACropCutsAwayAreNotAnnotated) {
+  const std::vector<ExportedJoint> joints{{{-0.6, 2}, 1}, {{-0.5, 2}, 1}, {{3, 4.6}, 0}};
+  const Json json = Json::parse(coco_person({1, 2, 1}, {0, 0, 4, 5}, true, joints, {5, 4}));
+  EXPECT_EQ(json["keypoints"], Json({0, 0, 0, 0.0, 2.5, 2, 0, 0, 0}));
+  EXPECT_EQ(json["num_keypoints"], 1);
+  EXPECT_EQ(json["iscrowd"], 1);
 }
 
 TEST(CocoPersonCategory, CountsJointsFromOne) {

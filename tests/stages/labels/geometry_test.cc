@@ -105,18 +105,18 @@ TEST(Geometry, AMappedCameraProjectsToMappedPoints) {
 }
 
 TEST(Clip, CutsToTheImageAndIsNeverInsideOut) {
-  const ImageSize size{50, 100};
+  const Rectangle image{0, 0, 100, 50};
   for (const double left : {-30.0, -10.0, 0.0, 40.0, 100.0, 130.0}) {
     for (const double top : {-30.0, 0.0, 20.0, 50.0, 70.0}) {
       const Rectangle box{left, top, left + 20, top + 10};
-      const Rectangle clipped = clip(box, size);
+      const Rectangle clipped = clip(box, image);
       EXPECT_GE(clipped.left, 0);
       EXPECT_GE(clipped.top, 0);
       EXPECT_LE(clipped.left, clipped.right);
       EXPECT_LE(clipped.top, clipped.bottom);
       EXPECT_LE(clipped.right, 100);
       EXPECT_LE(clipped.bottom, 50);
-      EXPECT_EQ(clip(clipped, size), clipped);
+      EXPECT_EQ(clip(clipped, image), clipped);
       const bool overlaps = left < 100 && left + 20 > 0 && top < 50 && top + 10 > 0;
       EXPECT_EQ(is_empty(clipped), !overlaps);
     }
@@ -125,12 +125,12 @@ TEST(Clip, CutsToTheImageAndIsNeverInsideOut) {
 
 TEST(Clip, LeavesABoxInsideAsItIs) {
   const Rectangle box{0, 1.5, 100, 49.25};
-  EXPECT_EQ(clip(box, {50, 100}), box);
+  EXPECT_EQ(clip(box, {0, 0, 100, 50}), box);
 }
 
 TEST(Clip, ABoxOutsideBecomesEmptyAtTheNearestBorder) {
-  EXPECT_EQ(clip(Rectangle{-20, 10, -5, 30}, {50, 100}), (Rectangle{0, 10, 0, 30}));
-  EXPECT_EQ(clip(Rectangle{120, 60, 130, 70}, {50, 100}), (Rectangle{100, 50, 100, 50}));
+  EXPECT_EQ(clip(Rectangle{-20, 10, -5, 30}, {0, 0, 100, 50}), (Rectangle{0, 10, 0, 30}));
+  EXPECT_EQ(clip(Rectangle{120, 60, 130, 70}, {0, 0, 100, 50}), (Rectangle{100, 50, 100, 50}));
 }
 
 TEST(IsEmpty, IsTrueWithoutArea) {

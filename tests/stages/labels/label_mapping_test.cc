@@ -100,6 +100,14 @@ TEST(MapLabels, WhatAStillsBordersHideIsCutEvenWhereALetterboxHasRoom) {
   EXPECT_EQ(to_source(still, labels.boxes[0].unclipped), (Rectangle{12, 6, 20, 49}));
 }
 
+TEST(MapLabels, ABoxThatReachesIntoALetterboxesBorderIsCutAtTheImage) {
+  // 100x50 in 60x40: 60x30, 5 px from the top. An edge maps as 0.6 x and 0.6 y + 5.
+  const Placement letterbox{{50, 100}, {30, 60}, {40, 60}, 0, 5};
+  const auto labels = mapped({"", {box(-10, -5, 50, 60)}, {}}, letterbox);
+  EXPECT_EQ(labels.boxes[0].unclipped, (Rectangle{-6, 2, 30, 41}));
+  EXPECT_EQ(labels.boxes[0].clipped, (Rectangle{0, 5, 30, 35}));
+}
+
 TEST(MapLabels, DontCareStaysIgnored) {
   Box dont_care = box(10, 10, 20, 20);
   dont_care.ignore = true;
