@@ -16,6 +16,7 @@ extern "C" {
 #include <opencv2/core.hpp>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include "stages/base/files/input_file.h"
@@ -197,12 +198,20 @@ std::optional<double> VideoFile::frames_per_second() const {
 
 std::int64_t VideoFile::announced_count() const {
   const AVStream& stream = *decoder_->stream;
-  if (stream.nb_frames > 0) return stream.nb_frames;
-  double duration_s = static_cast<double>(decoder_->format->duration) / AV_TIME_BASE;
-  if (!(duration_s > 0))
-    duration_s = static_cast<double>(stream.duration) * ratio(stream.time_base);
+  const AVFormatContext& format = *decoder_->format;
+  const bool has_edits = std::string_view(format.iformat->name).starts_with("mov");
+  if (stream.nb_frames > 0 && !has_edits) return stream.nb_frames;
+  // Where there is an edit list, the stream's duration is that of the frames that are shown.
+  // Without one the container's counts, which may begin at 0 wherever the first frame is.
+  const std::int64_t start =
+      format.start_time == AV_NOPTS_VALUE ? 0 : std::max<std::int64_t>(0, format.start_time);
+  const double duration_s = stream.duration == AV_NOPTS_VALUE
+                                ? static_cast<double>(format.duration - start) / AV_TIME_BASE
+                                : static_cast<double>(stream.duration) * ratio(stream.time_base);
   const double count = std::floor(duration_s * frames_per_second().value_or(0) + 0.5);
-  return count > 0 && count < 1e12 ? static_cast<std::int64_t>(count) : 0;
+  if (!(count > 0 && count < 1e12)) return std::max<std::int64_t>(0, stream.nb_frames);
+  const auto shown = static_cast<std::int64_t>(count);
+  return stream.nb_frames > 0 ? std::min(stream.nb_frames, shown) : shown;
 }
 
 }  // namespace eventgan

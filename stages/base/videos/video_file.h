@@ -35,7 +35,7 @@ class VideoFile {
   /// When the latest frame is shown, in seconds from any time on; NaN if the file does not tell.
   double time_s() const;
 
-  /// As the container says, often an estimate; 0 if it does not.
+  /// Frames that are shown, as the container says, often an estimate; 0 if it does not.
   std::int64_t announced_count() const;
 
   /// As the container says; none if it does not.

@@ -65,7 +65,9 @@ std::optional<VideoLabels> read_video_labels(const std::filesystem::path& file,
 
 namespace {
 
-constexpr std::array<std::string_view, 4> kVideoExtensions = {".mp4", ".avi", ".mov", ".mkv"};
+constexpr auto kVideoExtensions =
+    std::to_array<std::string_view>({".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg",
+                                     ".mpeg", ".ts", ".mts", ".wmv", ".flv", ".gif"});
 
 /// The place of the extension in kVideoExtensions; their number if it is none of them.
 std::size_t video_rank(const fs::path& file) {

@@ -71,13 +71,14 @@ TEST(VideoClip, TimesThatDoNotAscendAreNotTaken) {
   EXPECT_FALSE(clip.times_ascend);
 }
 
-/// Copies a video's packets to a Matroska file in which its i-th frame is shown at times_ms[i].
+/// Copies a video's packets to a file in which its i-th frame is shown at times_ms[i].
 void copy_retimed(const std::filesystem::path& from, const std::filesystem::path& to,
                   const std::vector<int>& times_ms) {
   AVFormatContext* in = nullptr;
   AVFormatContext* out = nullptr;
   ASSERT_EQ(avformat_open_input(&in, from.c_str(), nullptr, nullptr), 0);
-  ASSERT_GE(avformat_alloc_output_context2(&out, nullptr, "matroska", to.c_str()), 0);
+  ASSERT_GE(avformat_alloc_output_context2(&out, nullptr, nullptr, to.c_str()), 0);
+  out->avoid_negative_ts = 0;  // what is shown before 0 is not shown: MP4 has an edit list then
   AVStream* const stream = avformat_new_stream(out, nullptr);
   avcodec_parameters_copy(stream->codecpar, in->streams[0]->codecpar);
   stream->codecpar->codec_tag = 0;
@@ -97,11 +98,13 @@ void copy_retimed(const std::filesystem::path& from, const std::filesystem::path
   EXPECT_FALSE(std::ranges::is_sorted(order)) << "frames in the order in which they are shown";
   std::ranges::sort(order);
   ASSERT_EQ(order.size(), times_ms.size());
-  std::int64_t decoded_ms = -1000;  // each before it is shown
+  std::size_t place = 0;
   for (AVPacket* packet : packets) {
     const auto shown_as = std::ranges::lower_bound(order, packet->pts) - order.begin();
     packet->pts = times_ms[static_cast<std::size_t>(shown_as)];
-    packet->dts = decoded_ms++;
+    packet->dts = times_ms[place++] - 200;  // each before it is shown
+    packet->duration = 40;
+    av_packet_rescale_ts(packet, {1, 1000}, stream->time_base);
     ASSERT_GE(av_write_frame(out, packet), 0);
     av_packet_free(&packet);
   }
@@ -138,6 +141,16 @@ TEST(VideoClip, FramesStoredInAnotherOrderHaveTheirOwnTimes) {
   ASSERT_EQ(uneven.frame_count, kFrames);
   ASSERT_EQ(uneven.uneven_times_s.size(), static_cast<std::size_t>(kFrames));
   for (int i = 0; i < kFrames; ++i) EXPECT_NEAR(uneven.time_s(i), times_ms[i] / 1000.0, 1e-9) << i;
+
+  // A clock that begins at 5 s, and a cut without decoding, whose first five frames are not shown.
+  for (const auto& [name, start_ms, shown] :
+       {std::tuple("late.mkv", 5000, kFrames), std::tuple("cut.mp4", -200, kFrames - 5)}) {
+    for (int i = 0; i < kFrames; ++i) times_ms[i] = start_ms + 40 * i;
+    copy_retimed(folder / "even.mp4", folder / name, times_ms);
+    const VideoClip clip = measure_video(folder / name);
+    EXPECT_EQ(clip.frame_count, shown) << name;
+    EXPECT_EQ(clip.announced_count, shown) << name;
+  }
 }
 
 TEST(VideoClip, RefusesWhatIsNoVideo) {
