@@ -230,7 +230,13 @@ void refuse_another_job(const fs::path& folder, const Fingerprint& now,
 
 /// What to do about a fingerprint that differs: inputs that were mended ask for no new start, which
 /// would throw away what all other shards took.
-const char* way_out(const Fingerprint& frozen, Fingerprint now) {
+std::string way_out(const Fingerprint& frozen, Fingerprint now) {
+  if (const auto trial = limit_of(frozen); trial && trial != limit_of(now)) {
+    return fmt::format(
+        ": a trial of it lies there, made with --limit {} (choose another output folder, or start "
+        "again with --overwrite):",
+        *trial);
+  }
   for (const auto& [field, value] : frozen) {
     if (is_amendable(field)) now[field] = value;
   }

@@ -395,6 +395,7 @@ class Trial(program.InFolder):
         self.convert("--limit", 4, "--output", self.folder / "mine")
         self.assertEqual(len(self.ids("mine")), 4)
         _, errors = self.convert("--output", self.folder / "mine", expect=64)
+        self.assertIn(": a trial of it lies there, made with --limit 4 (choose another", errors)
         self.assertIn("limit: expected 4, got nothing", errors)
         self.convert()
         self.assertIn("limit: expected nothing, got 4",
