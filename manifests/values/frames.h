@@ -9,6 +9,13 @@
 
 namespace eventgan {
 
+/// The values of images of 16 bits that become 0 and 255.
+struct ValueRange {
+  int low = 0;
+  int high = 65535;  ///< > low
+  bool operator==(const ValueRange&) const = default;
+};
+
 /// Size of an image or a volume in pixels; always height first, as arrays are laid out.
 struct ImageSize {
   int height = 0;

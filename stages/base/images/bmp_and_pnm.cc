@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -123,6 +124,8 @@ struct PnmHeader {
   ImageSize size;
   char kind = '1';  ///< 1 and 4: bits, 2 and 5: grey, 3 and 6: colour; from 4 on binary
   int greatest = 1;
+
+  bool is_bits() const { return kind == '1' || kind == '4'; }
 };
 
 /// The next number, after white space and comments ("# ..."), and the white space behind it, which
@@ -166,17 +169,20 @@ PnmHeader read_pnm_header(std::FILE* file) {
 
 ImageSize pnm_size(std::FILE* file) { return read_pnm_header(file).size; }
 
-ColourFrame decode_pnm(std::FILE* file) {
-  const PnmHeader header = read_pnm_header(file);
+namespace {
+
+/// Reads the pixels; `take(value, header)` makes a channel of each.
+template <class Channel, class Take>
+std::vector<Channel> read_pixels(std::FILE* file, const PnmHeader& header, const Take& take) {
   const bool is_binary = header.kind >= '4';
-  const bool is_bits = header.kind == '1' || header.kind == '4';
+  const bool is_bits = header.is_bits();
   const bool is_wide = header.greatest > 255;
   const int channels = header.kind == '3' || header.kind == '6' ? 3 : 1;
   const int count = channels * header.size.width;  // of values in a row
   Buffer row(is_bits ? (count + 7) / 8 : is_wide ? 2 * count : count);
   require_bytes(file, row.size() * header.size.height);  // as text it is longer
-  ColourFrame frame{header.size, Buffer(3 * header.size.pixel_count())};
-  std::uint8_t* to = frame.bgr.data();
+  std::vector<Channel> bgr(3 * header.size.pixel_count());
+  Channel* to = bgr.data();
   for (int y = 0; y < header.size.height; ++y, to += 3 * header.size.width) {
     if (is_binary) read_exactly(file, row.data(), row.size());
     for (int i = 0; i < count; ++i) {
@@ -188,18 +194,35 @@ ColourFrame decode_pnm(std::FILE* file) {
         throw std::runtime_error("a value of " + std::to_string(value) + " beyond " +
                                  std::to_string(header.greatest));
       }
-      const auto byte = static_cast<std::uint8_t>(is_bits     ? 255 * (1 - value)
-                                                  : is_wide   ? value >> 8
-                                                  : is_binary ? value
-                                                              : value * 255 / header.greatest);
+      const auto channel = static_cast<Channel>(take(value));
       if (channels == 1) {
-        std::fill_n(to + 3 * i, 3, byte);
+        std::fill_n(to + 3 * i, 3, channel);
       } else {
-        to[i - i % 3 + 2 - i % 3] = byte;  // blue first
+        to[i - i % 3 + 2 - i % 3] = channel;  // blue first
       }
     }
   }
-  return frame;
+  return bgr;
+}
+
+}  // namespace
+
+ColourFrame decode_pnm(std::FILE* file) {
+  const PnmHeader header = read_pnm_header(file);
+  const bool is_binary = header.kind >= '4';
+  return {header.size, read_pixels<std::uint8_t>(file, header, [&](int value) {
+            return header.is_bits()        ? 255 * (1 - value)
+                   : header.greatest > 255 ? value >> 8
+                   : is_binary             ? value
+                                           : value * 255 / header.greatest;
+          })};
+}
+
+std::optional<WideFrame> decode_wide_pnm(std::FILE* file) {
+  const PnmHeader header = read_pnm_header(file);
+  if (header.greatest <= 255) return std::nullopt;
+  return WideFrame{header.size,
+                   read_pixels<std::uint16_t>(file, header, [](int value) { return value; })};
 }
 
 }  // namespace eventgan

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <vector>
 
 #include "manifests/values/frames.h"
@@ -49,6 +50,18 @@ ImageSize bmp_size(std::FILE* file);
 /// PBM, PGM and PPM, plain and binary; 16 bits are cut to the upper 8.
 ColourFrame decode_pnm(std::FILE* file);
 ImageSize pnm_size(std::FILE* file);
+
+/// [y, x, channel] uint16, C order, channels blue, green, red.
+struct WideFrame {
+  ImageSize size;
+  std::vector<std::uint16_t> bgr;
+};
+
+/// The same images with all of their bits, if they have 16 a channel (PNM: more than 8); none
+/// otherwise, from the header alone. As strict as above.
+std::optional<WideFrame> decode_wide_png(std::FILE* file);
+std::optional<WideFrame> decode_wide_tiff(std::FILE* file);
+std::optional<WideFrame> decode_wide_pnm(std::FILE* file);
 
 using Buffer = std::vector<std::uint8_t>;
 

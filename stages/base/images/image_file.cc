@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -26,32 +29,33 @@ struct Format {
   bool (*starts)(std::string_view bytes);  ///< a file of it, by the first 12
   ColourFrame (*decode)(std::FILE*);
   ImageSize (*size)(std::FILE*);
-  int (*orientation)(std::FILE*);  ///< null: it tells none
+  int (*orientation)(std::FILE*);                ///< null: it tells none
+  std::optional<WideFrame> (*wide)(std::FILE*);  ///< null: no more than 8 bits
 };
 
 constexpr std::array<Format, 6> kFormats = {{
     {"JPEG", [](std::string_view bytes) { return bytes.starts_with("\xff\xd8\xff"); }, decode_jpeg,
-     jpeg_size, jpeg_orientation},
+     jpeg_size, jpeg_orientation, nullptr},
     {"PNG", [](std::string_view bytes) { return bytes.starts_with("\x89PNG\r\n\x1a\n"); },
-     decode_png, png_size, png_orientation},
+     decode_png, png_size, png_orientation, decode_wide_png},
     {"WebP",
      [](std::string_view bytes) { return bytes.starts_with("RIFF") && bytes.ends_with("WEBP"); },
-     decode_webp, webp_size, webp_orientation},
+     decode_webp, webp_size, webp_orientation, nullptr},
     {"TIFF",
      [](std::string_view bytes) {
        using namespace std::string_view_literals;
        return bytes.starts_with("II*\0"sv) || bytes.starts_with("MM\0*"sv) ||
               bytes.starts_with("II+\0"sv) || bytes.starts_with("MM\0+"sv);
      },
-     decode_tiff, tiff_size, tiff_orientation},
+     decode_tiff, tiff_size, tiff_orientation, decode_wide_tiff},
     {"BMP", [](std::string_view bytes) { return bytes.starts_with("BM"); }, decode_bmp, bmp_size,
-     nullptr},
+     nullptr, nullptr},
     {"PNM",
      [](std::string_view bytes) {
        return bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6' &&
               std::isspace(static_cast<unsigned char>(bytes[2])) != 0;
      },
-     decode_pnm, pnm_size, nullptr},
+     decode_pnm, pnm_size, nullptr, decode_wide_pnm},
 }};
 
 /// None: the file is no image.
@@ -65,11 +69,10 @@ const Format* format_of(const InputFile& file) {
   return format == kFormats.end() ? nullptr : format;
 }
 
-/// What one of a format's functions makes of the file, turned as is wanted; with its errors
-/// completed.
-template <class Result>
-Result read_by_format(const InputFile& file, Result (*Format::*read)(std::FILE*),
-                      ImageOrientation wanted, std::size_t block_bytes) {
+/// What `read(format, stream)` makes of the file, turned as is wanted; with its errors completed.
+template <class Read>
+auto read_by_format(const InputFile& file, const Read& read, ImageOrientation wanted,
+                    std::size_t block_bytes) {
   const Format* const format = format_of(file);
   if (format == nullptr) {
     throw std::runtime_error(
@@ -77,13 +80,13 @@ Result read_by_format(const InputFile& file, Result (*Format::*read)(std::FILE*)
   }
   const InputFile::Stream stream = file.stream(block_bytes);
   int orientation = 1;
-  Result result;
+  decltype(read(*format, stream.get())) result;
   try {
     if (wanted == ImageOrientation::kUpright && format->orientation != nullptr) {
       orientation = format->orientation(stream.get());
       std::rewind(stream.get());
     }
-    result = (format->*read)(stream.get());
+    result = read(*format, stream.get());
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(std::string("expected a whole ") + format->name + ", got " +
                              error.what());
@@ -93,6 +96,22 @@ Result read_by_format(const InputFile& file, Result (*Format::*read)(std::FILE*)
                              std::to_string(orientation));
   }
   return turned(std::move(result), orientation);
+}
+
+constexpr std::size_t kPixelsBlock = std::size_t{1} << 16;
+constexpr std::size_t kHeaderBlock = std::size_t{1} << 13;
+
+ColourFrame narrowed(const WideFrame& wide, const ValueRange& range) {
+  std::vector<std::uint8_t> bytes(65536);  // of each value
+  const double scale = 255.0 / (range.high - range.low);
+  for (int value = 0; value < 65536; ++value) {
+    bytes[static_cast<std::size_t>(value)] =
+        static_cast<std::uint8_t>(std::clamp(std::lround((value - range.low) * scale), 0L, 255L));
+  }
+  ColourFrame frame{wide.size, std::vector<std::uint8_t>(wide.bgr.size())};
+  std::ranges::transform(wide.bgr, frame.bgr.begin(),
+                         [&](std::uint16_t value) { return bytes[value]; });
+  return frame;
 }
 
 }  // namespace
@@ -115,16 +134,39 @@ InputFile open_image_file(const std::filesystem::path& file) {
 
 bool is_image(const InputFile& file) { return format_of(file) != nullptr; }
 
-ColourFrame decode_image(const InputFile& file, ImageOrientation orientation) {
-  return read_by_format(file, &Format::decode, orientation, std::size_t{1} << 16);
+ColourFrame decode_image(const InputFile& file, ImageOrientation orientation,
+                         const std::optional<ValueRange>& range) {
+  const auto decode = [&](const Format& format, std::FILE* stream) {
+    if (range && format.wide != nullptr) {
+      if (const auto wide = format.wide(stream)) return narrowed(*wide, *range);
+      std::rewind(stream);
+    }
+    return format.decode(stream);
+  };
+  return read_by_format(file, decode, orientation, kPixelsBlock);
 }
 
-ColourFrame decode_image_file(const std::filesystem::path& file, ImageOrientation orientation) {
-  return decode_image(open_image_file(file), orientation);
+ColourFrame decode_image_file(const std::filesystem::path& file, ImageOrientation orientation,
+                              const std::optional<ValueRange>& range) {
+  return decode_image(open_image_file(file), orientation, range);
+}
+
+bool count_wide_values(const InputFile& file, std::span<std::int64_t> histogram) {
+  bool is_wide = false;
+  const auto count = [&](const Format& format, std::FILE* stream) {
+    const auto wide = format.wide == nullptr ? std::nullopt : format.wide(stream);
+    if (!wide) return ImageSize{};
+    is_wide = true;
+    for (const std::uint16_t value : wide->bgr) ++histogram[value];
+    return wide->size;
+  };
+  read_by_format(file, count, ImageOrientation::kStored, kPixelsBlock);
+  return is_wide;
 }
 
 ImageSize image_size(const InputFile& file, ImageOrientation orientation) {
-  return read_by_format(file, &Format::size, orientation, std::size_t{1} << 13);
+  const auto size = [](const Format& format, std::FILE* stream) { return format.size(stream); };
+  return read_by_format(file, size, orientation, kHeaderBlock);
 }
 
 ImageSize image_file_size(const std::filesystem::path& file, ImageOrientation orientation) {

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -50,9 +52,19 @@ enum class ImageOrientation { kStored, kUpright };
 /// mirror (2, 4, 5, 7) throw too, "expected an image that is not mirrored, got EXIF orientation 2":
 /// one that was drawn from the other side is no other view of the scene. A file that tells none, or
 /// a number beyond 1 to 8, is taken as stored, as all do.
-ColourFrame decode_image(const InputFile& file, ImageOrientation orientation);
+///
+/// Of an image of 16 bits (PNG, TIFF, PNM) the upper 8 are taken, or with a `range` the value v
+/// becomes round(255 (v - low) / (high - low)), at least 0 and at most 255. Others have no use for
+/// the range.
+ColourFrame decode_image(const InputFile& file, ImageOrientation orientation,
+                         const std::optional<ValueRange>& range = {});
 ColourFrame decode_image_file(const std::filesystem::path& file,
-                              ImageOrientation orientation = ImageOrientation::kStored);
+                              ImageOrientation orientation = ImageOrientation::kStored,
+                              const std::optional<ValueRange>& range = {});
+
+/// Counts the values of an image of 16 bits: `histogram` has 65,536 counts. False, and nothing is
+/// counted, if it has fewer bits. Throws as decode_image. Thread safe for different histograms.
+bool count_wide_values(const InputFile& file, std::span<std::int64_t> histogram);
 
 /// The size alone, from the header, turned as the image would be. Throws as above. Thread safe.
 ImageSize image_size(const InputFile& file, ImageOrientation orientation);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <csetjmp>
 #include <cstddef>
 #include <cstdint>
@@ -11,6 +12,7 @@
 #include <cstring>
 #include <memory>
 #include <new>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -346,30 +348,54 @@ class PngFile {
   ColourFrame read() {
     ColourFrame frame{read_header(), {}};
     frame.bgr.resize(3 * frame.size.pixel_count());
-    const std::size_t row_bytes = 3 * static_cast<std::size_t>(frame.size.width);
-    std::vector<png_bytep> rows;
-    rows.reserve(static_cast<std::size_t>(frame.size.height));
-    for (int y = 0; y < frame.size.height; ++y) rows.push_back(frame.bgr.data() + y * row_bytes);
     const bool has_palette = png_get_color_type(png_, info_) == PNG_COLOR_TYPE_PALETTE;
     run_guarded(escape_, [&] {
       if (has_palette) {
         png_set_packing(png_);  // a byte for each index
         png_set_interlace_handling(png_);
       } else {
+        png_set_strip_16(png_);
         set_conversions();
       }
+    });
+    const std::vector<png_bytep> rows = read_rows(frame, has_palette ? 3 : 1);
+    if (has_palette) look_up_colours(frame, rows);
+    return frame;
+  }
+
+  std::optional<WideFrame> read_wide() {
+    WideFrame frame{read_header(), {}};
+    if (png_get_bit_depth(png_, info_) < 16) return std::nullopt;
+    frame.bgr.resize(3 * frame.size.pixel_count());
+    run_guarded(escape_, [&] {
+      if constexpr (std::endian::native == std::endian::little) png_set_swap(png_);
+      set_conversions();
+    });
+    read_rows(frame, 1);
+    return frame;
+  }
+
+ private:
+  /// Reads the pixels, each row to the place of the frame's, of which it fills `part`th.
+  template <class Frame>
+  std::vector<png_bytep> read_rows(Frame& frame, std::size_t part) {
+    auto* const pixels = reinterpret_cast<png_bytep>(frame.bgr.data());
+    const std::size_t row_bytes =
+        3 * sizeof(frame.bgr[0]) * static_cast<std::size_t>(frame.size.width);
+    std::vector<png_bytep> rows;
+    rows.reserve(static_cast<std::size_t>(frame.size.height));
+    for (int y = 0; y < frame.size.height; ++y) rows.push_back(pixels + y * row_bytes);
+    run_guarded(escape_, [&] {
       png_read_update_info(png_, info_);
-      if (png_get_rowbytes(png_, info_) != (has_palette ? row_bytes / 3 : row_bytes)) {
+      if (png_get_rowbytes(png_, info_) != row_bytes / part) {
         escape_.leave("unexpected kind of pixels");
       }
       png_read_image(png_, rows.data());
       png_read_end(png_, nullptr);
     });
-    if (has_palette) look_up_colours(frame, rows);
-    return frame;
+    return rows;
   }
 
- private:
   /// Each row's indices, which are at its start, become colours. libpng would do it, but takes an
   /// index beyond the palette for black.
   void look_up_colours(const ColourFrame& frame, const std::vector<png_bytep>& rows) {
@@ -391,9 +417,8 @@ class PngFile {
     }
   }
 
-  /// Whatever the file holds but a palette, to 8-bit blue, green, red.
+  /// Whatever the file holds but a palette, to blue, green, red of at least 8 bits.
   void set_conversions() {
-    png_set_strip_16(png_);
     png_set_strip_alpha(png_);
     const png_byte kind = png_get_color_type(png_, info_);
     if ((kind & PNG_COLOR_MASK_COLOR) == 0) {
@@ -419,6 +444,8 @@ ColourFrame decode_png(std::FILE* file) {
   std::rewind(file);
   return PngFile(file, std::move(stored)).read();
 }
+
+std::optional<WideFrame> decode_wide_png(std::FILE* file) { return PngFile(file).read_wide(); }
 
 ImageSize png_size(std::FILE* file) { return PngFile(file).read_header(); }
 

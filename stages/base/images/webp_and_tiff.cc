@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -115,6 +116,43 @@ class TiffFile {
     return frame;
   }
 
+  std::optional<WideFrame> read_wide() {
+    WideFrame frame{size(), {}};
+    const auto field = [this](std::uint32_t tag) {
+      std::uint16_t value = 0;
+      TIFFGetFieldDefaulted(tiff_, tag, &value);
+      return value;
+    };
+    if (field(TIFFTAG_BITSPERSAMPLE) != 16) return std::nullopt;
+    const int samples = field(TIFFTAG_SAMPLESPERPIXEL);
+    const int kind = field(TIFFTAG_PHOTOMETRIC);
+    const bool is_grey = kind == PHOTOMETRIC_MINISBLACK && samples <= 2;
+    if (!is_grey && !(kind == PHOTOMETRIC_RGB && samples >= 3)) {
+      fail("16 bits that are neither grey nor red, green, blue");
+    }
+    if (field(TIFFTAG_SAMPLEFORMAT) != SAMPLEFORMAT_UINT) fail("16 bits of signed or real numbers");
+    if (field(TIFFTAG_PLANARCONFIG) != PLANARCONFIG_CONTIG || TIFFIsTiled(tiff_) != 0) {
+      fail("16 bits in planes or tiles");
+    }
+    const auto width = static_cast<std::size_t>(frame.size.width);
+    std::vector<std::uint16_t> row(width * static_cast<std::size_t>(samples));
+    if (TIFFScanlineSize64(tiff_) != 2 * row.size()) fail("a damaged header");
+    frame.bgr.reserve(3 * frame.size.pixel_count());
+    in_pixels_ = true;
+    for (int y = 0; y < frame.size.height; ++y) {
+      if (TIFFReadScanline(tiff_, row.data(), static_cast<std::uint32_t>(y)) != 1 ||
+          !error_.empty()) {
+        fail("damaged pixels");
+      }
+      for (std::size_t x = 0; x < row.size(); x += static_cast<std::size_t>(samples)) {
+        for (const std::size_t channel : {2, 1, 0}) {
+          frame.bgr.push_back(row[x + (is_grey ? 0 : channel)]);
+        }
+      }
+    }
+    return frame;
+  }
+
  private:
   [[noreturn]] void fail(const std::string& otherwise) const {
     throw std::runtime_error(error_.empty() ? otherwise : error_);
@@ -160,5 +198,7 @@ ImageSize tiff_size(std::FILE* file) { return TiffFile(file).size(); }
 int tiff_orientation(std::FILE* file) { return TiffFile(file).orientation(); }
 
 ColourFrame decode_tiff(std::FILE* file) { return TiffFile(file).read(); }
+
+std::optional<WideFrame> decode_wide_tiff(std::FILE* file) { return TiffFile(file).read_wide(); }
 
 }  // namespace eventgan

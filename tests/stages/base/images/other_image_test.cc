@@ -56,6 +56,67 @@ std::vector<cv::Mat> kinds(ImageSize size) {
   return images;
 }
 
+/// Four pixels of 16 bits, blue, green, red; grey ones have the first channel thrice.
+cv::Mat wide_image(bool is_colour) {
+  const std::uint16_t values[2][2][3] = {{{0, 1000, 1250}, {1002, 1004, 1500}},
+                                         {{1499, 1498, 1255}, {2000, 65535, 1001}}};
+  cv::Mat image(2, 2, is_colour ? CV_16UC3 : CV_16UC1);
+  for (int y = 0; y < 2; ++y) {
+    for (int x = 0; x < 2; ++x) {
+      for (int c = 0; c < image.channels(); ++c) {
+        image.ptr<std::uint16_t>(y)[image.channels() * x + c] = values[y][x][c];
+      }
+    }
+  }
+  return image;
+}
+
+TEST(ImagesOfSixteenBits, AreSpreadOverTheGivenRange) {
+  const TemporaryFolder folder;
+  // 255 (v - 1000) / 500: 1250 becomes 127.5, rounded up; 1002, 1004: 1.02, 2.04; 1499, 1498:
+  // 254.49, 253.98; 1255: 130.05; 1001: 0.51.
+  const std::vector<std::uint8_t> colour{0, 0, 128, 1, 2, 255, 254, 254, 130, 255, 255, 1};
+  const std::vector<std::uint8_t> grey{0, 0, 0, 1, 1, 1, 254, 254, 254, 255, 255, 255};
+  for (const bool is_colour : {false, true}) {
+    for (const char* ending : {"png", "tiff", is_colour ? "ppm" : "pgm"}) {
+      for (const int choice : {0, 1}) {  // PNM: plain or binary; TIFF: not compressed or LZW
+        const auto file = folder / "image."s.append(ending);
+        ASSERT_TRUE(cv::imwrite(
+            file.string(), wide_image(is_colour),
+            {cv::IMWRITE_PXM_BINARY, choice, cv::IMWRITE_TIFF_COMPRESSION, choice == 0 ? 1 : 5}));
+        const ColourFrame frame =
+            decode_image_file(file, ImageOrientation::kStored, ValueRange{1000, 1500});
+        EXPECT_EQ(frame.size, (ImageSize{2, 2}));
+        EXPECT_EQ(frame.bgr, is_colour ? colour : grey) << ending << choice;
+        std::vector<std::int64_t> counts(65536);
+        EXPECT_TRUE(count_wide_values(open_image_file(file), counts));
+        EXPECT_EQ(counts[0], is_colour ? 1 : 3);
+        EXPECT_EQ(counts[65535], is_colour ? 1 : 0);
+        EXPECT_EQ(counts[1002], is_colour ? 1 : 3);
+        // A file that ends early has no values.
+        const std::string whole = read_file(file);
+        write_file(file, whole.substr(0, whole.size() - whole.size() / 4));
+        EXPECT_THROW(decode_image_file(file, ImageOrientation::kStored, ValueRange{1000, 1500}),
+                     std::runtime_error)
+            << ending << choice;
+      }
+    }
+  }
+}
+
+TEST(ImagesOfSixteenBits, OthersHaveNoUseForARange) {
+  const TemporaryFolder folder;
+  for (const char* ending : {"png", "jpg", "webp", "tiff", "bmp", "ppm"}) {
+    const auto file = folder / "image."s.append(ending);
+    ASSERT_TRUE(cv::imwrite(file.string(), gradient_image({11, 13})));
+    EXPECT_EQ(decode_image_file(file, ImageOrientation::kStored, ValueRange{100, 200}).bgr,
+              decode_image_file(file).bgr);
+    std::vector<std::int64_t> counts(65536);
+    EXPECT_FALSE(count_wide_values(open_image_file(file), counts));
+    EXPECT_EQ(counts, std::vector<std::int64_t>(65536));
+  }
+}
+
 TEST(OtherImages, HaveTheSamePixelsAsOpenCvReads) {
   const TemporaryFolder folder;
   int written = 0;
