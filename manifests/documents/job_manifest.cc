@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "manifests/documents/detail/document_tables.h"
 #include "manifests/documents/detail/job_manifest.h"
 #include "manifests/documents/detail/manifest_file.h"
 #include "manifests/documents/detail/sensor_document.h"
@@ -417,7 +418,7 @@ JobManifest read_job_document(const StrictValue& document) {
   const StrictValue image = object.at("image");
   manifest.image = read_image(image, manifest.sources);
   if (const auto generator = object.find("generator")) {
-    manifest.generator = read_generator(*generator);
+    objects(list_generator).read(*generator, manifest.generator);
   }
   check_kind(manifest, sources);
   if (const auto volume = object.find("volume")) manifest.volume = read_volume(*volume);
@@ -438,7 +439,7 @@ JobManifest read_pair_document(const StrictValue& document) {
     manifest.image = read_image(*image, {SourceSpec()});
   }
   if (const auto generator = object.find("generator")) {
-    manifest.generator = read_generator(*generator);
+    objects(list_generator).read(*generator, manifest.generator);
     if (!needs_frames(manifest.generator.kind)) {
       generator->object().at("kind").fault("a generator that makes events of frames");
     }

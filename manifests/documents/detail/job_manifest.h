@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "manifests/documents/detail/strict_json.h"
-#include "manifests/values/events.h"
 #include "manifests/values/job.h"
 
 namespace eventgan {
@@ -35,17 +34,5 @@ std::array<double, 2> read_ends(const StrictValue& value, double lowest, double 
 
 /// Reads a recording's `columns`.
 EventFields read_columns(const StrictValue& value);
-
-/// Reads a contrast threshold, a number or [least, most], and beside it, if there, the ratio.
-ThresholdSpec read_threshold(const StrictValue& value, const std::optional<StrictValue>& ratio);
-
-/// Reads a sensor's `noise`.
-NoiseSpec read_noise(const StrictValue& value);
-
-/// Reads the manifest's `generator`; which keys it may have depends on its kind.
-GeneratorSpec read_generator(const StrictValue& value);
-
-/// Reads a manifest's `sensor`, whose keys are SensorSpec's.
-SensorSpec read_sensor(const StrictValue& value);
 
 }  // namespace eventgan
