@@ -10,6 +10,7 @@ namespace eventgan {
 
 // The tables of the documents' fields (fields.h).
 
+void list_job(Fields& fields, JobManifest& manifest);
 void list_training(Fields& fields, TrainingManifest& manifest);
 void list_simulation(Fields& fields, SimulationManifest& manifest);
 void list_camera_sensor(Fields& fields, CameraSensor& sensor);
