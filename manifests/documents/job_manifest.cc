@@ -398,14 +398,12 @@ void list_job(Fields& fields, JobManifest& manifest) {
 
 JobManifest parse_job_manifest(std::string_view text, const std::filesystem::path& directory,
                                const std::string& name) {
-  return parse_manifest<JobManifest>(with_sensor_document(text, directory), directory, name,
-                                     list_job);
+  return parse_manifest(with_sensor_document(text, directory), directory, name, list_job);
 }
 
 JobManifest parse_pair_manifest(std::string_view text, const std::filesystem::path& directory,
                                 const std::string& name) {
-  return parse_manifest<JobManifest>(with_sensor_document(text, directory), directory, name,
-                                     list_pair_manifest);
+  return parse_manifest(with_sensor_document(text, directory), directory, name, list_pair_manifest);
 }
 
 JobManifest read_job_manifest(const std::filesystem::path& file) {
