@@ -26,6 +26,13 @@ Schema schema_of(void (*list)(Fields&, T&)) {
 
 std::vector<DocumentKind> document_kinds() {
   return {
+      {"manifest.schema.json",
+       "eventgan job manifest, version 1",
+       "A job of `eventgan convert`: which labelled datasets become which HDF5 shards of event "
+       "volumes.",
+       {"of a range the second number is not below the first, and of fraction above it",
+        "a volume stays below 4 GiB (2 x bins x height x width x bytes of dtype)"},
+       schema_of(list_job)},
       {"simulation.schema.json",
        "eventgan simulation manifest, version 1",
        "A job of `eventgan simulate`: which clips become which event recordings, by which sensor.",
@@ -118,6 +125,10 @@ void add_rows(const Schema& object, const std::string& place, std::string& page)
     const bool is_list = property.contains("items");
     const Schema& inner = is_list ? property.at("items") : property;
     if (inner.contains("properties")) add_rows(inner, path + (is_list ? "[]." : "."), page);
+    for (const Schema& choice : inner.value("anyOf", Schema::array())) {
+      const bool is_told_elsewhere = choice.contains("title");
+      if (choice.contains("properties") && !is_told_elsewhere) add_rows(choice, path + ".", page);
+    }
   }
 }
 
