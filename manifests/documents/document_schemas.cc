@@ -26,6 +26,13 @@ Schema schema_of(void (*list)(Fields&, T&)) {
 
 std::vector<DocumentKind> document_kinds() {
   return {
+      {"manifest.schema.json",
+       "eventgan job manifest, version 1",
+       "A job of `eventgan convert`: which labelled datasets become which HDF5 shards of event "
+       "volumes.",
+       {"of a range the second number is not below the first, and of fraction above it",
+        "a volume stays below 4 GiB (2 x bins x height x width x bytes of dtype)"},
+       schema_of(list_job)},
       {"simulation.schema.json",
        "eventgan simulation manifest, version 1",
        "A job of `eventgan simulate`: which clips become which event recordings, by which sensor.",
@@ -44,6 +51,27 @@ std::vector<DocumentKind> document_kinds() {
        "An event camera: what its volumes need to be told of it, as `eventgan fit` finds it.",
        {"a range's second number is not below its first"},
        schema_of(list_camera_sensor)}};
+}
+
+/// JSON from `column` on: on one line of up to 120, or its members on some, objects on their own.
+std::string laid_out(const Schema& value, std::size_t indent = 0, std::size_t column = 0) {
+  constexpr std::size_t kWidth = 119;  // and a comma
+  if (!value.is_structured() || value.empty()) return dump_json(value);
+  const std::string margin = "\n" + std::string(indent + 2, ' ');
+  std::string line, lines;
+  std::size_t used = kWidth;  // of the last one of `lines`
+  for (const auto& [key, member] : value.items()) {
+    const std::string name = value.is_object() ? dump_json(Schema(key)) + ": " : "";
+    const std::string text = name + laid_out(member, indent + 2, indent + 2 + name.size());
+    const bool is_line = !member.is_object() && text.find('\n') == text.npos;
+    const bool stays = is_line && used + 2 + text.size() <= kWidth;
+    line += (line.empty() ? "" : ", ") + text;
+    lines += (lines.empty() ? "" : stays ? ", " : ",") + (stays ? "" : margin) + text;
+    used = is_line ? (stays ? used + 2 : indent + 2) + text.size() : kWidth;
+  }
+  const std::string_view ends = value.is_object() ? "{}" : "[]";
+  const bool fits = column + line.size() + 2 <= kWidth && line.find('\n') == line.npos;
+  return fits ? ends[0] + line + ends[1] : ends[0] + lines + margin.substr(0, indent + 1) + ends[1];
 }
 
 /// The text with what Markdown would take for a mark of its own escaped.
@@ -97,6 +125,10 @@ void add_rows(const Schema& object, const std::string& place, std::string& page)
     const bool is_list = property.contains("items");
     const Schema& inner = is_list ? property.at("items") : property;
     if (inner.contains("properties")) add_rows(inner, path + (is_list ? "[]." : "."), page);
+    for (const Schema& choice : inner.value("anyOf", Schema::array())) {
+      const bool is_told_elsewhere = choice.contains("title");
+      if (choice.contains("properties") && !is_told_elsewhere) add_rows(choice, path + ".", page);
+    }
   }
 }
 
@@ -114,7 +146,7 @@ std::map<std::string, std::string> document_schemas() {
                      "object once; an integer is written as one (9, not 9.0); {}.",
                      kind.what, fmt::join(kind.beyond, "; "))}};
     schema.update(kind.schema);
-    schemas[std::string(kind.file)] = dump_json(schema, JsonLayout::kIndented) + "\n";
+    schemas[std::string(kind.file)] = laid_out(schema) + "\n";
   }
   return schemas;
 }

@@ -22,12 +22,6 @@ Schema tidy(const Schema& value) {
   return tidied;
 }
 
-Schema words_of(const std::vector<std::string_view>& words) {
-  Schema list = Schema::array();
-  for (const std::string_view word : words) list.push_back(word);
-  return list;
-}
-
 Schema number_schema(double least, double most) {
   return {{"type", "number"}, {"minimum", tidy(least)}, {"maximum", tidy(most)}};
 }
@@ -67,25 +61,33 @@ void Fields::set_kind(std::string_view key, std::string_view word, std::string_v
   default_kind_ = fallback;
 }
 
-bool Fields::is_of(const std::vector<std::string_view>& owners) const {
-  return kind_.empty() || std::ranges::find(owners, kind_) != owners.end();
+Fields::Owned& Fields::owned_by(const Kinds& owners) {
+  const auto same = std::ranges::find(owned_, owners, &Owned::owners);
+  return same == owned_.end() ? owned_.emplace_back(Owned{owners, {}, {}}) : *same;
 }
 
-bool Fields::may_have(std::string_view key, const std::vector<std::string_view>& owners,
-                      bool is_required) {
+bool Fields::may_have(std::string_view key, const Only::Owners& owners) {
   if (schema_) {
-    const auto same = std::ranges::find(owned_, owners, &Owned::owners);
-    Owned& owned = same == owned_.end() ? owned_.emplace_back(Owned{owners, {}, {}}) : *same;
-    owned.keys.emplace_back(key);
-    if (is_required) owned.required.emplace_back(key);
+    if (kind_key_.empty()) return true;  // of an outer object, whose table has the rule
+    owned_by(owners.may).keys.emplace_back(key);
+    if (!owners.must.empty()) owned_by(owners.must).required.emplace_back(key);
     return true;
   }
-  if (is_of(owners)) return true;
+  if (kind_.empty() || std::ranges::find(owners.may, kind_) != owners.may.end()) return true;
   if (const auto found = peek(key)) {
     found->fault(fmt::format("no such key for {} \"{}\" (only for {})", kind_key_, kind_,
-                             fmt::join(owners, ", ")));
+                             fmt::join(owners.may, ", ")));
+    misplaced_.push_back(key);
   }
   return false;
+}
+
+/// "mpii, recording: the labels. Required of mpii."
+std::string Fields::of_kinds(const Only::Owners& owners, std::string_view what) {
+  std::string told = fmt::format("{}: {}", fmt::join(owners.may, ", "), what);
+  if (owners.must.empty()) return told;
+  if (owners.must == owners.may) return told + " Required.";
+  return told + fmt::format(" Required of {}.", fmt::join(owners.must, ", "));
 }
 
 void Fields::needs(std::string_view second, std::string_view first) {
@@ -97,6 +99,17 @@ void Fields::needs(std::string_view second, std::string_view first) {
   }
 }
 
+void Fields::sets(std::string_view first, std::initializer_list<std::string_view> others) {
+  for (const std::string_view other : others) {
+    const Schema both = {{"required", Schema::array({first, other})}};
+    rule({{"not", both}});
+    const auto found = peek(other);
+    if (found && peek(first)) {
+      found->fault(fmt::format("no such key together with {}, which sets it", first));
+    }
+  }
+}
+
 void Fields::rule(const Schema& schema) {
   if (schema_) (*schema_)["allOf"].push_back(schema);
 }
@@ -105,17 +118,15 @@ Fields::Schema Fields::schema() const {
   Schema schema = {{"type", "object"}, {"additionalProperties", false}};
   schema.update(*schema_);
   for (const Owned& owned : owned_) {
-    Schema is_owner = {
-        {"properties", {{std::string(kind_key_), {{"enum", words_of(owned.owners)}}}}}};
+    Schema is_owner = {{"properties", {{std::string(kind_key_), {{"enum", owned.owners}}}}}};
     // A kind that is left out is the default; one that must be there is a fault of its own.
     const bool may_be_left_out =
         default_kind_.empty() ||
         std::ranges::find(owned.owners, default_kind_) != owned.owners.end();
     if (!may_be_left_out) is_owner["required"] = Schema::array({kind_key_});
-    Schema others = Schema::object();
-    for (const std::string& key : owned.keys) others[key] = false;
-    Schema rule = {{"if", is_owner}, {"else", {{"properties", others}}}};
+    Schema rule = {{"if", is_owner}};
     if (!owned.required.empty()) rule["then"] = {{"required", owned.required}};
+    for (const std::string& key : owned.keys) rule["else"]["properties"][key] = false;
     schema["allOf"].push_back(std::move(rule));
   }
   return schema;
@@ -130,6 +141,8 @@ Texts paths() {
           R"({"title": "path", "type": "string", "pattern": "^[^\\u0000]+$"})"};
 }
 
+// Hidden files and temporaries begin with ".", options of commands with "-". Two names, a number
+// and a temporary's suffix stay below the file systems' limit of 255 bytes.
 Texts names() {
   return {
       "1..64 letters, digits, \".\", \"_\" or \"-\", not beginning with \".\" or \"-\"", is_name,

@@ -1,269 +1,184 @@
 #include "manifests/documents/job_manifest.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <limits>
-#include <stdexcept>
 
-#include "manifests/documents/detail/job_manifest.h"
+#include "manifests/documents/detail/document_tables.h"
 #include "manifests/documents/detail/manifest_file.h"
 #include "manifests/documents/detail/sensor_document.h"
-#include "manifests/documents/detail/strict_json.h"
-#include "manifests/documents/sensor_document.h"
-#include "manifests/values/job.h"
 #include "manifests/values/words.h"
 
 namespace eventgan {
-
-std::vector<int> read_gaps(const StrictValue& value, PairSide side) {
-  std::vector<int> gaps;
-  for (const StrictValue& element : value.elements(1)) {
-    const auto gap = element.sound_integer(1, 6);
-    if (!gap) continue;
-    if (side == PairSide::kAround && *gap % 2 != 0) {
-      element.fault("an even gap (2, 4 or 6), since side is \"around\"");
-    }
-    if (std::find(gaps.begin(), gaps.end(), *gap) != gaps.end()) element.fault("each gap once");
-    gaps.push_back(static_cast<int>(*gap));
-  }
-  std::sort(gaps.begin(), gaps.end());
-  return gaps;
-}
-
-std::array<double, 2> read_ends(const StrictValue& value, double lowest, double highest) {
-  const std::vector<StrictValue> ends = value.elements(2);
-  if (ends.size() != 2) {
-    if (!ends.empty()) value.fault("an array of 2");
-    return {lowest, lowest};
-  }
-  const std::array<double, 2> range{ends[0].number(lowest, highest),
-                                    ends[1].number(lowest, highest)};
-  if (range[1] < range[0]) ends[1].fault("a number not below the previous one");
-  return range;
-}
-
 namespace {
 
-StillsSpec read_motion(const StrictValue& value) {
-  constexpr double kFarthest_px = 100, kMost_deg = 45, kMostScale = 0.5;
-  StillsSpec spec;
-  StrictObject object = value.object();
-  if (const auto range = object.find("translation_px")) {
-    spec.translation_px = read_ends(*range, 0, kFarthest_px);
-  }
-  if (const auto angle = object.find("rotation_deg")) {
-    spec.rotation_deg = angle->number(0, kMost_deg);
-  }
-  if (const auto scale = object.find("scale")) spec.scale = scale->number(0, kMostScale);
-  if (const auto frames = object.find("frames")) spec.frames = frames->integer(1, 6);
-  object.finish();
-  return spec;
+constexpr std::int64_t kMostPairs = 1'000'000'000;
+constexpr std::int64_t kMostEvents = 1'000'000'000;
+constexpr int kLargestSensor = 8192;
+
+void list_motion(Fields& fields, StillsSpec& spec) {
+  fields.find("translation_px", spec.translation_px, pairs_of(0, 100),
+              "Least and most length of the shift, in any direction.");
+  fields.find("rotation_deg", spec.rotation_deg, numbers(0, 45), "Most, either way.");
+  fields.find("scale", spec.scale, numbers(0, 0.5),
+              "Most, larger or smaller: 0.03 is 0.97 to 1.03.");
+  fields.find("frames", spec.frames, integers(1, 6),
+              "The gap of the pair, which the generator's training knows as so many frames.");
 }
 
-}  // namespace
-
-PairSpec read_pairs(const StrictValue& value) {
-  PairSpec spec;
-  StrictObject object = value.object();
-  if (const auto least = object.find("min_pairs")) {
-    spec.min_pairs = least->integer<std::int64_t>(0, 1'000'000'000);
+void list_pairs(Fields& fields, PairSpec& spec) {
+  bool of_stills = spec.stills.has_value();
+  fields.kind("from", of_stills, words(kPairOriginWords),
+              "sequence: two frames of one sequence. stills: an image, and itself under a small "
+              "motion that the seed draws; what moves is everything, as before a moving camera.");
+  Fields::Only stills = fields.only_for({"stills"}), sequences = fields.only_for({"sequence"});
+  stills.find("motion", spec.stills, objects(list_motion),
+              "the motion from the one image to the other, about the image's centre, in pixels of "
+              "the image as stored. Each number is drawn uniformly.");
+  const auto side =
+      fields.find("side", spec.side, words(kSideWords),
+                  "Where the pair lies. before: it ends with the labelled frame. after: it starts "
+                  "with it. around: the labelled frame is in its middle; gaps must be even, and "
+                  "from is sequence.");
+  if (side && of_stills && spec.side == PairSide::kAround) {
+    side->fault("\"before\" or \"after\", since from is \"stills\"");
   }
-  const auto side = object.find("side");
-  if (side) spec.side = side->choice(kSideWords);
-  const auto from = object.find("from");
-  if (from && from->choice(kPairOriginWords)) {
-    if (spec.side == PairSide::kAround)
-      side->fault("\"before\" or \"after\", since from is \"stills\"");
-    const auto motion = object.find("motion");
-    spec.stills = motion ? read_motion(*motion) : StillsSpec();
-    spec.gaps = {spec.stills->frames};
-    for (const char* key : {"gaps", "choose", "max_gap_s"}) {
-      if (const auto found = object.find(key))
-        found->fault("no such key, since from is \"stills\"");
-    }
-    object.finish();
-    return spec;
-  }
-  if (const auto motion = object.find("motion")) {
-    motion->fault("no such key, since from is \"sequence\"");
-  }
-  if (const auto choose = object.find("choose")) spec.choose = choose->choice(kChoiceWords);
-  if (const auto most = object.find("max_gap_s")) spec.max_gap_s = most->number(1e-6, 1e6);
-  spec.gaps = read_gaps(object.at("gaps"), spec.side);
-  object.finish();
-  return spec;
+  fields.rule(R"({"if": {"required": ["side"], "properties": {"side": {"const": "around"}}},
+                  "then": {"properties": {"from": {"const": "sequence"},
+                                          "gaps": {"items": {"enum": [2, 4, 6]}}}}})");
+  sequences.at("gaps", spec.gaps, Gaps{spec.side},
+               "distances between the two frames of a pair, counted in stored frames.");
+  sequences.find("choose", spec.choose, words(kChoiceWords),
+                 "one pair for a labelled frame (one), its gap drawn by the seed, or a pair for "
+                 "each gap (all).");
+  sequences.find("max_gap_s", spec.max_gap_s, numbers(1e-6, 1e6),
+                 "seconds from the first frame of a pair to the second at most; frames farther "
+                 "apart are not paired, as beyond the sequence's end. Where stored frames lie at "
+                 "irregular times (Human3.6M by h36m-fetch). Pairs whose times are unknown stay. "
+                 "None unless given.");
+  fields.find("min_pairs", spec.min_pairs, integers(0, kMostPairs),
+              "Fewer pairs than this from the source are an error.");
+  if (!of_stills) return;
+  if (!spec.stills) spec.stills.emplace();
+  spec.gaps = {spec.stills->frames};
 }
 
-namespace {
-
-std::vector<std::string> read_words(const std::optional<StrictValue>& value) {
-  std::vector<std::string> words;
-  if (!value) return words;
-  for (const StrictValue& element : value->elements(1)) words.push_back(element.text());
-  return words;
+void list_labels(Fields& fields, LabelSpec& spec) {
+  fields.at("format", spec.format, words(kLabelFormatWords),
+            "coco: JSON, instances or person keypoints. yolo: a folder of text files, data.yaml or "
+            "classes.txt. voc: a folder of Pascal VOC's XML files. mot: gt.txt, or a folder of "
+            "sequences with it. csv: a table image,class,left,top,right,bottom[,track].");
+  fields.at("path", spec.path, paths(), "The file or folder.");
 }
 
-/// A source's keys that not every kind of dataset takes.
-class SourceKeys {
- public:
-  /// `row`: none if the kind is faulty; then no key is out of place.
-  SourceKeys(StrictObject& object, const DatasetRow* row) : object_(object), row_(row) {}
+void list_columns(Fields& fields, EventFields& spec) {
+  fields.find("t", spec.t, texts(),
+              "Times. Of an array [N, 4] the number of the column, 0 to 3; by default 0.");
+  fields.find("x", spec.x, texts(), "Columns of the sensor, from its left; by default 1.");
+  fields.find("y", spec.y, texts(), "Rows of the sensor, from its top; by default 2.");
+  fields.find("p", spec.p, texts(), "Polarities, 1 and 0 or 1 and -1; by default 3.");
+  fields.find("unit", spec.tick_s, words(kTimeUnitWords), "What the times count.");
+}
 
-  /// The key's value if it is there, or must be. It is a fault where the kind does not take it.
-  std::optional<StrictValue> find(std::string_view key) {
-    if (row_ != nullptr && row_->required_key == key) return object_.at(key);
-    std::vector<DatasetKind> owners;
-    for (const DatasetRow& row : kDatasets) {
-      if (takes(row, key)) owners.push_back(row.value);
-    }
-    const auto kind = row_ == nullptr ? std::nullopt : std::optional(row_->value);
-    return SpecialKeys(object_, "dataset", kind).find(key, owners);
+/// What a recording of events does not tell of itself.
+void list_recording(Fields::Only some, RecordingOptions& options) {
+  some.find("camera", options.camera, stereo_cameras(),
+            "of MVSEC's, DSEC's or M3ED's layout, which of its two.");
+  some.find("rectify", options.rectify, booleans(),
+            "of DSEC's layout, moves events by its rectify_map.h5.");
+  some.find("sensor", options.sensor, sizes(1, kLargestSensor),
+            "the camera's size in pixels, where the file does not tell it.");
+  some.find("columns", options.columns, objects(list_columns),
+            "of a table (.npy, .npz, .csv), the names of its columns, fields or arrays, and what "
+            "its times count.");
+}
+
+/// Which labelled frames are taken.
+void list_selection(Fields& fields, SelectionSpec& spec) {
+  Fields::Only some = fields.taken_by(kDatasets);
+  fields.find("ids", spec.ids, paths(),
+              "Takes only the labelled frames that this text file lists, a sample_id a line.");
+  some.find("subjects", spec.subjects, lists(texts(), 1),
+            "takes only these subjects, such as S1. Default of dhp19: S1 to S12 for the split "
+            "train, S13 to S17 for test, else all.");
+  some.find("cameras", spec.cameras, lists(texts(), 1),
+            "takes only these cameras, such as 54138969. Default of dhp19: 2 and 3.");
+  some.find("actions", spec.actions, lists(texts(), 1),
+            "takes only these actions, as the sequences name them: Directions-1 (fetch), "
+            "Directions_1 (extracted), Directions 1 (official); dhp19: SESSION_MOVEMENT, such as "
+            "1_3.");
+  some.find("without_actions", spec.without_actions, lists(texts(), 1),
+            "leaves out these movements, such as 2_1.");
+  fields.find("fraction", spec.fraction, pairs_of(0, 1, Ends::kAbove),
+              "Takes a part of the sequences: those whose number in [0, 1), which follows from "
+              "seed and name, lies from the first up to the second. [0, 0.8] and [0.8, 1] share no "
+              "sequence. Frames without a sequence count by themselves.");
+}
+
+void list_source(Fields& fields, SourceSpec& spec) {
+  fields.kind_at("dataset", spec.dataset, words(kDatasetWords),
+                 "What kind of dataset it is, and so how its files lie.");
+  if (fields.is_reading()) spec.window = dataset_row(spec.dataset).window;
+  fields.at("root", spec.root, paths(),
+            "The dataset's folder; for frames, a video, a folder of images, of such folders, or of "
+            "videos; for recording, a recording, or a folder of them.");
+  fields.find("split", spec.split, names(),
+              "Name of the split that the source belongs to, a part of its shards' names.");
+  Fields::Only some = fields.taken_by(kDatasets);
+  some.find("raw_root", spec.raw_root, paths(),
+            "the folder of KITTI raw, whose frames give gaps beyond the three previous frames.");
+  some.find("devkit", spec.devkit, paths(),
+            "the object development kit, whose mapping says which raw frame an image is. Alone it "
+            "names the drives.");
+  fields.needs("raw_root", "devkit");
+  some.find("annotations", spec.annotations, paths(),
+            "the annotation file or folder, if not in its usual place. mpii_list: the JSON list or "
+            "HDF5 table. recording: the file of labels, or the folder of NAME.csv and "
+            "NAME.json, if not beside the recording.");
+  some.find("sequences", spec.sequences, paths(),
+            "the folder of video frames around the annotated images.");
+  some.find("layout", spec.layout, words(kLayoutWords),
+            "as h36m-fetch unpacks the dataset (fetch), the pre-extracted images (extracted), or "
+            "videos and .cdf files, as the dataset is downloaded (official).");
+  const auto every = some.find("every", spec.every, integers(1, 1000),
+                               "in the official layout, takes every so many frames of its videos, "
+                               "from the first on. A gap counts the frames that are taken.");
+  if (every && spec.layout != Human36mLayout::kOfficial) {
+    every->fault("no such key for this layout (only for official)");
   }
-
-  std::optional<std::string> find_path(std::string_view key) {
-    const std::optional<StrictValue> value = find(key);
-    return value ? std::optional(read_path(*value)) : std::nullopt;
-  }
-
- private:
-  StrictObject& object_;
-  const DatasetRow* row_;
-};
-
-SelectionSpec read_selection(StrictObject& object, SourceKeys& keys) {
-  SelectionSpec spec;
-  if (const auto ids = object.find("ids")) spec.ids = read_path(*ids);
-  spec.subjects = read_words(keys.find("subjects"));
-  spec.cameras = read_words(keys.find("cameras"));
-  spec.actions = read_words(keys.find("actions"));
-  spec.without_actions = read_words(keys.find("without_actions"));
-  if (const auto fraction = object.find("fraction")) {
-    const auto ends = fraction->elements(2);
-    if (ends.size() == 2) {
-      spec.fraction = {ends[0].number(0, 1), ends[1].number(0, 1)};
-      if (spec.fraction[1] <= spec.fraction[0]) ends[1].fault("a number above the previous one");
-    } else if (!ends.empty()) {
-      fraction->fault("an array of 2");
-    }
-  }
-  return spec;
+  fields.rule(R"({"if": {"required": ["layout"], "properties": {"layout": {"const": "official"}}},
+                  "else": {"properties": {"every": false}}})");
+  some.find("frames_per_second", spec.frames_per_second, numbers(1e-6, 1e6),
+            "the frame rate. Default: a video's own times; none for images.");
+  some.find("labels", spec.labels, objects(list_labels),
+            "labels of your own for the images or videos (manifests/guides/own_data.md).");
+  list_recording(some, spec.recording);
+  list_selection(fields, spec.selection);
+  some.find("window_s", spec.window.duration_s, numbers(1e-6, 1e3),
+            "the events of so many seconds make a volume. Default: as long as the interval between "
+            "frames that the label's time lies in.");
+  some.find("window_events", spec.window.events, integers(1, kMostEvents),
+            "so many events make a volume, in place of a time. dhp19: by default 7500, one window "
+            "after the other.");
+  fields.sets("window_s", {"window_events"});
+  some.find("label_at", spec.window.label, words(kLabelPlaceWords),
+            "where in its window the label's time lies.");
+  fields.only_for(words_where(kDatasets, [](const DatasetRow& row) { return !row.has_events; }))
+      .at("pairs", spec.pairs, objects(list_pairs),
+          "which pairs of frames become samples. Of other datasets these are windows of events.");
 }
-
-/// Reads what the source says of its windows, over what is usual.
-WindowSpec read_window(SourceKeys& keys, WindowSpec spec) {
-  const auto duration = keys.find("window_s");
-  const auto events = keys.find("window_events");
-  if (duration) spec.duration_s = duration->number(1e-6, 1e3);
-  if (events) spec.events = events->integer<std::int64_t>(1, 1'000'000'000);
-  if (duration && events) events->fault("no such key together with window_s, which sets it");
-  if (const auto place = keys.find("label_at")) spec.label = place->choice(kLabelPlaceWords);
-  return spec;
-}
-
-LabelSpec read_labels(const StrictValue& value) {
-  LabelSpec spec;
-  StrictObject object = value.object();
-  spec.format = object.at("format").choice(kLabelFormatWords);
-  spec.path = read_path(object.at("path"));
-  object.finish();
-  return spec;
-}
-
-RecordingOptions read_recording_options(SourceKeys& keys) {
-  constexpr int kLargestSensor = 8192;
-  RecordingOptions options;
-  if (const auto camera = keys.find("camera")) options.camera = read_stereo_camera(*camera);
-  if (const auto rectify = keys.find("rectify")) options.rectify = rectify->boolean();
-  if (const auto sensor = keys.find("sensor")) {
-    options.sensor = read_size(*sensor, 1, kLargestSensor);
-  }
-  if (const auto columns = keys.find("columns")) options.columns = read_columns(*columns);
-  return options;
-}
-
-}  // namespace
-
-std::string read_stereo_camera(const StrictValue& value) {
-  return value.text("\"left\" or \"right\"",
-                    [](std::string_view text) { return text == "left" || text == "right"; });
-}
-
-ImageSize read_size(const StrictValue& value, int least, int most) {
-  StrictObject object = value.object();
-  const ImageSize size{object.at("height").integer(least, most),
-                       object.at("width").integer(least, most)};
-  object.finish();
-  return size;
-}
-
-EventFields read_columns(const StrictValue& value) {
-  EventFields columns;
-  StrictObject object = value.object();
-  const auto read = [&](const char* key, std::string& name) {
-    if (const auto found = object.find(key)) name = found->text();
-  };
-  read("t", columns.t);
-  read("x", columns.x);
-  read("y", columns.y);
-  read("p", columns.p);
-  if (const auto unit = object.find("unit")) columns.tick_s = unit->choice(kTimeUnitWords);
-  object.finish();
-  return columns;
-}
-
-SourceSpec read_source(const StrictValue& value) {
-  SourceSpec spec;
-  StrictObject object = value.object();
-  const auto dataset = object.at("dataset").sound_choice(kDatasetWords);
-  spec.dataset = dataset.value_or(spec.dataset);
-  spec.root = read_path(object.at("root"));
-  if (const auto split = object.find("split")) spec.split = read_name(*split);
-
-  const DatasetRow* const row = dataset ? &dataset_row(*dataset) : nullptr;
-  SourceKeys keys(object, row);
-  spec.raw_root = keys.find_path("raw_root");
-  spec.devkit = keys.find_path("devkit");
-  // Neither is of use without the other: the devkit's mapping says which raw frame an image is.
-  if (spec.raw_root && !spec.devkit) object.at("devkit").fault("a path, since raw_root is given");
-  spec.annotations = keys.find_path("annotations");
-  spec.sequences = keys.find_path("sequences");
-  if (const auto layout = keys.find("layout")) spec.layout = layout->choice(kLayoutWords);
-  if (const auto every = keys.find("every")) {
-    spec.every = every->integer(1, 1000);
-    if (spec.layout != Human36mLayout::kOfficial) {
-      every->fault("no such key for this layout (only for official)");
-    }
-  }
-  if (const auto rate = keys.find("frames_per_second")) {
-    spec.frames_per_second = rate->number(1e-6, 1e6);
-  }
-
-  if (const auto labels = keys.find("labels")) spec.labels = read_labels(*labels);
-  spec.recording = read_recording_options(keys);
-
-  spec.selection = read_selection(object, keys);
-  spec.window = read_window(keys, row == nullptr ? WindowSpec() : row->window);
-  if (row == nullptr || !row->has_events) {
-    spec.pairs = read_pairs(object.at("pairs"));
-  } else if (const auto pairs = object.find("pairs")) {
-    pairs->fault("no such key for dataset \"" + std::string(row->word) +
-                 "\", whose samples are windows of events");
-  }
-  object.finish();
-  return spec;
-}
-
-namespace {
 
 // Below 16 pixels a side the network's four halvings leave less than one pixel of the image at
 // its bottom; above 8192 no camera of these datasets goes, so that a larger number is a slip.
-constexpr int kSmallestSide = 16;
-constexpr int kLargestSide = 8192;
+Integers sides() { return integers(16, 8192); }
 
 struct Preset {
   std::string_view name;
-  GreyOrder grey;
-  int blur;
+  GreyOrder grey = GreyOrder::kBeforeResize;
+  int blur = 0;
+  bool operator==(const Preset&) const = default;
 };
 
 // As the published scripts for KITTI, for MPII and Human3.6M, and for the demo.
@@ -273,126 +188,129 @@ constexpr Preset kDemo{"demo", GreyOrder::kAfterResize, 0};
 constexpr std::array kPresetWords{Word<Preset>{kKitti.name, kKitti},
                                   Word<Preset>{kMpii.name, kMpii}, Word<Preset>{kDemo.name, kDemo}};
 
-/// The preset of that name; one without a name if there is none.
-Preset preset_named(std::string_view name) {
-  const auto preset = std::ranges::find(kPresetWords, name, &Word<Preset>::word);
-  return preset == kPresetWords.end() ? Preset{"", GreyOrder::kBeforeResize, 0} : preset->value;
-}
-
 /// The preset of the sources' datasets. A job has one preprocessing: where they differ, that is a
 /// fault of `preset`, which had to say which.
-Preset default_preset(const std::vector<SourceSpec>& sources, StrictObject& image) {
+Preset default_preset(const std::vector<SourceSpec>& sources, Fields& image) {
   if (sources.empty()) return kKitti;  // a fault already
   const DatasetRow& first = dataset_row(sources.front().dataset);
   for (const SourceSpec& source : sources) {
     const DatasetRow& other = dataset_row(source.dataset);
     if (other.preset == first.preset) continue;
-    const auto has = [](const DatasetRow& row) {
-      return std::string(row.word) + " has \"" + std::string(row.preset) + "\"";
-    };
-    image.at("preset").fault("a preset, since " + has(first) + " and " + has(other));
+    image.fault("preset", fmt::format("a preset, since {} has \"{}\" and {} has \"{}\"", first.word,
+                                      first.preset, other.word, other.preset));
     break;
   }
-  return preset_named(first.preset);
+  const auto preset = std::ranges::find(kPresetWords, first.preset, &Word<Preset>::word);
+  return preset == kPresetWords.end() ? Preset() : preset->value;
 }
 
-int read_blur(const StrictValue& value) {
-  const int blur = value.integer(0, 31);
-  if (blur == 1 || (blur > 0 && blur % 2 == 0)) value.fault("0 (no blur) or an odd integer 3..31");
-  return blur;
-}
-
-}  // namespace
-
-ImageSpec read_image(const StrictValue& value, const std::vector<SourceSpec>& sources) {
-  ImageSpec spec;
-  StrictObject object = value.object();
-  if (object.find("width") || object.find("height")) {
-    spec.size = {object.at("height").integer(kSmallestSide, kLargestSide),
-                 object.at("width").integer(kSmallestSide, kLargestSide)};
+/// "kitti for kitti_object, kitti_raw; mpii for ..."
+std::string default_presets() {
+  std::vector<std::string> presets;
+  for (const Word<Preset>& preset : kPresetWords) {
+    const auto has = [&](const DatasetRow& row) { return row.preset == preset.word; };
+    presets.push_back(
+        fmt::format("{} for {}", preset.word, fmt::join(words_where(kDatasets, has), ", ")));
   }
-  if (const auto fit = object.find("fit")) spec.fit = fit->choice(kFitWords);
+  return fmt::format("{}", fmt::join(presets, "; "));
+}
 
-  const auto preset = object.find("preset");
-  const auto grey = object.find("grey");
-  const auto blur = object.find("blur");
+void list_image(Fields& fields, ImageSpec& spec, const std::vector<SourceSpec>& sources) {
+  std::optional<int> height, width;
+  fields.find("height", height, sides(), "Height of the volumes in pixels; with width.");
+  fields.find("width", width, sides(),
+              "Width of the volumes in pixels; with height. Without both, every image keeps its "
+              "own size (a pair no image of which can be read yet gets a shard of its own). At "
+              "least 16, since the network halves the image four times.");
+  fields.needs("height", "width");
+  fields.needs("width", "height");
+  if (height && width) spec.size = {*height, *width};
+  fields.find("fit", spec.fit, words(kFitWords),
+              "stretch: fill the volume, whatever becomes of the shape. letterbox: keep the shape, "
+              "with borders. crop: keep the shape, cut what is over.");
+
+  std::optional<Preset> preset;
+  std::optional<GreyOrder> grey;
+  std::optional<int> blur;
+  const auto of_preset = fields.find(
+      "preset", preset, words(kPresetWords),
+      "The preprocessing of the published scripts. kitti: grey, resize, 3x3 blur. mpii (Human3.6M "
+      "too): grey, resize. demo: resize, grey. Default: " +
+          default_presets() + "; sources of which these differ need a preset, or grey and blur.");
+  const auto of_grey = fields.find("grey", grey, words(kGreyWords),
+                                   "Whether the image is made grey before or after it is resized; "
+                                   "with blur, in place of a preset.");
+  const auto of_blur = fields.find("blur", blur, integers(0, 31),
+                                   "Side of the Gaussian kernel in pixels, odd from 3 on; 0 = no "
+                                   "blur.");
+  if (of_blur && (*blur == 1 || (*blur > 0 && *blur % 2 == 0))) {
+    of_blur->fault("0 (no blur) or an odd integer 3..31");
+  }
+  fields.rule(R"({"properties": {"blur": {"anyOf": [{"const": 0},
+                                                    {"minimum": 3, "not": {"multipleOf": 2}}]}}})");
   if (!sources.empty() && std::ranges::all_of(sources, has_events, &SourceSpec::dataset)) {
-    for (const auto& key : {preset, grey, blur}) {
+    for (const auto& key : {of_preset, of_grey, of_blur}) {
       if (key) key->fault("no such key for events, which have no grey values");
     }
-  } else if (preset || (!grey && !blur)) {
-    const Preset chosen = preset ? preset->choice(kPresetWords) : default_preset(sources, object);
-    spec.preset = chosen.name;
-    spec.grey = chosen.grey;
-    spec.blur = chosen.blur;
-    if (grey) grey->fault("no such key together with a preset, which sets it");
-    if (blur) blur->fault("no such key together with a preset, which sets it");
-  } else {
-    spec.grey = object.at("grey").choice(kGreyWords);
-    spec.blur = read_blur(object.at("blur"));
+    return;
   }
-  object.finish();
-  return spec;
+  fields.sets("preset", {"grey", "blur"});
+  if (!of_preset) {
+    fields.needs("grey", "blur");
+    fields.needs("blur", "grey");
+  }
+  if (!fields.is_reading()) return;
+  if (!preset && !grey && !blur) preset = default_preset(sources, fields);
+  if (!preset) preset = Preset{"", grey.value_or(spec.grey), blur.value_or(spec.blur)};
+  spec.preset = preset->name;
+  spec.grey = preset->grey;
+  spec.blur = preset->blur;
 }
 
-namespace {
+auto images_of(const std::vector<SourceSpec>& sources) {
+  return objects<ImageSpec>([&sources](Fields& fields, ImageSpec& spec) {  //
+    list_image(fields, spec, sources);
+  });
+}
+
+void list_volume(Fields& fields, VolumeSpec& spec) {
+  fields.find("bins", spec.bins, integers(1, 64),
+              "Time bins per polarity; the published network has 9.");
+  fields.find("normalize", spec.normalize, words(kNormalizationWords),
+              "none: volumes as generated. eta98: each clipped at the 98th percentile of its "
+              "non-zero values and divided by it.");
+}
+
+void list_output(Fields& fields, OutputSpec& spec) {
+  fields.at("directory", spec.directory, paths(), "Folder of the shards; made if it is absent.");
+  fields.find("samples_per_shard", spec.samples_per_shard, integers(1, 65536),
+              "Samples in a shard; the last of a source holds the rest.");
+  fields.find("dtype", spec.dtype, words(kStoredTypeWords),
+              "Type of the stored values. uint8: 255 steps up to the sample's largest value.");
+  fields.find("deflate_level", spec.deflate_level, integers(0, 9),
+              "0 stores without compression, 9 compresses hardest.");
+}
+
+void list_errors(Fields& fields, ErrorSpec& spec) {
+  fields.find("policy", spec.policy, words(kPolicyWords),
+              "fail: the first ends the run. quarantine: such a sample keeps its slot, marked "
+              "invalid, and the run goes on.");
+  fields.find("max_count", spec.max_count, integers(0, 1'000'000'000),
+              "More quarantined samples than this end the run.");
+  fields.find("max_fraction", spec.max_fraction, numbers(0, 1),
+              "A larger share of quarantined samples than this ends the run.");
+}
 
 /// Events are the only volumes that a dataset of events can give, and no other dataset has them.
 void check_kind(const JobManifest& manifest, const std::vector<StrictValue>& sources) {
   const bool wants_events = !needs_frames(manifest.generator.kind);
-  std::string of_events;
-  for (const DatasetRow& row : kDatasets) {
-    if (row.has_events) of_events += (of_events.empty() ? "" : ", ") + std::string(row.word);
-  }
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    const DatasetKind dataset = manifest.sources[i].dataset;
-    if (has_events(dataset) == wants_events) continue;
-    StrictObject source = sources[i].object();
-    source.at("dataset").fault(
-        wants_events ? "a dataset of events (" + of_events + "), since generator.kind is \"events\""
+    if (has_events(manifest.sources[i].dataset) == wants_events) continue;
+    sources[i].object().at("dataset").fault(
+        wants_events ? fmt::format("a dataset of events ({}), since generator.kind is \"events\"",
+                                   fmt::join(words_where(kDatasets, &DatasetRow::has_events), ", "))
                      : "a dataset of frames, since generator.kind is not \"events\"");
   }
-}
-
-constexpr std::string_view kFormat = "eventgan-manifest";
-constexpr int kVersion = 1;
-
-VolumeSpec read_volume(const StrictValue& value) {
-  VolumeSpec spec;
-  StrictObject object = value.object();
-  if (const auto bins = object.find("bins")) spec.bins = bins->integer(1, 64);
-  if (const auto normalize = object.find("normalize")) {
-    spec.normalize = normalize->choice(kNormalizationWords);
-  }
-  object.finish();
-  return spec;
-}
-
-OutputSpec read_output(const StrictValue& value) {
-  OutputSpec spec;
-  StrictObject object = value.object();
-  spec.directory = read_path(object.at("directory"));
-  if (const auto count = object.find("samples_per_shard")) {
-    spec.samples_per_shard = count->integer(1, 65536);
-  }
-  if (const auto dtype = object.find("dtype")) spec.dtype = dtype->choice(kStoredTypeWords);
-  if (const auto level = object.find("deflate_level")) spec.deflate_level = level->integer(0, 9);
-  object.finish();
-  return spec;
-}
-
-ErrorSpec read_errors(const StrictValue& value) {
-  ErrorSpec spec;
-  StrictObject object = value.object();
-  if (const auto policy = object.find("policy")) spec.policy = policy->choice(kPolicyWords);
-  if (const auto count = object.find("max_count")) {
-    spec.max_count = count->integer<std::int64_t>(0, 1'000'000'000);
-  }
-  if (const auto fraction = object.find("max_fraction")) {
-    spec.max_fraction = fraction->number(0, 1);
-  }
-  object.finish();
-  return spec;
 }
 
 /// A volume is one chunk of its shard, and HDF5's chunks stay below 4 GiB.
@@ -406,63 +324,86 @@ void check_chunk(const JobManifest& manifest, const StrictValue& image) {
               std::to_string(bytes) + " bytes");
 }
 
-JobManifest read_job_document(const StrictValue& document) {
-  JobManifest manifest;
-  StrictObject object = document.object();
-  if (!object.has_format(kFormat, kVersion)) return manifest;
-  manifest.name = read_name(object.at("name"));
-  if (const auto seed = object.find("seed")) manifest.seed = read_seed(*seed);
-  const std::vector<StrictValue> sources = object.at("sources").elements(1);
-  for (const StrictValue& source : sources) manifest.sources.push_back(read_source(source));
-  const StrictValue image = object.at("image");
-  manifest.image = read_image(image, manifest.sources);
-  if (const auto generator = object.find("generator")) {
-    manifest.generator = read_generator(*generator);
+/// What a schema can say of the rules on sources, image and generator.
+void add_rules(Fields& fields) {
+  if (!fields.is_describing()) return;
+  const auto sources = [](const auto& holds) -> Schema {
+    const Schema is_one = {{"enum", words_where(kDatasets, holds)}};
+    return {{"items", {{"properties", {{"dataset", is_one}}}}}};
+  };
+  Schema one_preset = Schema::array();
+  for (const std::string_view preset : {kKitti.name, kMpii.name, kDemo.name, std::string_view()}) {
+    const auto has = [preset](const DatasetRow& row) { return row.preset == preset; };
+    one_preset.push_back({{"properties", {{"sources", sources(has)}}}});
   }
-  check_kind(manifest, sources);
-  if (const auto volume = object.find("volume")) manifest.volume = read_volume(*volume);
-  manifest.output = read_output(object.at("output"));
-  if (const auto errors = object.find("errors")) manifest.errors = read_errors(*errors);
-  object.finish();
-  check_chunk(manifest, image);
-  return manifest;
+  Schema presets = Schema::parse(R"({"if": {"properties": {"image": {"properties":
+      {"preset": false, "grey": false, "blur": false}}}}})");
+  presets["then"]["anyOf"] = one_preset;
+  fields.rule(presets);
+  Schema events = Schema::parse(R"({
+      "if": {"required": ["generator"], "properties": {"generator": {
+          "required": ["kind"], "properties": {"kind": {"const": "events"}}}}},
+      "then": {"properties": {"image": {"properties":
+          {"preset": false, "grey": false, "blur": false}}}}})");
+  const auto has_none = [](const DatasetRow& row) { return !row.has_events; };
+  events["then"]["properties"]["sources"] = sources(&DatasetRow::has_events);
+  events["else"]["properties"]["sources"] = sources(has_none);
+  fields.rule(events);
 }
 
-JobManifest read_pair_document(const StrictValue& document) {
-  JobManifest manifest;
-  StrictObject object = document.object();
-  if (const auto seed = object.find("seed")) manifest.seed = read_seed(*seed);
+constexpr char kImageField[] =
+    "How a frame becomes the network's input. Either a preset or both grey and blur, or none of "
+    "them: then the datasets' own preset holds.";
+constexpr char kGeneratorField[] =
+    "What makes event volumes: of frame pairs the network, or a model of the sensor to compare it "
+    "with; of recordings the camera.";
+constexpr char kVolumeField[] = "The event volumes.";
+
+void list_pair_manifest(Fields& fields, JobManifest& manifest) {
+  const std::vector<SourceSpec> sources{SourceSpec()};  // frames
   manifest.image.preset = kDemo.name;
   manifest.image.grey = kDemo.grey;
-  if (const auto image = object.find("image")) {
-    manifest.image = read_image(*image, {SourceSpec()});
+  fields.find("seed", manifest.seed, seeds(), kSeedField);
+  fields.find("image", manifest.image, images_of(sources), kImageField);
+  const auto generator =
+      fields.find("generator", manifest.generator, objects(list_generator), kGeneratorField);
+  if (!needs_frames(manifest.generator.kind)) {
+    generator->object().at("kind").fault("a generator that makes events of frames");
   }
-  if (const auto generator = object.find("generator")) {
-    manifest.generator = read_generator(*generator);
-    if (!needs_frames(manifest.generator.kind)) {
-      generator->object().at("kind").fault("a generator that makes events of frames");
-    }
-    if (manifest.generator.device != Device::kCpu || manifest.generator.engine == Engine::kTorch) {
-      generator->fault("the engine \"onednn\" on the device \"cpu\"");
-    }
+  if (manifest.generator.device != Device::kCpu || manifest.generator.engine == Engine::kTorch) {
+    generator->fault("the engine \"onednn\" on the device \"cpu\"");
   }
-  if (const auto volume = object.find("volume")) manifest.volume = read_volume(*volume);
-  object.finish();
-  return manifest;
+  fields.find("volume", manifest.volume, objects(list_volume), kVolumeField);
 }
 
 }  // namespace
 
+void list_job(Fields& fields, JobManifest& manifest) {
+  if (!fields.has_format("eventgan-manifest", 1)) return;
+  fields.at("name", manifest.name, names(),
+            "Name of the data that is made, the first part of its files' names.");
+  fields.find("seed", manifest.seed, seeds(), kSeedField);
+  const auto sources = fields.at("sources", manifest.sources, lists(objects(list_source), 1),
+                                 "The datasets to convert, in the order of their shards.");
+  const auto image = fields.at("image", manifest.image, images_of(manifest.sources), kImageField);
+  fields.find("generator", manifest.generator, objects(list_generator), kGeneratorField);
+  if (sources && sources->is_array()) check_kind(manifest, sources->elements());
+  add_rules(fields);
+  fields.find("volume", manifest.volume, objects(list_volume), kVolumeField);
+  fields.at("output", manifest.output, objects(list_output), "The files that are made.");
+  fields.find("errors", manifest.errors, objects(list_errors),
+              "What becomes of samples that cannot be made (a corrupt image, a malformed label).");
+  if (image) check_chunk(manifest, *image);
+}
+
 JobManifest parse_job_manifest(std::string_view text, const std::filesystem::path& directory,
                                const std::string& name) {
-  return parse_manifest<JobManifest>(with_sensor_document(text, directory), directory, name,
-                                     read_job_document);
+  return parse_manifest(with_sensor_document(text, directory), directory, name, list_job);
 }
 
 JobManifest parse_pair_manifest(std::string_view text, const std::filesystem::path& directory,
                                 const std::string& name) {
-  return parse_manifest<JobManifest>(with_sensor_document(text, directory), directory, name,
-                                     read_pair_document);
+  return parse_manifest(with_sensor_document(text, directory), directory, name, list_pair_manifest);
 }
 
 JobManifest read_job_manifest(const std::filesystem::path& file) {

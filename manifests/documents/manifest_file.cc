@@ -1,7 +1,6 @@
 #include "manifests/documents/detail/manifest_file.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "manifests/values/faults.h"
 #include "stages/base/files/input_file.h"
@@ -19,12 +18,6 @@ std::filesystem::path manifest_folder(const std::filesystem::path& file) {
   return std::filesystem::absolute(file).parent_path();
 }
 
-std::string read_path(const StrictValue& value) {
-  return value.text("a path", [](std::string_view text) {
-    return !text.empty() && text.find('\0') == std::string_view::npos;
-  });
-}
-
 bool is_name(std::string_view text) {
   const auto belongs = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
@@ -32,16 +25,6 @@ bool is_name(std::string_view text) {
   };
   return !text.empty() && text.size() <= 64 && text[0] != '.' && text[0] != '-' &&
          std::all_of(text.begin(), text.end(), belongs);
-}
-
-std::string read_name(const StrictValue& value) {
-  return value.text(
-      "1..64 letters, digits, \".\", \"_\" or \"-\", not beginning with \".\" or \"-\"", is_name);
-}
-
-std::uint64_t read_seed(const StrictValue& value) {
-  return static_cast<std::uint64_t>(
-      value.integer<std::int64_t>(0, std::numeric_limits<std::int64_t>::max()));
 }
 
 }  // namespace eventgan

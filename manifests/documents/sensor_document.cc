@@ -32,30 +32,35 @@ std::optional<SensorText> find_document(const std::string& path_or_name,
   return SensorText{std::string(shipped->second), "the shipped sensor " + path_or_name};
 }
 
-}  // namespace
-
-void list_sensor(Fields& fields, SensorSpec& spec) {
+/// `some`: all fields, or those of some kinds.
+template <class Some>
+void list_settings(Some& some, SensorSpec& spec) {
   const Numbers thresholds = numbers(kLeastContrast, kMostContrast);
   const Numbers rates = numbers(0, 1e6);
-  fields.find("positive_threshold", spec.positive_threshold, thresholds,
-              "Mean contrast threshold of positive events.");
-  fields.find("negative_threshold", spec.negative_threshold, thresholds,
-              "The same of negative events, as a positive number.");
-  fields.find("threshold_spread", spec.threshold_spread, numbers(0, 1),
-              "Standard deviation of the thresholds over the pixels, drawn per polarity.");
-  fields.find("refractory_s", spec.refractory_s, numbers(0, 1),
-              "A pixel is silent so long after an event.");
-  fields.find("leak_rate_hz", spec.leak_rate_hz, rates,
-              "Positive events per pixel and second without any motion.");
-  fields.find("shot_noise_rate_hz", spec.shot_noise_rate_hz, rates,
-              "Random events of either polarity per pixel and second.");
-  fields.find("hot_pixel_fraction", spec.hot_pixel_fraction, numbers(0, 1),
-              "Share of pixels that fire on their own.");
-  fields.find("hot_pixel_rate_hz", spec.hot_pixel_rate_hz, rates,
-              "Events of a hot pixel per second.");
-  fields.find("log_epsilon", spec.log_epsilon, numbers(1e-6, 1),
-              "Added to the intensity, so that the logarithm of black is finite.");
+  some.find("positive_threshold", spec.positive_threshold, thresholds,
+            "Mean contrast threshold of positive events.");
+  some.find("negative_threshold", spec.negative_threshold, thresholds,
+            "The same of negative events, as a positive number.");
+  some.find("threshold_spread", spec.threshold_spread, numbers(0, 1),
+            "Standard deviation of the thresholds over the pixels, drawn per polarity.");
+  some.find("refractory_s", spec.refractory_s, numbers(0, 1),
+            "A pixel is silent so long after an event.");
+  some.find("leak_rate_hz", spec.leak_rate_hz, rates,
+            "Positive events per pixel and second without any motion.");
+  some.find("shot_noise_rate_hz", spec.shot_noise_rate_hz, rates,
+            "Random events of either polarity per pixel and second.");
+  some.find("hot_pixel_fraction", spec.hot_pixel_fraction, numbers(0, 1),
+            "Share of pixels that fire on their own.");
+  some.find("hot_pixel_rate_hz", spec.hot_pixel_rate_hz, rates,
+            "Events of a hot pixel per second.");
+  some.find("log_epsilon", spec.log_epsilon, numbers(1e-6, 1),
+            "Added to the intensity, so that the logarithm of black is finite.");
 }
+
+}  // namespace
+
+void list_sensor(Fields& fields, SensorSpec& spec) { list_settings(fields, spec); }
+void list_sensor(Fields::Only fields, SensorSpec& spec) { list_settings(fields, spec); }
 
 void list_threshold(Fields& fields, std::optional<ThresholdSpec>& threshold,
                     std::string_view what) {
@@ -92,24 +97,15 @@ void list_camera_sensor(Fields& fields, CameraSensor& sensor) {
                  "Contrast threshold of ln(u/255 + 0.02), u the frames' grey level, or [least, "
                  "most], from which it is drawn log-uniformly for each pair: the geometric mean of "
                  "both polarities'.");
-  fields.find("noise", sensor.noise, objects(list_noise),
-              "Noise events that are added to finished volumes, +1 in one voxel each: a Poisson "
-              "process of each pixel over the pair's gap_s, or where that is unknown over "
-              "duration_s. A range is drawn from uniformly for each pair.");
+  fields.find("noise", sensor.noise, objects(list_noise), kNoiseField);
   fields.find("origin", sensor.origin, texts(), "How the numbers were found, for people.");
-}
-
-CameraSensor read_camera_sensor(const StrictValue& value) {
-  CameraSensor sensor;
-  objects(list_camera_sensor).read(value, sensor);
-  return sensor;
 }
 
 CameraSensor parse_camera_sensor(std::string_view text, const std::string& name) {
   CameraSensor sensor;
   FaultList faults(name);
   if (const auto document = parse_json_text(text, faults)) {
-    sensor = read_camera_sensor(StrictValue(*document, faults));
+    objects(list_camera_sensor).read(StrictValue(*document, faults), sensor);
   }
   if (!faults.empty()) throw UsageError(faults.text());
   return sensor;

@@ -263,7 +263,7 @@ class Recordings(program.InFolder):
                                     'since generator.kind is not "events"'),
                                    (events_manifest({"dataset": "recording", "root": "drive.hdf5",
                                                      "pairs": program.pairs([1])}),
-                                    "whose samples are windows of events"),
+                                    'pairs: expected no such key for dataset "recording"'),
                                    (events_manifest({"dataset": "recordings", "root": "drive.hdf5"}), '"recording"')]:
             self.assertIn(expected, run("plan", self.write_manifest(manifest), expect=64)[1])
         for command in ("tradeoff", "calibrate"):

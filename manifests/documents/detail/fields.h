@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,16 @@
 #include "manifests/values/job.h"
 
 namespace eventgan {
+
+/// The words of a table's rows for which `holds` does.
+template <class Row, std::size_t N, class Holds>
+std::vector<std::string_view> words_where(const std::array<Row, N>& rows, const Holds& holds) {
+  std::vector<std::string_view> words;
+  for (const Row& row : rows) {
+    if (std::invoke(holds, row)) words.push_back(row.word);
+  }
+  return words;
+}
 
 /// The table of a document's fields: a function that tells a struct's members, each by key, type,
 /// and what it is. The same function reads the document strictly, describes it as a JSON Schema,
@@ -75,57 +86,71 @@ class Fields {
     set_kind(key, type.word(member), fallback);
   }
 
+  /// In an object within one of that kind, what only_for() asks about; none if the kind is faulty.
+  /// What a schema says of it is a rule of the outer object.
+  void within(std::string_view key, std::string_view kind) {
+    kind_key_ = key;
+    kind_ = kind;
+  }
+  std::string_view found_kind() const { return kind_; }  ///< none if it is faulty
+
+  using Kinds = std::vector<std::string_view>;
+
   /// Fields of some kinds alone: `fields.only_for({kEsim}).find(...)`; `at`: which these need.
   class Only {
    public:
-    /// Which kinds may have a key.
-    using Owners = std::function<std::vector<std::string_view>(std::string_view key)>;
-    Only(Fields& fields, Owners owners) : fields_(fields), owners_(std::move(owners)) {}
+    /// Which kinds may have a key, and which must.
+    struct Owners {
+      Kinds may, must;
+    };
+    Only(Fields& fields, std::function<Owners(std::string_view key)> owners)
+        : fields_(fields), owners_(std::move(owners)) {}
     template <class T, class Type>
     std::optional<StrictValue> at(std::string_view key, T& member, const Type& type,
                                   std::string_view what) {
-      return add(key, member, type, what, true);
+      const Kinds may = owners_(key).may;
+      return fields_.owned(key, member, type, what, {may, may});
     }
     template <class T, class Type>
     std::optional<StrictValue> find(std::string_view key, T& member, const Type& type,
                                     std::string_view what) {
-      return add(key, member, type, what, false);
+      return fields_.owned(key, member, type, what, owners_(key));
     }
 
    private:
-    template <class T, class Type>
-    std::optional<StrictValue> add(std::string_view key, T& member, const Type& type,
-                                   std::string_view what, bool is_required) {
-      const std::vector<std::string_view> owners = owners_(key);
-      if (!fields_.may_have(key, owners, is_required)) return std::nullopt;
-      const bool must_be_there = !fields_.is_describing() && is_required;
-      return fields_.field(key, member, type, of_kinds(owners, what), must_be_there);
-    }
-
     Fields& fields_;
-    Owners owners_;
+    std::function<Owners(std::string_view key)> owners_;
   };
+  Only only_for(const Kinds& owners) {
+    return {*this, [owners](std::string_view) { return Only::Owners{owners, {}}; }};
+  }
   template <class Kind>
-  Only only_for(std::initializer_list<Kind> owners) {
-    std::vector<std::string_view> words;
+  requires std::is_enum_v<Kind> Only only_for(std::initializer_list<Kind> owners) {
+    Kinds words;
     for (const Kind owner : owners) words.push_back(to_string(owner));
-    return Only(*this, [words](std::string_view) { return words; });
+    return only_for(words);
   }
 
-  /// The same where a table has a row for each kind, and `takes(row, key)` says which may have it.
+  /// The same where a table has a row for each kind, and `takes(row, key)` says which may have it;
+  /// a row's `required_key`, if it has such, must be there.
   template <class Row, std::size_t N>
   Only taken_by(const std::array<Row, N>& rows) {
-    return Only(*this, [&rows](std::string_view key) {
-      std::vector<std::string_view> words;
-      for (const Row& row : rows) {
-        if (takes(row, key)) words.push_back(row.word);
-      }
-      return words;
-    });
+    return {*this, [&rows](std::string_view key) {
+              Only::Owners owners;
+              owners.may = words_where(rows, [key](const Row& row) { return takes(row, key); });
+              if constexpr (requires { rows[0].required_key; }) {
+                owners.must =
+                    words_where(rows, [key](const Row& row) { return row.required_key == key; });
+              }
+              return owners;
+            }};
   }
 
   /// `second` is only of use beside `first`.
   void needs(std::string_view second, std::string_view first);
+
+  /// `first` sets the others, which have no place beside it.
+  void sets(std::string_view first, std::initializer_list<std::string_view> others);
 
   /// What the schema says beside the fields: a JSON text, or a value.
   void rule(const char* schema) {
@@ -133,10 +158,14 @@ class Fields {
   }
   void rule(const Schema& schema);
 
-  /// The value of a key that is read apart, if it is there; no key is a fault by that.
+  /// The value of a key, if it is there and its kind may have it; no key is a fault by that.
   std::optional<StrictValue> peek(std::string_view key) {
-    return object_ ? object_->find(key) : std::nullopt;
+    const bool is_misplaced = std::ranges::find(misplaced_, key) != misplaced_.end();
+    return object_ && !is_misplaced ? object_->find(key) : std::nullopt;
   }
+
+  /// When reading: a fault of this key, whether it is there or not.
+  void fault(std::string_view key, std::string_view expected) { object_->at(key).fault(expected); }
 
   /// Whether what was read of this key is without a fault.
   bool is_sound(std::string_view key) const {
@@ -208,20 +237,26 @@ class Fields {
                 bool is_required);
   void state_default(std::string_view key, const Schema& value);
   void set_kind(std::string_view key, std::string_view word, std::string_view fallback);
-  bool is_of(const std::vector<std::string_view>& owners) const;
-  bool may_have(std::string_view key, const std::vector<std::string_view>& owners,
-                bool is_required);
-  static std::string of_kinds(const std::vector<std::string_view>& owners, std::string_view what) {
-    return fmt::format("{}: {}", fmt::join(owners, ", "), what);
+  bool may_have(std::string_view key, const Only::Owners& owners);
+  static std::string of_kinds(const Only::Owners& owners, std::string_view what);
+
+  template <class T, class Type>
+  std::optional<StrictValue> owned(std::string_view key, T& member, const Type& type,
+                                   std::string_view what, const Only::Owners& owners) {
+    if (!may_have(key, owners)) return std::nullopt;
+    const bool must = std::ranges::find(owners.must, kind_) != owners.must.end();
+    return field(key, member, type, of_kinds(owners, what), !is_describing() && must);
   }
 
+  /// What a schema says of kinds: the keys that no others have, and those that these need.
   struct Owned {
-    std::vector<std::string_view> owners;
+    Kinds owners;
     std::vector<std::string> keys, required;
   };
+  Owned& owned_by(const Kinds& owners);
 
   std::optional<StrictObject> object_;  // when reading
-  std::vector<std::string_view> faulty_;
+  std::vector<std::string_view> faulty_, misplaced_;
   bool is_finished_ = false;
   std::optional<Schema> schema_;  // when describing
   std::vector<Owned> owned_;
@@ -287,7 +322,9 @@ template <class T, std::size_t N>
 struct Words {
   const std::array<Word<T>, N>& table;
   std::string_view word(const T& member) const { return word_of(table, member); }
-  void read(const StrictValue& value, T& member) const { member = value.choice(table); }
+  void read(const StrictValue& value, T& member) const {
+    if (const auto choice = value.sound_choice(table)) member = *choice;
+  }
   Schema schema(const T&) const {
     Fields::Schema list = Fields::Schema::array();
     for (const Word<T>& entry : table) list.push_back(entry.word);
@@ -340,6 +377,10 @@ struct Objects {
 template <class T>
 auto objects(void (*list)(Fields&, T&)) {
   return Objects<T, void (*)(Fields&, T&)>{list};
+}
+template <class T, class List>
+auto objects(List list) {
+  return Objects<T, List>{list};
 }
 
 /// Width and height, each least..most.

@@ -6,16 +6,10 @@
 #include <string>
 #include <string_view>
 
-#include "manifests/documents/detail/strict_json.h"
-#include "manifests/values/events.h"
-
 namespace eventgan {
 
 /// The documents that are part of the program, by name (shipped_sensors.cmake).
 const std::map<std::string, std::string_view, std::less<>>& shipped_sensor_documents();
-
-/// Reads a sensor's document.
-CameraSensor read_camera_sensor(const StrictValue& value);
 
 /// A manifest's text in which `generator.sensor`, if it is a shipped name or the path of a document
 /// (*.json, from `directory` on), has become that document: what the manifest says then stays with

@@ -67,13 +67,28 @@ void list_drawn(Fields& fields, Drawn& drawn) {
   fields.rule(R"({"properties": {"width": {"maximum": 2}}})");
 }
 
-/// What the table says of a text: faults, or what was read, written again.
-std::string read_again(const char* text) {
+struct ShapeRow {
+  std::string_view word, key, required_key;
+};
+constexpr std::array kShapeRows{ShapeRow{"dot", "note", ""}, ShapeRow{"line", "length", "length"}};
+bool takes(const ShapeRow& row, std::string_view key) { return row.key == key; }
+
+void list_by_rows(Fields& fields, Drawn& drawn) {
+  fields.kind_at("shape", drawn.shape, words(kShapes), "What it is.");
+  Fields::Only some = fields.taken_by(kShapeRows);
+  some.find("length", drawn.length, numbers(0, 9), "how long it is.");
+  some.find("note", drawn.note, texts(), "for people.");
+  fields.find("width", drawn.width, integers(1, 3), "How wide.");
+  fields.sets("note", {"width"});
+}
+
+/// What a table says of a text: faults, or what was read, written again.
+std::string read_again(const char* text, void (*list)(Fields&, Drawn&) = list_drawn) {
   FaultList faults("d");
   const json document = json::parse(text);
   Drawn drawn;
-  objects(list_drawn).read(StrictValue(document, faults), drawn);
-  return faults.empty() ? objects(list_drawn).json(drawn).dump() : faults.text();
+  objects(list).read(StrictValue(document, faults), drawn);
+  return faults.empty() ? objects(list).json(drawn).dump() : faults.text();
 }
 
 TEST(Fields, AreReadAndWritten) {
@@ -104,6 +119,25 @@ TEST(Fields, HaveTheirFaultsTogether) {
             R"(d: $.format: expected "drawn", got "other")");
 }
 
+TEST(Fields, AreThoseThatARowTakes) {
+  EXPECT_EQ(read_again(R"({"shape": "line", "length": 4, "width": 3})", list_by_rows),
+            R"({"shape":"line","length":4.0,"width":3})");
+  EXPECT_EQ(read_again(R"({"shape": "line", "note": "n", "width": 3})", list_by_rows),
+            "d: $.length: expected a number 0..9, got nothing\n"
+            "d: $.note: expected no such key for shape \"line\" (only for dot), got \"n\"");
+  EXPECT_EQ(read_again(R"({"shape": "dot", "note": "n", "width": 3})", list_by_rows),
+            "d: $.width: expected no such key together with note, which sets it, got 3");
+  // Of a kind that is none, no key is missing either.
+  EXPECT_EQ(read_again(R"({"shape": "lin"})", list_by_rows),
+            R"(d: $.shape: expected "dot" or "line", got "lin")");
+  EXPECT_EQ(json(objects(list_by_rows).schema(Drawn()).at("allOf")), json::parse(R"([
+      {"not": {"required": ["note", "width"]}},
+      {"if": {"properties": {"shape": {"enum": ["line"]}}},
+       "then": {"required": ["length"]}, "else": {"properties": {"length": false}}},
+      {"if": {"properties": {"shape": {"enum": ["dot"]}}},
+       "else": {"properties": {"note": false}}}])"));
+}
+
 TEST(Fields, AreDescribed) {
   EXPECT_EQ(json(objects(list_drawn).schema(Drawn())), json::parse(R"({
     "type": "object", "additionalProperties": false, "required": ["format", "version"],
@@ -112,7 +146,7 @@ TEST(Fields, AreDescribed) {
       "version": {"const": 1, "description": "Version of the document's format."},
       "shape": {"enum": ["dot", "line"], "default": "dot", "description": "What it is."},
       "length": {"type": "number", "minimum": 0, "maximum": 9, "default": 2.5,
-                 "description": "line: how long it is."},
+                 "description": "line: how long it is. Required."},
       "width": {"type": "integer", "minimum": 1, "maximum": 3, "default": 1, "description": "How wide."},
       "note": {"type": "string", "description": "For people."},
       "range": {"anyOf": [{"type": "number", "minimum": 0, "maximum": 1},

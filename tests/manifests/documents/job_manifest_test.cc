@@ -7,7 +7,6 @@
 #include <set>
 #include <tuple>
 
-#include "manifests/documents/detail/job_manifest.h"
 #include "manifests/documents/manifest_fields.h"
 #include "manifests/values/faults.h"
 #include "tests/manifests/documents/manifest_cases.h"
@@ -261,14 +260,13 @@ TEST(JobManifest, ReportsADoubleKeyBesideOtherFaults) {
             "m.json: $.sed: expected the key \"seed\" or none, got an unknown key");
 }
 
-ImageSpec read(const char* text, DatasetKind dataset = DatasetKind::kFrames) {
-  FaultList faults("m");
-  const auto document = nlohmann::json::parse(text);
-  SourceSpec source;
-  source.dataset = dataset;
-  const ImageSpec spec = read_image(StrictValue(document, faults), {source});
-  EXPECT_EQ(faults.text(), "");
-  return spec;
+ImageSpec read(const char* image, DatasetKind dataset = DatasetKind::kFrames) {
+  nlohmann::json source = {
+      {"dataset", to_string(dataset)}, {"root", "r"}, {"pairs", {{"gaps", {1}}}}};
+  if (dataset == DatasetKind::kHuman36m) source["layout"] = "fetch";
+  if (dataset == DatasetKind::kMpiiList) source["annotations"] = "a";
+  return parse(testing::edited(kSoundManifest, {{"/sources/0", source.dump()}, {"/image", image}}))
+      .image;
 }
 
 TEST(ImageSpec, PresetsAreThoseOfThePublishedScripts) {
@@ -343,6 +341,9 @@ TEST(PairManifest, HasTheDefaultsOfFrames) {
       parse_pair_manifest(R"({"image": {"width": 32, "height": 16}})", "", "");
   EXPECT_EQ(named.image.preset, manifest.image.preset);
   EXPECT_EQ(named.image.grey, manifest.image.grey);
+  const JobManifest by_keys =
+      parse_pair_manifest(R"({"image": {"grey": "before_resize", "blur": 3}})", "", "");
+  EXPECT_EQ(by_keys.image.preset, "");
 }
 
 TEST(PairManifest, TakesWhatMakesAVolumeAndNothingElse) {

