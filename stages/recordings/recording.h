@@ -22,8 +22,9 @@ struct FlowField {
 };
 
 /// A recording of an event camera: the events, and frames with their times if it has any, all on
-/// one clock and one pixel grid. Of a table (.npy, .npz, .csv) all events are read at once, those
-/// of the tables used last are kept; of the others nothing but the index is held in memory.
+/// one clock and one pixel grid. Of tables, AEDAT4 and Prophesee's files the events read last are
+/// kept, for all windows and threads: sixteen million of the whole process, or 220 MB. Of the
+/// others nothing but the index is held in memory.
 ///
 /// A frame that is not there is std::out_of_range. Thread safety: all may be called from several
 /// threads (calls into HDF5 take turns).
