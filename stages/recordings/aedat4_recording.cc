@@ -15,6 +15,7 @@
 
 #include "manifests/values/faults.h"
 #include "stages/recordings/detail/ecd_event_file.h"
+#include "stages/recordings/detail/event_parts.h"
 #include "stages/recordings/detail/frame_intervals.h"
 #include "stages/recordings/detail/recording_reader.h"
 
@@ -144,7 +145,7 @@ const Table& table_of(std::string& bytes, const char* identifier) {
   throw EventFault(fmt::format("expected a sound table {}, got another", identifier));
 }
 
-/// A packet as it lies in the file.
+/// A packet as it lies in the file, or as the table of packets tells of it.
 struct PacketPlace {
   std::int64_t byte = 0;  ///< where its content begins
   std::int64_t size_bytes = 0;
@@ -153,13 +154,40 @@ struct PacketPlace {
   // Of events, if there are any:
   std::int64_t begin_us = 0;
   std::int64_t end_us = 0;
+
+  std::int64_t end() const { return byte + size_bytes; }
+  std::string text() const {
+    return fmt::format("stream {}, {} bytes at byte {}, {} elements, {} to {} µs", stream,
+                       size_bytes, byte, count, begin_us, end_us);
+  }
 };
+
+/// What the table says of a packet must be so; older writers left out all but its place.
+void check_packet(const PacketPlace& is, const PacketPlace& told) {
+  const bool is_placed =
+      told.byte == is.byte && told.stream == is.stream && told.size_bytes == is.size_bytes;
+  const bool is_told = is.count >= 0 && told.count != 0;
+  const bool is_counted = !is_told || told.count == is.count;
+  const bool is_timed =
+      !is_told || is.end_us == 0 || (told.begin_us == is.begin_us && told.end_us == is.end_us);
+  if (is_placed && is_counted && is_timed) return;
+  throw EventFault("expected the packet in the table as it is, " + is.text() + ", got " +
+                   told.text());
+}
 
 double seconds(std::int64_t time_us) { return static_cast<double>(time_us) / 1e6; }
 
 void check_time(std::int64_t time_us) {
   if (time_us >= 0 && time_us < kTimesEnd) return;
   throw EventFault(fmt::format("expected a time of 0..{} µs, got {} µs", kTimesEnd - 1, time_us));
+}
+
+/// The same of an event behind another.
+void check_order(std::int64_t time_us, std::int64_t last_us) {
+  check_time(time_us);
+  if (time_us >= last_us) return;
+  throw EventFault(
+      fmt::format("expected times that never decrease, got {} µs after {} µs", time_us, last_us));
 }
 
 /// The file, and how its packets are packed.
@@ -172,14 +200,25 @@ class Aedat4File {
   void set_compression(int compression) { compression_ = compression; }
 
   std::string read(std::int64_t begin, std::int64_t end) const {
-    if (end - begin <= static_cast<std::int64_t>(kMostBytes)) return file_.read(begin, end);
-    throw EventFault(fmt::format("expected at most {} bytes, got {}", kMostBytes, end - begin));
+    check_size(end - begin);
+    return file_.read(begin, end);
   }
 
-  std::string unpack(std::int64_t begin, std::int64_t end) const {
-    std::string bytes = read(begin, end);
+  std::string unpack(std::string bytes) const {
     if (compression_ == 0) return bytes;
     return compression_ <= 2 ? unpack_lz4(bytes) : unpack_zstd(bytes);
+  }
+
+  /// What is in a packet, whose stream and size must lie in front of it.
+  std::string content(const PacketPlace& packet) const {
+    check_size(packet.size_bytes);
+    std::string bytes = file_.read(packet.byte - kPacketHeaderBytes, packet.end());
+    PacketPlace is = packet;
+    is.stream = number_at<std::int32_t>(bytes, 0);
+    is.size_bytes = number_at<std::int32_t>(bytes, 4);
+    check_packet(is, packet);
+    bytes.erase(0, kPacketHeaderBytes);
+    return unpack(std::move(bytes));
   }
 
   /// Runs `read`; a fault in it is of what lies at `byte`.
@@ -196,15 +235,33 @@ class Aedat4File {
     throw InputError(fmt::format("{}, in {} (byte {})", fault, name(), byte));
   }
 
-  std::vector<aedat4::Event> events(const PacketPlace& packet) const {
+  /// Reads a packet, whose first event is the recording's `first` and not before `last_us`. What
+  /// was not known of it is known then; what was must be so.
+  CompactEvents events(PacketPlace& packet, std::int64_t first, std::int64_t last_us) const {
     return at(packet.byte, [&] {
-      std::string bytes = unpack(packet.byte, packet.byte + packet.size_bytes);
+      std::string bytes = content(packet);
       const auto* const elements = table_of<aedat4::Events>(bytes, "EVTS").elements();
-      std::vector<aedat4::Event> events(elements ? elements->size() : 0);
-      // Copied, since nothing says that they lie where 64-bit numbers should.
-      if (!events.empty()) {
-        std::memcpy(events.data(), elements->Data(), events.size() * sizeof(aedat4::Event));
+      PacketPlace is = packet;
+      is.count = elements ? std::int64_t{elements->size()} : 0;
+      CompactEvents events;
+      events.reserve(static_cast<std::size_t>(is.count));
+      for (std::int64_t i = 0; i < is.count; ++i) {
+        aedat4::Event event;  // copied, since nothing says that it lies where 64-bit numbers should
+        std::memcpy(&event, elements->Data() + static_cast<std::size_t>(i) * sizeof(event),
+                    sizeof(event));
+        try {
+          check_order(event.t_us(), last_us);
+        } catch (const EventFault& fault) {
+          throw InputError(fmt::format("{}, in {} (event {})", fault.what(), name(), first + i));
+        }
+        last_us = event.t_us();
+        if (i == 0) is.begin_us = last_us;
+        is.end_us = last_us;
+        events.push_back({static_cast<double>(event.x()), static_cast<double>(event.y()),
+                          seconds(last_us), static_cast<double>(event.on())});
       }
+      if (packet.count >= 0) check_packet(is, packet);
+      packet = is;
       return events;
     });
   }
@@ -217,7 +274,7 @@ class Aedat4File {
 
   Frame frame(const PacketPlace& packet, ImageSize size) const {
     return at(packet.byte, [&] {
-      std::string bytes = unpack(packet.byte, packet.byte + packet.size_bytes);
+      std::string bytes = content(packet);
       const aedat4::Frame& table = table_of<aedat4::Frame>(bytes, "FRME");
       const std::int64_t begin_us = table.exposure_begin_us();
       const std::int64_t end_us = table.exposure_end_us();
@@ -264,6 +321,11 @@ class Aedat4File {
   }
 
  private:
+  static void check_size(std::int64_t size_bytes) {
+    if (size_bytes <= static_cast<std::int64_t>(kMostBytes)) return;
+    throw EventFault(fmt::format("expected at most {} bytes, got {}", kMostBytes, size_bytes));
+  }
+
   RandomAccessFile file_;
   int compression_ = 0;
 };
@@ -354,26 +416,49 @@ int only_stream(const Header& header, std::string_view type) {
 
 // ---- The packets
 
-/// Where the packets are, in the file's order.
+/// The packets that the file's table tells of, in the file's order.
+std::vector<PacketPlace> read_table(const Aedat4File& file, std::int64_t table_byte) {
+  std::string bytes = file.unpack(file.read(table_byte, file.size_bytes()));
+  std::vector<PacketPlace> told;
+  const auto* const entries = table_of<aedat4::PacketTable>(bytes, "FTAB").packets();
+  for (flatbuffers::uoffset_t i = 0; entries && i < entries->size(); ++i) {
+    const aedat4::PacketEntry& entry = *entries->Get(i);
+    const aedat4::Packet nowhere(-1, -1);
+    const aedat4::Packet& packet = entry.packet() ? *entry.packet() : nowhere;
+    told.push_back({entry.byte(), packet.size_bytes(), packet.stream(), entry.count(),
+                    entry.begin_us(), entry.end_us()});
+  }
+  std::ranges::stable_sort(told, {}, &PacketPlace::byte);
+  return told;
+}
+
+/// Where the packets are, in the file's order. Those that `told` has follow each other as it says,
+/// which is looked at when they are read.
 std::vector<PacketPlace> find_packets(const Aedat4File& file, const Header& header,
+                                      const std::vector<PacketPlace>& told,
                                       std::vector<std::string>& notes) {
   const bool has_table = header.table_byte != -1;
   const std::int64_t end = has_table ? header.table_byte : file.size_bytes();
   std::vector<PacketPlace> packets;
   for (std::int64_t byte = header.end_byte; byte < end;) {
     PacketPlace packet{byte + kPacketHeaderBytes};
-    if (packet.byte <= end) {
+    const std::size_t number = packets.size();
+    if (number < told.size() && told[number].byte == packet.byte &&
+        header.streams.contains(told[number].stream) && told[number].size_bytes > 0) {
+      packet.stream = told[number].stream;
+      packet.size_bytes = told[number].size_bytes;
+    } else if (packet.byte <= end) {
       const std::string bytes = file.read(byte, packet.byte);
       packet.stream = number_at<std::int32_t>(bytes, 0);
       packet.size_bytes = number_at<std::int32_t>(bytes, 4);
-      if (!header.streams.contains(packet.stream) || packet.size_bytes <= 0) {
-        file.refuse(fmt::format("expected a packet of a stream that the header tells of, got {} "
-                                "bytes of stream {}",
-                                packet.size_bytes, packet.stream),
-                    byte);
-      }
     }
-    if (packet.byte + packet.size_bytes > end) {
+    if (packet.byte <= end && (!header.streams.contains(packet.stream) || packet.size_bytes <= 0)) {
+      file.refuse(fmt::format("expected a packet of a stream that the header tells of, got {} "
+                              "bytes of stream {}",
+                              packet.size_bytes, packet.stream),
+                  byte);
+    }
+    if (packet.end() > end) {
       const std::string cut = fmt::format("expected a packet of {} bytes, got {}",
                                           kPacketHeaderBytes + packet.size_bytes, end - byte);
       if (has_table) file.refuse(cut, byte);
@@ -381,104 +466,52 @@ std::vector<PacketPlace> find_packets(const Aedat4File& file, const Header& head
                                   cut, file.name(), byte));
       break;
     }
-    byte = packet.byte + packet.size_bytes;
+    byte = packet.end();
     packets.push_back(packet);
+  }
+  if (has_table && told.size() != packets.size()) {
+    file.refuse(fmt::format("expected a table of {} packets, as many as there are, got {}",
+                            packets.size(), told.size()),
+                header.table_byte);
+  }
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    file.at(header.table_byte, [&] { check_packet(packets[i], told[i]); });
   }
   return packets;
 }
 
-/// What the file's table says of a packet must be so; older writers left out all but its place.
-void check_table(const Aedat4File& file, const Header& header,
-                 const std::vector<PacketPlace>& packets) {
-  std::string bytes = file.unpack(header.table_byte, file.size_bytes());
-  const auto* const stored = table_of<aedat4::PacketTable>(bytes, "FTAB").packets();
-  std::vector<const aedat4::PacketEntry*> entries;
-  if (stored) entries.assign(stored->begin(), stored->end());
-  std::ranges::stable_sort(entries, {}, &aedat4::PacketEntry::byte);
-  if (entries.size() != packets.size()) {
-    throw EventFault(fmt::format("expected a table of {} packets, as many as there are, got {}",
-                                 packets.size(), entries.size()));
-  }
-  for (std::size_t i = 0; i < packets.size(); ++i) {
-    const aedat4::PacketEntry& entry = *entries[i];
-    const PacketPlace& packet = packets[i];
-    const bool is_placed = entry.byte() == packet.byte && entry.packet() &&
-                           entry.packet()->stream() == packet.stream &&
-                           entry.packet()->size_bytes() == packet.size_bytes;
-    const bool is_told = packet.count >= 0 && entry.count() != 0;
-    const bool is_counted = !is_told || entry.count() == packet.count;
-    const bool is_timed = !is_told || packet.end_us == 0 ||
-                          (entry.begin_us() == packet.begin_us && entry.end_us() == packet.end_us);
-    if (is_placed && is_counted && is_timed) continue;
-    throw EventFault(fmt::format(
-        "expected packet {} in the table as it is, stream {}, {} bytes at byte {}, {} elements, "
-        "{} to {} µs, got stream {}, {} bytes at byte {}, {} elements, {} to {} µs",
-        i, packet.stream, packet.size_bytes, packet.byte, packet.count, packet.begin_us,
-        packet.end_us, entry.packet() ? entry.packet()->stream() : -1,
-        entry.packet() ? entry.packet()->size_bytes() : -1, entry.byte(), entry.count(),
-        entry.begin_us(), entry.end_us()));
-  }
-}
-
-class Aedat4Events final : public EventStore {
+class Aedat4Events final : public EventParts {
  public:
-  explicit Aedat4Events(std::shared_ptr<const Aedat4File> file) : file_(std::move(file)) {}
+  explicit Aedat4Events(std::shared_ptr<const Aedat4File> file)
+      : EventParts(file->name()), file_(std::move(file)) {}
 
-  /// Reads a packet, which comes behind those added before.
-  void add(PacketPlace& packet) {
-    const std::vector<aedat4::Event> events = file_->events(packet);
-    packet.count = std::ssize(events);
-    if (events.empty()) return;
-    for (std::size_t i = 0; i < events.size(); ++i) {
-      const std::int64_t time_us = events[i].t_us();
-      try {
-        check_time(time_us);
-        if (time_us < last_us_) {
-          throw EventFault(fmt::format("expected times that never decrease, got {} µs after {} µs",
-                                       time_us, last_us_));
-        }
-      } catch (const EventFault& fault) {
-        throw InputError(fmt::format("{}, in {} (event {})", fault.what(), file_->name(),
-                                     count_ + static_cast<std::int64_t>(i)));
-      }
-      last_us_ = time_us;
+  /// A packet behind those added before. It is read now unless the table tells, of a packet that
+  /// fits behind them, how many events of which times it has.
+  void add(PacketPlace packet, const PacketPlace* told) {
+    constexpr auto kMostEvents = static_cast<std::int64_t>(kMostBytes / sizeof(aedat4::Event));
+    if (told && told->count > 0 && told->count <= kMostEvents && told->begin_us >= last_us_ &&
+        told->end_us >= told->begin_us && told->end_us < kTimesEnd) {
+      packet = *told;
+      packets_.push_back(packet);
+      add_part(packet.count, seconds(packet.begin_us));
+    } else {
+      CompactEvents events = file_->events(packet, count(), last_us_);
+      if (told) file_->at(packet.byte, [&] { check_packet(packet, *told); });
+      if (packet.count == 0) return;
+      packets_.push_back(packet);
+      add_part(std::move(events));
     }
-    packet.begin_us = events.front().t_us();
-    packet.end_us = last_us_;
-    packets_.push_back(packet);
-    firsts_.push_back(count_);
-    count_ += packet.count;
-  }
-
-  std::int64_t count() const override { return count_; }
-
-  std::vector<StoredEvent> read(std::int64_t first, std::int64_t count) const override {
-    std::vector<StoredEvent> result;
-    result.reserve(static_cast<std::size_t>(count));
-    const auto behind = std::ranges::upper_bound(firsts_, first);
-    auto at = static_cast<std::size_t>(behind - firsts_.begin()) - 1;
-    for (; std::ssize(result) < count; ++at) {
-      const std::vector<aedat4::Event> events = file_->events(packets_[at]);
-      if (std::ssize(events) != packets_[at].count) {
-        file_->refuse("expected a file that stays as it is, got another number of events",
-                      packets_[at].byte);
-      }
-      const std::int64_t begin = first + std::ssize(result) - firsts_[at];
-      const std::int64_t end = std::min(begin + count - std::ssize(result), packets_[at].count);
-      for (std::int64_t i = begin; i < end; ++i) {
-        const aedat4::Event& event = events[static_cast<std::size_t>(i)];
-        result.push_back({static_cast<double>(event.x()), static_cast<double>(event.y()),
-                          seconds(event.t_us()), static_cast<double>(event.on())});
-      }
-    }
-    return result;
+    last_us_ = packet.end_us;
   }
 
  private:
+  CompactEvents read_part(std::size_t part) const override {
+    PacketPlace packet = packets_[part];
+    return file_->events(packet, first_of(part), part == 0 ? 0 : packets_[part - 1].end_us);
+  }
+
   std::shared_ptr<const Aedat4File> file_;
   std::vector<PacketPlace> packets_;  ///< those with events
-  std::vector<std::int64_t> firsts_;  ///< the number of each packet's first event
-  std::int64_t count_ = 0;
   std::int64_t last_us_ = 0;
 };
 
@@ -488,9 +521,10 @@ class Aedat4Frames final : public FrameStore {
       : file_(std::move(file)), size_(size) {}
 
   /// Reads a packet; false if its frame is in colour.
-  bool add(PacketPlace& packet) {
+  bool add(PacketPlace packet, const PacketPlace* told) {
     const Aedat4File::Frame frame = file_->frame(packet, size_);
     packet.count = 1;
+    if (told) file_->at(packet.byte, [&] { check_packet(packet, *told); });
     packets_.push_back(packet);
     times_s_.push_back(seconds(frame.time_us));
     return frame.is_grey;
@@ -534,16 +568,18 @@ StoredParts open_aedat4(const std::filesystem::path& path) {
         "there is read, in " +
         file->name());
   }
-  std::vector<PacketPlace> packets = find_packets(*file, header, parts.notes);
+  std::vector<PacketPlace> told;
+  if (header.table_byte != -1) {
+    told = file->at(header.table_byte, [&] { return read_table(*file, header.table_byte); });
+  }
+  const std::vector<PacketPlace> packets = find_packets(*file, header, told, parts.notes);
   auto events = std::make_unique<Aedat4Events>(file);
   auto frames = std::make_unique<Aedat4Frames>(file, parts.size);
   bool are_grey = true;
-  for (PacketPlace& packet : packets) {
-    if (packet.stream == event_stream) events->add(packet);
-    if (packet.stream == frame_stream) are_grey &= frames->add(packet);
-  }
-  if (header.table_byte != -1) {
-    file->at(header.table_byte, [&] { check_table(*file, header, packets); });
+  for (std::size_t i = 0; i < packets.size(); ++i) {
+    const PacketPlace* const entry = told.empty() ? nullptr : &told[i];
+    if (packets[i].stream == event_stream) events->add(packets[i], entry);
+    if (packets[i].stream == frame_stream) are_grey &= frames->add(packets[i], entry);
   }
   if (!are_grey) parts.notes.push_back("frames in colour are made grey, in " + file->name());
   parts.events = std::move(events);

@@ -19,6 +19,7 @@
 namespace eventgan {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -147,8 +148,15 @@ class Aedat4Test : public ::testing::Test {
   std::unique_ptr<Recording> open(const TestFile& file) { return open(file.bytes()); }
 
   void expect_refused(const std::string& bytes, const std::string& reason) {
-    EXPECT_THAT([&] { open(bytes); }, ThrowsMessage<InputError>(HasSubstr(reason)));
-    EXPECT_THAT([&] { open(bytes); }, ThrowsMessage<InputError>(HasSubstr(path_.string())));
+    EXPECT_THAT([&] { open(bytes); },
+                ThrowsMessage<InputError>(AllOf(HasSubstr(reason), HasSubstr(path_.string()))));
+  }
+
+  /// A packet that the table tells of is read when its events are asked for.
+  void expect_refused_when_read(const std::string& bytes, const std::string& reason) {
+    const auto recording = open(bytes);
+    EXPECT_THAT([&] { recording->events_in(0, 2); },
+                ThrowsMessage<InputError>(AllOf(HasSubstr(reason), HasSubstr(path_.string()))));
   }
 
   /// Three packets of events, the second empty, two frames, and one of a stream that is not read.
@@ -257,16 +265,25 @@ TEST_F(Aedat4Test, ReadsTablesOfBothAlignments) {
 }
 
 TEST_F(Aedat4Test, RefusesATableThatSaysOtherwise) {
-  const std::function<void(TestFile&)> changes[] = {
-      [](TestFile& file) { file.packets[0].count = 3; },
-      [](TestFile& file) { file.packets[1].count = 2; },
-      [](TestFile& file) { file.packets[3].count = 1; },
-      [](TestFile& file) { file.packets[0].begin_us -= 1; },
-      [](TestFile& file) { file.packets[5].end_us += 1; }};
-  for (const auto& change : changes) {
+  using Change = std::function<void(TestFile&)>;
+  const auto changed = [](const Change& change) {
     TestFile file = small();
     change(file);
-    expect_refused(file.bytes(), "in the table as it is");
+    return file.bytes();
+  };
+  const Change seen_on_opening[] = {[](TestFile& file) { file.packets[1].count = 2; },
+                                    [](TestFile& file) { file.packets[3].count = 1; },
+                                    [](TestFile& file) { file.packets[0].end_us = 1; },
+                                    [](TestFile& file) { file.packets[5].begin_us -= 1; }};
+  for (const Change& change : seen_on_opening) {
+    expect_refused(changed(change), "in the table as it is");
+  }
+  const Change seen_when_read[] = {[](TestFile& file) { file.packets[0].count = 3; },
+                                   [](TestFile& file) { file.packets[0].begin_us -= 1; },
+                                   [](TestFile& file) { file.packets[5].begin_us += 1; },
+                                   [](TestFile& file) { file.packets[5].end_us += 1; }};
+  for (const Change& change : seen_when_read) {
+    expect_refused_when_read(changed(change), "in the table as it is");
   }
   TestFile file = small();
   expect_refused(file.bytes() + "rest", "expected a sound table FTAB");
@@ -366,17 +383,27 @@ TEST_F(Aedat4Test, RefusesBrokenPackets) {
   // With a table it is no matter of an unplugged camera.
   std::string longer = whole;
   const std::size_t size_at = file.header(-1).size() + 4;
-  longer.replace(size_at, 4, number_bytes(1 << 28));
-  expect_refused(longer, "expected a packet of 268435464 bytes, got");
-  longer.replace(size_at, 4, number_bytes(-1));
-  expect_refused(longer, "got -1 bytes of stream 0");
-  longer.replace(size_at, 4, number_bytes(0));
-  expect_refused(longer, "got 0 bytes of stream 0");
+  for (const std::int32_t size_bytes : {1 << 28, -1, 0}) {
+    longer.replace(size_at, 4, number_bytes(size_bytes));
+    expect_refused_when_read(longer, "in the table as it is, stream 0, " +
+                                         std::to_string(size_bytes) + " bytes at byte");
+    // Without a table nothing else tells.
+    std::string unplugged = longer;
+    unplugged.replace(0, file.header(-1).size(), file.header(-1));
+    if (size_bytes > 0) continue;
+    expect_refused(unplugged, "got " + std::to_string(size_bytes) + " bytes of stream 0");
+  }
   for (const int compression : {1, 3}) {
     file.compression = compression;
     std::string damaged = file.bytes();
     damaged[file.header(-1).size() + 8] ^= 1;
-    expect_refused(damaged, compression == 1 ? "expected an LZ4 frame" : "expected a Zstandard");
+    const std::string reason = compression == 1 ? "expected an LZ4 frame" : "expected a Zstandard";
+    expect_refused_when_read(damaged, reason);
+    TestFile unplugged = file;
+    unplugged.has_table = false;
+    damaged = unplugged.bytes();
+    damaged[file.header(-1).size() + 8] ^= 1;
+    expect_refused(damaged, reason);
   }
   // A frame that ends before it is whole, as the packet says its size.
   file.compression = 0;
