@@ -84,9 +84,10 @@ std::filesystem::path event_file(const std::filesystem::path& path,
                                  const RecordingOptions& options = {});
 
 /// What decides, beside this file, the times of frames and the places of events: images.txt of ECD;
-/// timestamps.txt and, with `rectify`, rectify_map.h5 of DSEC.
-std::vector<std::filesystem::path> event_companions(const std::filesystem::path& event_file,
-                                                    const RecordingOptions& options = {});
+/// timestamps.txt and, with `rectify`, rectify_map.h5 of DSEC. Without a format it is found.
+std::vector<std::filesystem::path> event_companions(
+    const std::filesystem::path& event_file, std::optional<RecordingFormat> format = std::nullopt,
+    const RecordingOptions& options = {});
 
 /// Opens a recording of the format, or of what is found without one: reads the frames' times and
 /// checks that everything is there and fits together; where a frame's events end is looked up when
