@@ -100,7 +100,7 @@ void read_header_line(std::string_view key, std::string_view value, PropheseeHea
   throw InputError(fmt::format("{}, in {} (byte {})", fault, name, byte));
 }
 
-constexpr std::int64_t kMostHeaderBytes = std::int64_t{1} << 16;
+constexpr std::int64_t kMostHeaderBytes = std::int64_t{1} << 14;
 
 /// Lines "% key value", up to a line "% end" or to what is no such line.
 PropheseeHeader read_prophesee_header(std::string_view text, const std::string& name) {

@@ -16,7 +16,7 @@ namespace eventgan {
 
 namespace {
 
-constexpr std::uint64_t kBeginningBytes = 1 << 16;
+constexpr std::uint64_t kBeginningBytes = 1 << 14;
 
 /// At the file's start, or behind a user's block, at 512 bytes or twice, four times, ... as many.
 bool has_hdf5_signature(const InputFile& file) {

@@ -7,10 +7,12 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <string>
 
 #include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
 #include "stages/recordings/recording.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
@@ -205,6 +207,50 @@ TEST_F(Aedat4Test, ReadsAFileWithoutFrames) {
   EXPECT_EQ(open(file)->frame_count(), 0);
   file.packets.clear();
   EXPECT_EQ(open(file)->event_span(), std::nullopt);
+}
+
+/// Of `packets` packets of a thousand events, one each microsecond.
+TestFile long_file(int packets) {
+  constexpr std::int64_t kEvents = 1000;
+  TestFile file;
+  for (int i = 0; i < packets; ++i) {
+    std::vector<aedat4::Event> events;
+    for (std::int64_t k = 0; k < kEvents; ++k) events.emplace_back(i * kEvents + k, 1, 2, 1);
+    file.packets.push_back(events_packet(events));
+  }
+  return file;
+}
+
+TEST_F(Aedat4Test, IsReadOnceForAllWindows) {
+  TestFile file = long_file(40);
+  file.packets.push_back({kFrameStream, frame_table({.t_us = 39'999}), 1});
+  for (const bool has_table : {true, false}) {
+    file.has_table = has_table;
+    testing::write_file(path_, file.bytes());
+    const InputCounter counter;
+    const auto recording = open_recording(path_, find_recording_format(path_));
+    EXPECT_EQ(recording->event_span(), (std::array{0.0, 0.039999}));
+    std::size_t events = 0;
+    for (int i = 0; i < 80; ++i) {  // each of half a packet
+      events += recording->events_in(i * 500e-6 - 0.1e-6, (i + 1) * 500e-6 - 0.1e-6).size();
+    }
+    EXPECT_EQ(events, 40'000u);
+    EXPECT_EQ(counter.of(path_).opens, 2u);  // to recognise it, and to read it
+    EXPECT_LE(static_cast<double>(counter.of(path_).bytes),
+              1.2 * static_cast<double>(std::filesystem::file_size(path_)));
+  }
+}
+
+TEST_F(Aedat4Test, OfItsPacketsOnlyThoseOfTheWindowAreRead) {
+  testing::write_file(path_, long_file(40).bytes());
+  constexpr std::uint64_t kPacket = 16'000;
+  const InputCounter counter;
+  const auto recording = open_recording(path_, RecordingFormat::kAedat4);
+  EXPECT_EQ(recording->frame_count(), 0);
+  EXPECT_LT(counter.of(path_).bytes, kPacket / 2);  // the header and the table
+  // Of packets 20 and 21; their times are looked for up to 512 events around.
+  EXPECT_EQ(recording->events_in(0.0206, 0.0214).size(), 800u);
+  EXPECT_LT(counter.of(path_).bytes, 3 * kPacket);
 }
 
 // Grey as ITU-R BT.601 weighs: 0.114 * 10 + 0.587 * 100 + 0.299 * 200 = 119.64.
