@@ -135,9 +135,19 @@ std::int64_t EcdEventFile::first_byte_after(double time_s) const {
   return found;
 }
 
+namespace {
+
+/// What so many lines take, and more than one.
+std::int64_t usual_bytes(std::int64_t lines) {
+  return std::min(2 * kLongestLine + std::min(lines, kBytesPerRead) * kUsualLine, kBytesPerRead);
+}
+
+}  // namespace
+
 std::int64_t EcdEventFile::skip_lines(std::int64_t byte, std::int64_t lines) const {
   while (lines > 0 && byte < file_.size_bytes()) {
-    const std::string bytes = file_.read(byte, std::min(byte + kBytesPerRead, file_.size_bytes()));
+    const std::string bytes =
+        file_.read(byte, std::min(byte + usual_bytes(lines), file_.size_bytes()));
     std::size_t at = 0;
     for (; lines > 0 && at < bytes.size(); --lines) {
       at = std::min(bytes.find('\n', at), bytes.size() - 1) + 1;
@@ -146,7 +156,7 @@ std::int64_t EcdEventFile::skip_lines(std::int64_t byte, std::int64_t lines) con
     byte += static_cast<std::int64_t>(at);
   }
   while (lines < 0 && byte > 0) {
-    const std::int64_t begin = std::max<std::int64_t>(byte - kBytesPerRead, 0);
+    const std::int64_t begin = std::max<std::int64_t>(byte - usual_bytes(-lines), 0);
     const std::string bytes = file_.read(begin, byte);
     // The line before starts behind the last line end but the one that ends it.
     std::size_t at = bytes.size();
