@@ -17,6 +17,7 @@
 #include "stages/base/archives/detail/numpy_arrays.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/archives/zip_archive.h"
+#include "stages/base/files/csv_records.h"
 #include "stages/base/files/input_file.h"
 #include "stages/recordings/detail/event_parts.h"
 #include "stages/recordings/detail/recording_reader.h"
@@ -138,78 +139,53 @@ CompactEvents read_npz(const fs::path& path, const EventFields& columns) {
 
 // ---- CSV
 
-std::vector<std::string_view> split(std::string_view line) {
-  constexpr std::string_view kBlanks = " \t\r";
-  std::vector<std::string_view> fields;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(',', begin), line.size());
-    std::string_view field = line.substr(begin, end - begin);
-    field.remove_prefix(std::min(field.find_first_not_of(kBlanks), field.size()));
-    fields.push_back(field.substr(0, field.find_last_not_of(kBlanks) + 1));
-    begin = end + 1;
-  }
-  return fields;
-}
-
 /// The columns' places in a header line; none unless it has all of them.
-std::optional<std::array<std::size_t, kColumns>> find_columns(std::string_view header,
+std::optional<std::array<std::size_t, kColumns>> find_columns(const CsvRecord& header,
                                                               const EventFields& columns) {
-  constexpr std::string_view kMark = "\xEF\xBB\xBF";
-  if (header.starts_with(kMark)) header.remove_prefix(kMark.size());
-  const std::vector<std::string_view> fields = split(header);
   std::array<std::size_t, kColumns> places{};
   const std::array<std::string, kColumns> names = names_of(columns);
   for (std::size_t i = 0; i < kColumns; ++i) {
-    if (std::ranges::count(fields, names[i]) != 1) return std::nullopt;
-    places[i] = static_cast<std::size_t>(std::ranges::find(fields, names[i]) - fields.begin());
+    if (std::ranges::count(header.fields, names[i]) != 1) return std::nullopt;
+    places[i] = static_cast<std::size_t>(std::ranges::find(header.fields, names[i]) -
+                                         header.fields.begin());
   }
   return places;
 }
 
 CompactEvents read_csv(const fs::path& path, const EventFields& columns) {
   const std::string text = read_text_file(path);
+  const std::array<std::string, kColumns> names = names_of(columns);
+  const auto refuse = [&](const std::string& fault, int line) {
+    throw InputError(fault + ", in " + path.string() + " (line " + std::to_string(line) + ")");
+  };
+  CsvReader reader(text);
+  const std::optional<CsvRecord> header = reader.next();
+  if (!header) refuse("expected a header line, got none", 1);
+  const auto places = find_columns(*header, columns);
+  if (!places) {
+    refuse("expected a header line with " + columns.t + ", " + columns.x + ", " + columns.y +
+               " and " + columns.p + ", got another",
+           header->line);
+  }
   const double ticks_per_s = std::round(1 / columns.tick_s);
-  std::optional<std::array<std::size_t, kColumns>> places;
-  std::size_t width = 0;
   CompactEvents events;
   events.reserve(static_cast<std::size_t>(std::ranges::count(text, '\n')));
-  std::int64_t number = 0;
-  const auto refuse = [&](const std::string& expected, const std::string& got) {
-    throw InputError("expected " + expected + ", got " + got + ", in " + path.string() + " (line " +
-                     std::to_string(number) + ")");
-  };
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::string_view line(text.data() + begin, end - begin);
-    begin = end + 1;
-    ++number;
-    const std::vector<std::string_view> fields = split(line);
-    if (!places) {
-      places = find_columns(line, columns);
-      if (!places)
-        refuse("a header line with " + columns.t + ", " + columns.x + ", " + columns.y + " and " +
-                   columns.p,
-               "another");
-      width = fields.size();
-      continue;
-    }
-    if (fields.size() == 1 && fields[0].empty()) continue;
-    if (fields.size() != width) {
-      refuse(std::to_string(width) + " fields", std::to_string(fields.size()));
+  while (const std::optional<CsvRecord> record = reader.next()) {
+    if (record->fields.empty()) refuse(record->fault, record->line);
+    if (record->fields.size() != header->fields.size()) {
+      refuse("expected " + std::to_string(header->fields.size()) + " fields, got " +
+                 std::to_string(record->fields.size()),
+             record->line);
     }
     Row row{};
     for (std::size_t i = 0; i < kColumns; ++i) {
-      const std::string_view field = fields[(*places)[i]];
+      const std::string_view field = record->fields[(*places)[i]];
       const auto [stop, error] = std::from_chars(field.data(), field.data() + field.size(), row[i]);
       if (error != std::errc() || stop != field.data() + field.size()) {
-        refuse("a number of " + names_of(columns)[i], "another field");
+        refuse("expected a number of " + names[i] + ", got another field", record->line);
       }
     }
     events.push_back(event_of(row, ticks_per_s));
-  }
-  if (!places) {
-    ++number;
-    refuse("a header line", "none");
   }
   return events;
 }
@@ -260,7 +236,8 @@ bool is_event_table(const RecordingInput& input, const RecordingOptions& options
       return std::ranges::find(layout.fields, name, &NumpyField::name) != layout.fields.end();
     });
   }
-  return find_columns(text.substr(0, text.find('\n')), options.columns).has_value();
+  const auto header = CsvReader(text).next();
+  return header && find_columns(*header, options.columns).has_value();
 } catch (const std::runtime_error&) {  // reported when it is opened
   return false;
 }
