@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/recordings/detail/ecd_event_file.h"
+#include "stages/base/files/input_file.h"
 #include "stages/recordings/detail/event_parts.h"
 #include "stages/recordings/detail/frame_intervals.h"
 #include "stages/recordings/detail/recording_reader.h"
@@ -196,12 +196,12 @@ class Aedat4File {
   explicit Aedat4File(const std::filesystem::path& path) : file_(path) {}
 
   const std::string& name() const { return file_.name(); }
-  std::int64_t size_bytes() const { return file_.size_bytes(); }
+  std::int64_t size_bytes() const { return file_.end_byte(); }
   void set_compression(int compression) { compression_ = compression; }
 
   std::string read(std::int64_t begin, std::int64_t end) const {
     check_size(end - begin);
-    return file_.read(begin, end);
+    return file_.read_between(begin, end);
   }
 
   std::string unpack(std::string bytes) const {
@@ -212,7 +212,7 @@ class Aedat4File {
   /// What is in a packet, whose stream and size must lie in front of it.
   std::string content(const PacketPlace& packet) const {
     check_size(packet.size_bytes);
-    std::string bytes = file_.read(packet.byte - kPacketHeaderBytes, packet.end());
+    std::string bytes = file_.read_between(packet.byte - kPacketHeaderBytes, packet.end());
     PacketPlace is = packet;
     is.stream = number_at<std::int32_t>(bytes, 0);
     is.size_bytes = number_at<std::int32_t>(bytes, 4);
@@ -326,7 +326,7 @@ class Aedat4File {
     throw EventFault(fmt::format("expected at most {} bytes, got {}", kMostBytes, size_bytes));
   }
 
-  RandomAccessFile file_;
+  InputFile file_;
   int compression_ = 0;
 };
 

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/recordings/detail/ecd_event_file.h"
+#include "stages/base/files/input_file.h"
 #include "stages/recordings/detail/event_parts.h"
 #include "stages/recordings/detail/recording_reader.h"
 
@@ -283,13 +283,13 @@ struct DecodingStart {
 
 class PropheseeEvents final : public EventParts {
  public:
-  PropheseeEvents(RandomAccessFile file, PropheseeEncoding encoding, std::int64_t first_byte)
+  PropheseeEvents(InputFile file, PropheseeEncoding encoding, std::int64_t first_byte)
       : EventParts(file.name()), file_(std::move(file)), encoding_(encoding) {
-    if (const std::int64_t rest = (file_.size_bytes() - first_byte) % word_bytes(); rest != 0) {
+    if (const std::int64_t rest = (file_.end_byte() - first_byte) % word_bytes(); rest != 0) {
       refuse_at(fmt::format("expected whole words of {} bytes, got {} more", word_bytes(), rest),
-                file_.name(), file_.size_bytes() - rest);
+                file_.name(), file_.end_byte() - rest);
     }
-    for (DecodingStart start{first_byte, {}}; start.byte < file_.size_bytes();) {
+    for (DecodingStart start{first_byte, {}}; start.byte < file_.end_byte();) {
       const DecodingStart begin = start;
       CompactEvents events = decode(start);
       if (events.size() > 0) starts_.push_back(begin);
@@ -328,7 +328,7 @@ class PropheseeEvents final : public EventParts {
   template <class Word, class TakeWord>
   CompactEvents decode_words(DecodingStart& start, TakeWord take_word) const {
     const std::string bytes =
-        file_.read(start.byte, std::min(start.byte + kBytesPerPart, file_.size_bytes()));
+        file_.read_between(start.byte, std::min(start.byte + kBytesPerPart, file_.end_byte()));
     CompactEvents result;
     WordEvents events;
     for (std::size_t i = 0; i < bytes.size(); i += sizeof(Word)) {
@@ -346,7 +346,7 @@ class PropheseeEvents final : public EventParts {
     return result;
   }
 
-  RandomAccessFile file_;
+  InputFile file_;
   PropheseeEncoding encoding_;
   std::vector<DecodingStart> starts_;  ///< of the parts, which have events
   std::int64_t left_out_ = 0;
@@ -380,9 +380,9 @@ bool is_prophesee(const RecordingInput& input, const RecordingOptions&) try {
 
 StoredParts open_prophesee(const std::filesystem::path& path,
                            const std::optional<ImageSize>& sensor) {
-  RandomAccessFile file(path);
+  InputFile file(path);
   PropheseeHeader header = read_prophesee_header(
-      file.read(0, std::min(kMostHeaderBytes, file.size_bytes())), file.name());
+      file.read_between(0, std::min(kMostHeaderBytes, file.end_byte())), file.name());
   if (!header.encoding) {
     throw InputError(
         "expected a header \"% Data file containing ...\", \"% evt 2.0\" or \"% evt 3.0\", got "
@@ -391,7 +391,7 @@ StoredParts open_prophesee(const std::filesystem::path& path,
   }
   if (header.encoding == PropheseeEncoding::kDat) {
     const std::int64_t end = header.end_byte + 2;
-    const std::string kind = file.read(header.end_byte, std::min(end, file.size_bytes()));
+    const std::string kind = file.read_between(header.end_byte, std::min(end, file.end_byte()));
     constexpr char kEvent2d = 0x00;
     constexpr char kEventCd = 0x0c;
     if (kind.size() < 2 || (kind[0] != kEvent2d && kind[0] != kEventCd) || kind[1] != 8) {
