@@ -33,9 +33,9 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Of the file with the events and of what is read beside it.
-std::string recording_hash(const fs::path& path, const RecordingOptions& options) {
-  const fs::path events = event_file(fs::absolute(path).lexically_normal(), options);
-  std::vector<fs::path> files = event_companions(events, options);
+std::string recording_hash(const fs::path& path, const RecordingSpec& spec) {
+  const fs::path events = event_file(fs::absolute(path).lexically_normal(), spec.options);
+  std::vector<fs::path> files = event_companions(events, spec.format, spec.options);
   if (files.empty()) return sha256_of_file(events);
   files.insert(files.begin(), events);
   std::string listing;
@@ -105,7 +105,7 @@ void add_final_origin(Weights& weights, const TrainingManifest& manifest,
   std::string listing;
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     const RecordingSpec& spec = manifest.recordings.at(i);
-    listing += spec.path + '\t' + recording_hash(recordings[i].file, spec.options) + '\n';
+    listing += spec.path + '\t' + recording_hash(recordings[i].file, spec) + '\n';
   }
   weights.metadata["training_recordings_sha256"] = listing;
   if (manifest.simulated) {

@@ -1,484 +1,63 @@
 #include "stages/recordings/detail/aedat4_recording.h"
 
-#include <aedat4_generated.h>
-#include <fmt/core.h>
-#include <lz4frame.h>
-#include <zstd.h>
-
 #include <algorithm>
-#include <cstring>
-#include <map>
-#include <opencv2/imgproc.hpp>
-#include <pugixml.hpp>
+#include <memory>
+#include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
-#include "manifests/values/faults.h"
-#include "stages/recordings/detail/ecd_event_file.h"
-#include "stages/recordings/detail/frame_intervals.h"
+#include "stages/recordings/detail/aedat4_file.h"
+#include "stages/recordings/detail/event_parts.h"
 #include "stages/recordings/detail/recording_reader.h"
 
 namespace eventgan {
 namespace {
 
-constexpr std::string_view kFirstLine = "#!AER-DAT4.0\r\n";
-constexpr std::int64_t kPacketHeaderBytes = 8;
-/// Of a packet, unpacked: sixteen million events, or a table of five million packets.
-constexpr std::size_t kMostBytes = std::size_t{1} << 28;
-/// Up to here, of the year 2112, whole microseconds stay distinct as seconds in a double.
-constexpr std::int64_t kTimesEnd = std::int64_t{1} << 52;
-
-static_assert(sizeof(aedat4::Event) == 16, "events are copied as they are stored");
-
-// ---- Unpacking
-
-template <class Context, auto release>
-struct Released {
-  void operator()(Context* context) const { release(context); }
-};
-using Lz4Context = std::unique_ptr<LZ4F_dctx, Released<LZ4F_dctx, LZ4F_freeDecompressionContext>>;
-using ZstdContext = std::unique_ptr<ZSTD_DStream, Released<ZSTD_DStream, ZSTD_freeDStream>>;
-
-/// What one step of unpacking took and gave.
-struct UnpackStep {
-  std::size_t taken = 0;
-  std::size_t given = 0;
-  bool is_end = false;
-};
-
-/// Memory grows with what comes out, not with what the frame claims. `step` gets the target and the
-/// packed bytes left.
-template <class Step>
-std::string unpack_by(std::string_view packed, Step step) {
-  std::string unpacked;
-  std::size_t used = 0;
-  for (;;) {
-    if (used == unpacked.size()) {
-      if (used == kMostBytes) {
-        throw EventFault(fmt::format("expected at most {} bytes unpacked, got more", kMostBytes));
-      }
-      unpacked.resize(std::min(std::max(2 * used, 4 * packed.size() + 64), kMostBytes));
-    }
-    const UnpackStep made = step(unpacked.data() + used, unpacked.size() - used, packed);
-    used += made.given;
-    packed.remove_prefix(made.taken);
-    if (made.is_end) break;
-    if (made.taken == 0 && made.given == 0) {
-      throw EventFault("expected a whole packed frame, got one that is cut off");
-    }
-  }
-  if (!packed.empty()) {
-    throw EventFault(
-        fmt::format("expected one packed frame, got {} bytes behind its end", packed.size()));
-  }
-  unpacked.resize(used);
-  return unpacked;
-}
-
-std::string unpack_lz4(std::string_view packed) {
-  LZ4F_dctx* made = nullptr;
-  if (LZ4F_isError(LZ4F_createDecompressionContext(&made, LZ4F_VERSION))) throw std::bad_alloc();
-  const Lz4Context context(made);
-  return unpack_by(packed, [&](char* target, std::size_t room, std::string_view rest) {
-    UnpackStep step{rest.size(), room};
-    const std::size_t hint =
-        LZ4F_decompress(context.get(), target, &step.given, rest.data(), &step.taken, nullptr);
-    if (LZ4F_isError(hint)) {
-      throw EventFault(
-          fmt::format("expected an LZ4 frame, got damage ({})", LZ4F_getErrorName(hint)));
-    }
-    step.is_end = hint == 0;
-    return step;
-  });
-}
-
-std::string unpack_zstd(std::string_view packed) {
-  const ZstdContext context(ZSTD_createDStream());
-  if (!context) throw std::bad_alloc();
-  return unpack_by(packed, [&](char* target, std::size_t room, std::string_view rest) {
-    ZSTD_outBuffer output{target, room, 0};
-    ZSTD_inBuffer input{rest.data(), rest.size(), 0};
-    const std::size_t hint = ZSTD_decompressStream(context.get(), &output, &input);
-    if (ZSTD_isError(hint)) {
-      throw EventFault(
-          fmt::format("expected a Zstandard frame, got damage ({})", ZSTD_getErrorName(hint)));
-    }
-    return UnpackStep{input.pos, output.pos, hint == 0};
-  });
-}
-
-// ---- The file
-
-template <class Number>
-Number number_at(const std::string& bytes, std::size_t offset) {
-  Number number;
-  std::memcpy(&number, bytes.data() + offset, sizeof(number));
-  return number;
-}
-
-/// As many tables as fit, since the default is less than a long recording has packets.
-flatbuffers::Verifier verifier_of(const std::string& bytes) {
-  const auto most_tables = static_cast<flatbuffers::uoffset_t>(bytes.size() / 4);
-  return flatbuffers::Verifier(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(),
-                               64, most_tables);
-}
-
-/// The table of a whole FlatBuffer with its size in front, once every offset in it is known to be
-/// sound. Numbers lie as their types want it counted from the size, or, of older writers, from
-/// behind it: then the size is taken off `bytes`.
-template <class Table>
-const Table& table_of(std::string& bytes, const char* identifier) {
-  flatbuffers::Verifier whole = verifier_of(bytes);
-  if (whole.VerifySizePrefixedBuffer<Table>(identifier)) {
-    return *flatbuffers::GetSizePrefixedRoot<Table>(bytes.data());
-  }
-  constexpr std::size_t kSizeBytes = 4;
-  if (bytes.size() > kSizeBytes &&
-      number_at<std::uint32_t>(bytes, 0) == bytes.size() - kSizeBytes) {
-    bytes.erase(0, kSizeBytes);
-    flatbuffers::Verifier rest = verifier_of(bytes);
-    if (rest.VerifyBuffer<Table>(identifier)) {
-      return *flatbuffers::GetRoot<Table>(bytes.data());
-    }
-  }
-  throw EventFault(fmt::format("expected a sound table {}, got another", identifier));
-}
-
-/// A packet as it lies in the file.
-struct PacketPlace {
-  std::int64_t byte = 0;  ///< where its content begins
-  std::int64_t size_bytes = 0;
-  int stream = 0;
-  std::int64_t count = -1;  ///< of events or frames; -1: it is of neither
-  // Of events, if there are any:
-  std::int64_t begin_us = 0;
-  std::int64_t end_us = 0;
-};
-
-double seconds(std::int64_t time_us) { return static_cast<double>(time_us) / 1e6; }
-
-void check_time(std::int64_t time_us) {
-  if (time_us >= 0 && time_us < kTimesEnd) return;
-  throw EventFault(fmt::format("expected a time of 0..{} µs, got {} µs", kTimesEnd - 1, time_us));
-}
-
-/// The file, and how its packets are packed.
-class Aedat4File {
- public:
-  explicit Aedat4File(const std::filesystem::path& path) : file_(path) {}
-
-  const std::string& name() const { return file_.name(); }
-  std::int64_t size_bytes() const { return file_.size_bytes(); }
-  void set_compression(int compression) { compression_ = compression; }
-
-  std::string read(std::int64_t begin, std::int64_t end) const {
-    if (end - begin <= static_cast<std::int64_t>(kMostBytes)) return file_.read(begin, end);
-    throw EventFault(fmt::format("expected at most {} bytes, got {}", kMostBytes, end - begin));
-  }
-
-  std::string unpack(std::int64_t begin, std::int64_t end) const {
-    std::string bytes = read(begin, end);
-    if (compression_ == 0) return bytes;
-    return compression_ <= 2 ? unpack_lz4(bytes) : unpack_zstd(bytes);
-  }
-
-  /// Runs `read`; a fault in it is of what lies at `byte`.
-  template <class Read>
-  auto at(std::int64_t byte, Read read) const {
-    try {
-      return read();
-    } catch (const EventFault& fault) {
-      refuse(fault.what(), byte);
-    }
-  }
-
-  [[noreturn]] void refuse(const std::string& fault, std::int64_t byte) const {
-    throw InputError(fmt::format("{}, in {} (byte {})", fault, name(), byte));
-  }
-
-  std::vector<aedat4::Event> events(const PacketPlace& packet) const {
-    return at(packet.byte, [&] {
-      std::string bytes = unpack(packet.byte, packet.byte + packet.size_bytes);
-      const auto* const elements = table_of<aedat4::Events>(bytes, "EVTS").elements();
-      std::vector<aedat4::Event> events(elements ? elements->size() : 0);
-      // Copied, since nothing says that they lie where 64-bit numbers should.
-      if (!events.empty()) {
-        std::memcpy(events.data(), elements->Data(), events.size() * sizeof(aedat4::Event));
-      }
-      return events;
-    });
-  }
-
-  struct Frame {
-    std::int64_t time_us = 0;
-    bool is_grey = true;
-    GreyImage image;
-  };
-
-  Frame frame(const PacketPlace& packet, ImageSize size) const {
-    return at(packet.byte, [&] {
-      std::string bytes = unpack(packet.byte, packet.byte + packet.size_bytes);
-      const aedat4::Frame& table = table_of<aedat4::Frame>(bytes, "FRME");
-      const std::int64_t begin_us = table.exposure_begin_us();
-      const std::int64_t end_us = table.exposure_end_us();
-      Frame frame;
-      frame.time_us = table.t_us();
-      if (begin_us != 0 || end_us != 0) {
-        check_time(begin_us);
-        check_time(end_us);
-        if (end_us < begin_us) {
-          throw EventFault(fmt::format("expected an exposure that ends at {} µs or later, got {}",
-                                       begin_us, end_us));
-        }
-        frame.time_us = begin_us + (end_us - begin_us) / 2;
-      }
-      check_time(frame.time_us);
-      const ImageSize stored{table.height(), table.width()};
-      if (stored != size || table.left() != 0 || table.top() != 0) {
-        throw EventFault(fmt::format("expected a frame of {} at 0, 0, got {} at {}, {}",
-                                     to_string(size), to_string(stored), table.left(),
-                                     table.top()));
-      }
-      const int type = table.format();
-      if (type != CV_8UC1 && type != CV_8UC3 && type != CV_8UC4) {
-        throw EventFault(fmt::format("expected pixels of OpenCV's type {}, {} or {}, got {}",
-                                     CV_8UC1, CV_8UC3, CV_8UC4, type));
-      }
-      const std::size_t count = table.pixels() ? table.pixels()->size() : 0;
-      if (count != size.pixel_count() * CV_MAT_CN(type)) {
-        throw EventFault(fmt::format("expected {} bytes of pixels, got {}",
-                                     size.pixel_count() * CV_MAT_CN(type), count));
-      }
-      frame.is_grey = type == CV_8UC1;
-      frame.image = {size, std::vector<std::uint8_t>(size.pixel_count())};
-      const std::uint8_t* const pixels = table.pixels()->data();
-      if (frame.is_grey) {
-        std::copy_n(pixels, count, frame.image.pixels.begin());
-      } else {
-        const cv::Mat colour(size.height, size.width, type, const_cast<std::uint8_t*>(pixels));
-        cv::Mat grey(size.height, size.width, CV_8UC1, frame.image.pixels.data());
-        cv::cvtColor(colour, grey, type == CV_8UC3 ? cv::COLOR_BGR2GRAY : cv::COLOR_BGRA2GRAY);
-      }
-      return frame;
-    });
-  }
-
- private:
-  RandomAccessFile file_;
-  int compression_ = 0;
-};
-
-// ---- What the header says
-
-struct Stream {
-  std::string type;
-  ImageSize size;
-};
-
-struct Header {
-  std::int64_t end_byte = 0;    ///< where the packets begin
-  std::int64_t table_byte = 0;  ///< -1: there is no table
-  int compression = 0;
-  std::map<int, Stream> streams;
-};
-
-/// The streams that the XML tells of: its node outInfo has a node for each, named by its number.
-std::map<int, Stream> streams_of(const std::string& xml) {
-  pugi::xml_document document;
-  if (const auto parsed = document.load_buffer(xml.data(), xml.size()); !parsed) {
-    throw EventFault(
-        fmt::format("expected XML of the streams, got none ({})", parsed.description()));
-  }
-  std::map<int, Stream> streams;
-  const auto attribute = [](const pugi::xml_node& node, const char* key) {
-    return node.find_child_by_attribute("attr", "key", key).text();
-  };
-  for (const pugi::xml_node& node :
-       document.child("dv").find_child_by_attribute("node", "name", "outInfo").children("node")) {
-    const pugi::xml_node info = node.find_child_by_attribute("node", "name", "info");
-    const int number = node.attribute("name").as_int(-1);
-    const Stream stream{attribute(node, "typeIdentifier").as_string(),
-                        {attribute(info, "sizeY").as_int(), attribute(info, "sizeX").as_int()}};
-    if (number < 0 || !streams.emplace(number, stream).second) {
-      throw EventFault(
-          fmt::format("expected streams of different numbers, got another, {}", number));
-    }
-  }
-  return streams;
-}
-
-Header read_header(const Aedat4File& file) {
-  constexpr auto kLine = static_cast<std::int64_t>(kFirstLine.size());
-  const std::string start = file.read(0, std::min(kLine + 4, file.size_bytes()));
-  if (!start.starts_with(kFirstLine) || std::ssize(start) < kLine + 4) {
-    file.refuse("expected \"#!AER-DAT4.0\" and a header, got another file", 0);
-  }
-  Header header;
-  header.end_byte = kLine + 4 + number_at<std::uint32_t>(start, kFirstLine.size());
-  if (header.end_byte > file.size_bytes()) {
-    file.refuse(fmt::format("expected a header up to byte {}, got a file of {} bytes",
-                            header.end_byte, file.size_bytes()),
-                kLine);
-  }
-  return file.at(kLine, [&] {
-    std::string bytes = file.read(kLine, header.end_byte);
-    const auto& table = table_of<aedat4::Header>(bytes, "IOHE");
-    header.compression = table.compression();
-    header.table_byte = table.table_byte();
-    if (header.compression < 0 || header.compression > 4) {
-      throw EventFault(fmt::format("expected a compression 0..4, got {}", header.compression));
-    }
-    if (header.table_byte != -1 &&
-        (header.table_byte < header.end_byte || header.table_byte > file.size_bytes())) {
-      throw EventFault(fmt::format("expected a table of packets at a byte {}..{}, got one at {}",
-                                   header.end_byte, file.size_bytes(), header.table_byte));
-    }
-    header.streams = streams_of(table.info() ? table.info()->str() : std::string());
-    return header;
-  });
-}
-
 /// The number of the one stream of a type; -1 if there is none.
-int only_stream(const Header& header, std::string_view type) {
+int only_stream(const Aedat4File::Header& header, std::string_view type) {
   int found = -1;
   for (const auto& [number, stream] : header.streams) {
     if (stream.type != type) continue;
     if (found >= 0) {
-      throw EventFault(
-          fmt::format("expected one stream of {}, got several ({} and {})", type, found, number));
+      throw EventFault("expected one stream of " + std::string(type) + ", got several (" +
+                       std::to_string(found) + " and " + std::to_string(number) + ")");
     }
     found = number;
   }
   return found;
 }
 
-// ---- The packets
-
-/// Where the packets are, in the file's order.
-std::vector<PacketPlace> find_packets(const Aedat4File& file, const Header& header,
-                                      std::vector<std::string>& notes) {
-  const bool has_table = header.table_byte != -1;
-  const std::int64_t end = has_table ? header.table_byte : file.size_bytes();
-  std::vector<PacketPlace> packets;
-  for (std::int64_t byte = header.end_byte; byte < end;) {
-    PacketPlace packet{byte + kPacketHeaderBytes};
-    if (packet.byte <= end) {
-      const std::string bytes = file.read(byte, packet.byte);
-      packet.stream = number_at<std::int32_t>(bytes, 0);
-      packet.size_bytes = number_at<std::int32_t>(bytes, 4);
-      if (!header.streams.contains(packet.stream) || packet.size_bytes <= 0) {
-        file.refuse(fmt::format("expected a packet of a stream that the header tells of, got {} "
-                                "bytes of stream {}",
-                                packet.size_bytes, packet.stream),
-                    byte);
-      }
-    }
-    if (packet.byte + packet.size_bytes > end) {
-      const std::string cut = fmt::format("expected a packet of {} bytes, got {}",
-                                          kPacketHeaderBytes + packet.size_bytes, end - byte);
-      if (has_table) file.refuse(cut, byte);
-      notes.push_back(fmt::format("the last packet is cut off and left out: {}, in {} (byte {})",
-                                  cut, file.name(), byte));
-      break;
-    }
-    byte = packet.byte + packet.size_bytes;
-    packets.push_back(packet);
-  }
-  return packets;
-}
-
-/// What the file's table says of a packet must be so; older writers left out all but its place.
-void check_table(const Aedat4File& file, const Header& header,
-                 const std::vector<PacketPlace>& packets) {
-  std::string bytes = file.unpack(header.table_byte, file.size_bytes());
-  const auto* const stored = table_of<aedat4::PacketTable>(bytes, "FTAB").packets();
-  std::vector<const aedat4::PacketEntry*> entries;
-  if (stored) entries.assign(stored->begin(), stored->end());
-  std::ranges::stable_sort(entries, {}, &aedat4::PacketEntry::byte);
-  if (entries.size() != packets.size()) {
-    throw EventFault(fmt::format("expected a table of {} packets, as many as there are, got {}",
-                                 packets.size(), entries.size()));
-  }
-  for (std::size_t i = 0; i < packets.size(); ++i) {
-    const aedat4::PacketEntry& entry = *entries[i];
-    const PacketPlace& packet = packets[i];
-    const bool is_placed = entry.byte() == packet.byte && entry.packet() &&
-                           entry.packet()->stream() == packet.stream &&
-                           entry.packet()->size_bytes() == packet.size_bytes;
-    const bool is_told = packet.count >= 0 && entry.count() != 0;
-    const bool is_counted = !is_told || entry.count() == packet.count;
-    const bool is_timed = !is_told || packet.end_us == 0 ||
-                          (entry.begin_us() == packet.begin_us && entry.end_us() == packet.end_us);
-    if (is_placed && is_counted && is_timed) continue;
-    throw EventFault(fmt::format(
-        "expected packet {} in the table as it is, stream {}, {} bytes at byte {}, {} elements, "
-        "{} to {} µs, got stream {}, {} bytes at byte {}, {} elements, {} to {} µs",
-        i, packet.stream, packet.size_bytes, packet.byte, packet.count, packet.begin_us,
-        packet.end_us, entry.packet() ? entry.packet()->stream() : -1,
-        entry.packet() ? entry.packet()->size_bytes() : -1, entry.byte(), entry.count(),
-        entry.begin_us(), entry.end_us()));
-  }
-}
-
-class Aedat4Events final : public EventStore {
+class Aedat4Events final : public EventParts {
  public:
-  explicit Aedat4Events(std::shared_ptr<const Aedat4File> file) : file_(std::move(file)) {}
+  explicit Aedat4Events(std::shared_ptr<const Aedat4File> file)
+      : EventParts(file->name()), file_(std::move(file)) {}
 
-  /// Reads a packet, which comes behind those added before.
-  void add(PacketPlace& packet) {
-    const std::vector<aedat4::Event> events = file_->events(packet);
-    packet.count = std::ssize(events);
-    if (events.empty()) return;
-    for (std::size_t i = 0; i < events.size(); ++i) {
-      const std::int64_t time_us = events[i].t_us();
-      try {
-        check_time(time_us);
-        if (time_us < last_us_) {
-          throw EventFault(fmt::format("expected times that never decrease, got {} µs after {} µs",
-                                       time_us, last_us_));
-        }
-      } catch (const EventFault& fault) {
-        throw InputError(fmt::format("{}, in {} (event {})", fault.what(), file_->name(),
-                                     count_ + static_cast<std::int64_t>(i)));
-      }
-      last_us_ = time_us;
+  /// A packet behind those added before. It is read now unless the table tells, of a packet that
+  /// fits behind them, how many events of which times it has.
+  void add(PacketPlace packet, const PacketPlace* told) {
+    if (told && told->may_have_events_from(last_us_)) {
+      packet = *told;
+      packets_.push_back(packet);
+      add_part(packet.count, packet.begin_s());
+    } else {
+      CompactEvents events = file_->events(packet, count(), last_us_);
+      if (told) file_->at(packet.byte, [&] { check_packet(packet, *told); });
+      if (packet.count == 0) return;
+      packets_.push_back(packet);
+      add_part(std::move(events));
     }
-    packet.begin_us = events.front().t_us();
-    packet.end_us = last_us_;
-    packets_.push_back(packet);
-    firsts_.push_back(count_);
-    count_ += packet.count;
-  }
-
-  std::int64_t count() const override { return count_; }
-
-  std::vector<StoredEvent> read(std::int64_t first, std::int64_t count) const override {
-    std::vector<StoredEvent> result;
-    result.reserve(static_cast<std::size_t>(count));
-    const auto behind = std::ranges::upper_bound(firsts_, first);
-    auto at = static_cast<std::size_t>(behind - firsts_.begin()) - 1;
-    for (; std::ssize(result) < count; ++at) {
-      const std::vector<aedat4::Event> events = file_->events(packets_[at]);
-      if (std::ssize(events) != packets_[at].count) {
-        file_->refuse("expected a file that stays as it is, got another number of events",
-                      packets_[at].byte);
-      }
-      const std::int64_t begin = first + std::ssize(result) - firsts_[at];
-      const std::int64_t end = std::min(begin + count - std::ssize(result), packets_[at].count);
-      for (std::int64_t i = begin; i < end; ++i) {
-        const aedat4::Event& event = events[static_cast<std::size_t>(i)];
-        result.push_back({static_cast<double>(event.x()), static_cast<double>(event.y()),
-                          seconds(event.t_us()), static_cast<double>(event.on())});
-      }
-    }
-    return result;
+    last_us_ = packet.end_us;
   }
 
  private:
+  CompactEvents read_part(std::size_t part) const override {
+    PacketPlace packet = packets_[part];
+    return file_->events(packet, first_of(part), part == 0 ? 0 : packets_[part - 1].end_us);
+  }
+
   std::shared_ptr<const Aedat4File> file_;
   std::vector<PacketPlace> packets_;  ///< those with events
-  std::vector<std::int64_t> firsts_;  ///< the number of each packet's first event
-  std::int64_t count_ = 0;
   std::int64_t last_us_ = 0;
 };
 
@@ -488,11 +67,12 @@ class Aedat4Frames final : public FrameStore {
       : file_(std::move(file)), size_(size) {}
 
   /// Reads a packet; false if its frame is in colour.
-  bool add(PacketPlace& packet) {
+  bool add(PacketPlace packet, const PacketPlace* told) {
     const Aedat4File::Frame frame = file_->frame(packet, size_);
     packet.count = 1;
+    if (told) file_->at(packet.byte, [&] { check_packet(packet, *told); });
     packets_.push_back(packet);
-    times_s_.push_back(seconds(frame.time_us));
+    times_s_.push_back(frame.time_s);
     return frame.is_grey;
   }
 
@@ -513,10 +93,9 @@ class Aedat4Frames final : public FrameStore {
 
 StoredParts open_aedat4(const std::filesystem::path& path) {
   const auto file = std::make_shared<Aedat4File>(path);
-  const Header header = read_header(*file);
-  file->set_compression(header.compression);
+  const Aedat4File::Header& header = file->header();
   StoredParts parts{file->name(), {}, nullptr};
-  const auto [event_stream, frame_stream] = file->at(std::ssize(kFirstLine), [&] {
+  const auto [event_stream, frame_stream] = file->at(std::ssize(kAedat4FirstLine), [&] {
     const std::pair streams(only_stream(header, "EVTS"), only_stream(header, "FRME"));
     if (streams.first < 0) throw EventFault("expected a stream of events (EVTS), got none");
     parts.size = header.streams.at(streams.first).size;
@@ -534,16 +113,15 @@ StoredParts open_aedat4(const std::filesystem::path& path) {
         "there is read, in " +
         file->name());
   }
-  std::vector<PacketPlace> packets = find_packets(*file, header, parts.notes);
+  const std::vector<PacketPlace> told = file->read_table();
+  const std::vector<PacketPlace> packets = file->find_packets(told, parts.notes);
   auto events = std::make_unique<Aedat4Events>(file);
   auto frames = std::make_unique<Aedat4Frames>(file, parts.size);
   bool are_grey = true;
-  for (PacketPlace& packet : packets) {
-    if (packet.stream == event_stream) events->add(packet);
-    if (packet.stream == frame_stream) are_grey &= frames->add(packet);
-  }
-  if (header.table_byte != -1) {
-    file->at(header.table_byte, [&] { check_table(*file, header, packets); });
+  for (std::size_t i = 0; i < packets.size(); ++i) {
+    const PacketPlace* const entry = told.empty() ? nullptr : &told[i];
+    if (packets[i].stream == event_stream) events->add(packets[i], entry);
+    if (packets[i].stream == frame_stream) are_grey &= frames->add(packets[i], entry);
   }
   if (!are_grey) parts.notes.push_back("frames in colour are made grey, in " + file->name());
   parts.events = std::move(events);
@@ -554,7 +132,7 @@ StoredParts open_aedat4(const std::filesystem::path& path) {
 constinit const RecordingReader kAedat4Reader{
     .format = RecordingFormat::kAedat4,
     .fits = [](const RecordingInput& input,
-               const RecordingOptions&) { return input.beginning().starts_with(kFirstLine); },
+               const RecordingOptions&) { return input.beginning().starts_with(kAedat4FirstLine); },
     .open = [](const std::filesystem::path& path,
                const RecordingOptions&) { return make_stored_recording(open_aedat4(path)); }};
 

@@ -85,7 +85,8 @@ std::string long_line_text() {
 void EcdEventFile::refuse(const EventFault& fault, std::int64_t line_begin) const {
   std::int64_t line = 1;
   for (std::int64_t begin = 0; begin < line_begin; begin += kBytesPerRead) {
-    const std::string bytes = file_.read(begin, std::min(begin + kBytesPerRead, line_begin));
+    const std::string bytes =
+        file_.read_between(begin, std::min(begin + kBytesPerRead, line_begin));
     line += std::ranges::count(bytes, '\n');
   }
   throw InputError(std::string(fault.what()) + ", in " + file_.name() + " (line " +
@@ -94,7 +95,7 @@ void EcdEventFile::refuse(const EventFault& fault, std::int64_t line_begin) cons
 
 EcdEventFile::Line EcdEventFile::line_from(std::int64_t byte) const {
   const std::string bytes =
-      file_.read(byte - 1, std::min(byte + 2 * kLongestLine, file_.size_bytes()));
+      file_.read_between(byte - 1, std::min(byte + 2 * kLongestLine, file_.end_byte()));
   const std::size_t before = bytes.find('\n');
   const std::size_t begin = before + 1;
   const std::size_t end = before == std::string::npos ? before : bytes.find('\n', begin);
@@ -111,12 +112,12 @@ EcdEventFile::Line EcdEventFile::line_from(std::int64_t byte) const {
 std::int64_t EcdEventFile::first_byte_after(double time_s) const {
   // Lines before `low` are at or before the time, those from `high` on are after it.
   std::int64_t low = 0;
-  std::int64_t high = file_.size_bytes();
+  std::int64_t high = file_.end_byte();
   while (high - low > kWindow) {
     const Line line = line_from(low + (high - low) / 2);
     (line.time_s > time_s ? high : low) = line.time_s > time_s ? line.begin : line.end;
   }
-  const std::string bytes = file_.read(low, high);
+  const std::string bytes = file_.read_between(low, high);
   std::int64_t found = high;
   double previous_s = std::numeric_limits<double>::lowest();
   for_each_line(bytes, [&](std::string_view line, std::size_t offset) {
@@ -135,9 +136,19 @@ std::int64_t EcdEventFile::first_byte_after(double time_s) const {
   return found;
 }
 
+namespace {
+
+/// What so many lines take, and more than one.
+std::int64_t usual_bytes(std::int64_t lines) {
+  return std::min(2 * kLongestLine + std::min(lines, kBytesPerRead) * kUsualLine, kBytesPerRead);
+}
+
+}  // namespace
+
 std::int64_t EcdEventFile::skip_lines(std::int64_t byte, std::int64_t lines) const {
-  while (lines > 0 && byte < file_.size_bytes()) {
-    const std::string bytes = file_.read(byte, std::min(byte + kBytesPerRead, file_.size_bytes()));
+  while (lines > 0 && byte < file_.end_byte()) {
+    const std::string bytes =
+        file_.read_between(byte, std::min(byte + usual_bytes(lines), file_.end_byte()));
     std::size_t at = 0;
     for (; lines > 0 && at < bytes.size(); --lines) {
       at = std::min(bytes.find('\n', at), bytes.size() - 1) + 1;
@@ -146,8 +157,8 @@ std::int64_t EcdEventFile::skip_lines(std::int64_t byte, std::int64_t lines) con
     byte += static_cast<std::int64_t>(at);
   }
   while (lines < 0 && byte > 0) {
-    const std::int64_t begin = std::max<std::int64_t>(byte - kBytesPerRead, 0);
-    const std::string bytes = file_.read(begin, byte);
+    const std::int64_t begin = std::max<std::int64_t>(byte - usual_bytes(-lines), 0);
+    const std::string bytes = file_.read_between(begin, byte);
     // The line before starts behind the last line end but the one that ends it.
     std::size_t at = bytes.size();
     for (; lines < 0 && at > 0; ++lines) {
@@ -162,10 +173,10 @@ std::int64_t EcdEventFile::skip_lines(std::int64_t byte, std::int64_t lines) con
 }
 
 std::optional<std::array<double, 2>> EcdEventFile::span() const {
-  const std::int64_t end = file_.size_bytes();
+  const std::int64_t end = file_.end_byte();
   if (end == 0) return std::nullopt;
   const auto time_at = [&](std::int64_t byte) {
-    const std::string bytes = file_.read(byte, std::min(byte + kLongestLine, end));
+    const std::string bytes = file_.read_between(byte, std::min(byte + kLongestLine, end));
     try {
       return parse_ecd_event_time(std::string_view(bytes).substr(0, bytes.find('\n')));
     } catch (const EventFault& fault) {
@@ -181,7 +192,7 @@ std::vector<Event> EcdEventFile::events(std::int64_t begin, std::int64_t end,
   std::vector<Event> events;
   events.reserve(static_cast<std::size_t>((end - begin) / kUsualLine));
   while (begin < end) {
-    std::string bytes = file_.read(begin, std::min(begin + kBytesPerRead, end));
+    std::string bytes = file_.read_between(begin, std::min(begin + kBytesPerRead, end));
     const bool whole = begin + static_cast<std::int64_t>(bytes.size()) == end;
     if (!whole) bytes.resize(bytes.rfind('\n') + 1);  // none: nothing, and npos + 1 is 0
     std::size_t at = 0;

@@ -98,9 +98,9 @@ class ColumnStore final : public EventStore {
     return times;
   }
 
-  std::int64_t near(double time_s) const override {
+  std::optional<std::int64_t> near(double time_s) const override {
     const std::int64_t entries = ms_index_ ? static_cast<std::int64_t>(ms_index_->dims()[0]) : 0;
-    if (entries == 0) return count() / 2;
+    if (entries == 0) return std::nullopt;
     const double ms = (time_s * kTicksPerSecond - static_cast<double>(offset_us_)) / kTicksPerMs;
     const double entry = std::clamp(ms, 0.0, static_cast<double>(entries - 1));
     return column(*ms_index_, static_cast<std::int64_t>(entry), 1)[0];

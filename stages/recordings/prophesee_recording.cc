@@ -6,12 +6,12 @@
 #include <array>
 #include <charconv>
 #include <cstring>
-#include <span>
 #include <string_view>
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/recordings/detail/ecd_event_file.h"
+#include "stages/base/files/input_file.h"
+#include "stages/recordings/detail/event_parts.h"
 #include "stages/recordings/detail/recording_reader.h"
 
 namespace eventgan {
@@ -100,7 +100,7 @@ void read_header_line(std::string_view key, std::string_view value, PropheseeHea
   throw InputError(fmt::format("{}, in {} (byte {})", fault, name, byte));
 }
 
-constexpr std::int64_t kMostHeaderBytes = std::int64_t{1} << 16;
+constexpr std::int64_t kMostHeaderBytes = std::int64_t{1} << 14;
 
 /// Lines "% key value", up to a line "% end" or to what is no such line.
 PropheseeHeader read_prophesee_header(std::string_view text, const std::string& name) {
@@ -278,101 +278,77 @@ std::size_t take_evt3(std::uint16_t word, WordState& state, WordEvents& events) 
 /// Where decoding can begin.
 struct DecodingStart {
   std::int64_t byte = 0;
-  std::int64_t event = 0;
   WordState state;
 };
 
-class PropheseeEvents final : public EventStore {
+class PropheseeEvents final : public EventParts {
  public:
-  PropheseeEvents(const std::filesystem::path& path, PropheseeEncoding encoding,
-                  std::int64_t first_byte)
-      : file_(path), encoding_(encoding) {
-    if (const std::int64_t rest = (file_.size_bytes() - first_byte) % word_bytes(); rest != 0) {
+  PropheseeEvents(InputFile file, PropheseeEncoding encoding, std::int64_t first_byte)
+      : EventParts(file.name()), file_(std::move(file)), encoding_(encoding) {
+    if (const std::int64_t rest = (file_.end_byte() - first_byte) % word_bytes(); rest != 0) {
       refuse_at(fmt::format("expected whole words of {} bytes, got {} more", word_bytes(), rest),
-                file_.name(), file_.size_bytes() - rest);
+                file_.name(), file_.end_byte() - rest);
     }
-    starts_.push_back({first_byte, 0, {}});
-    left_out_ = decode(starts_.front(), [&](const DecodingStart& next, auto) {
-                  if (next.event - starts_.back().event >= kEventsPerStart) {
-                    starts_.push_back(next);
-                  }
-                  count_ = next.event;
-                  return true;
-                }).left_out;
+    for (DecodingStart start{first_byte, {}}; start.byte < file_.end_byte();) {
+      const DecodingStart begin = start;
+      CompactEvents events = decode(start);
+      if (events.size() > 0) starts_.push_back(begin);
+      add_part(std::move(events));
+      left_out_ = start.state.left_out;
+    }
   }
 
   std::int64_t left_out() const { return left_out_; }
-  std::int64_t count() const override { return count_; }
-
-  std::vector<StoredEvent> read(std::int64_t first, std::int64_t count) const override {
-    std::vector<StoredEvent> result;
-    if (count == 0) return result;
-    result.reserve(static_cast<std::size_t>(count));
-    const auto behind = std::ranges::upper_bound(starts_, first, {}, &DecodingStart::event);
-    decode(*(behind - 1), [&](const DecodingStart& next, auto events) {
-      for (const StoredEvent& event : events.last(static_cast<std::size_t>(
-               std::clamp<std::int64_t>(next.event - first, 0, std::ssize(events))))) {
-        if (std::ssize(result) < count) result.push_back(event);
-      }
-      return std::ssize(result) < count;
-    });
-    if (std::ssize(result) < count) {
-      throw InputError("expected a file that stays as it is, got fewer events, in " + file_.name());
-    }
-    return result;
-  }
 
  private:
-  static constexpr std::int64_t kEventsPerStart = 1 << 16;
+  static constexpr std::int64_t kBytesPerPart = 1 << 17;
+
+  CompactEvents read_part(std::size_t part) const override {
+    DecodingStart start = starts_[part];
+    return decode(start);
+  }
 
   std::int64_t word_bytes() const {
     return encoding_ == PropheseeEncoding::kDat ? 8 : encoding_ == PropheseeEncoding::kEvt2 ? 4 : 2;
   }
 
-  /// Decodes from `start` on; `take` gets for each word where decoding would go on behind it, and
-  /// its events, and says whether to. Gives the state behind the last word.
-  template <class Take>
-  WordState decode(DecodingStart start, Take take) const {
+  /// Decodes a part from `start` on, which goes to where decoding goes on behind it.
+  CompactEvents decode(DecodingStart& start) const {
     switch (encoding_) {
       case PropheseeEncoding::kDat:
-        return decode_words<std::uint64_t>(start, take_dat, take);
+        return decode_words<std::uint64_t>(start, take_dat);
       case PropheseeEncoding::kEvt2:
-        return decode_words<std::uint32_t>(start, take_evt2, take);
+        return decode_words<std::uint32_t>(start, take_evt2);
       case PropheseeEncoding::kEvt3:
         break;
     }
-    return decode_words<std::uint16_t>(start, take_evt3, take);
+    return decode_words<std::uint16_t>(start, take_evt3);
   }
 
-  template <class Word, class TakeWord, class Take>
-  WordState decode_words(DecodingStart start, TakeWord take_word, Take take) const {
-    constexpr std::int64_t kBytesPerRead = 1 << 17;
+  template <class Word, class TakeWord>
+  CompactEvents decode_words(DecodingStart& start, TakeWord take_word) const {
+    const std::string bytes =
+        file_.read_between(start.byte, std::min(start.byte + kBytesPerPart, file_.end_byte()));
+    CompactEvents result;
     WordEvents events;
-    while (start.byte < file_.size_bytes()) {
-      const std::string bytes =
-          file_.read(start.byte, std::min(start.byte + kBytesPerRead, file_.size_bytes()));
-      for (std::size_t i = 0; i < bytes.size(); i += sizeof(Word)) {
-        Word word;
-        std::memcpy(&word, bytes.data() + i, sizeof(word));
-        std::size_t count = 0;
-        try {
-          count = take_word(word, start.state, events);
-        } catch (const EventFault& fault) {
-          refuse_at(fault.what(), file_.name(), start.byte);
-        }
-        start.byte += sizeof(Word);
-        start.event += static_cast<std::int64_t>(count);
-        if (!take(std::as_const(start), std::span<const StoredEvent>(events.data(), count)))
-          return start.state;
+    for (std::size_t i = 0; i < bytes.size(); i += sizeof(Word)) {
+      Word word;
+      std::memcpy(&word, bytes.data() + i, sizeof(word));
+      std::size_t count = 0;
+      try {
+        count = take_word(word, start.state, events);
+      } catch (const EventFault& fault) {
+        refuse_at(fault.what(), file_.name(), start.byte);
       }
+      start.byte += sizeof(Word);
+      for (std::size_t k = 0; k < count; ++k) result.push_back(events[k]);
     }
-    return start.state;
+    return result;
   }
 
-  RandomAccessFile file_;
+  InputFile file_;
   PropheseeEncoding encoding_;
-  std::vector<DecodingStart> starts_;  ///< ascending, the first at event 0
-  std::int64_t count_ = 0;
+  std::vector<DecodingStart> starts_;  ///< of the parts, which have events
   std::int64_t left_out_ = 0;
 };
 
@@ -404,9 +380,9 @@ bool is_prophesee(const RecordingInput& input, const RecordingOptions&) try {
 
 StoredParts open_prophesee(const std::filesystem::path& path,
                            const std::optional<ImageSize>& sensor) {
-  const RandomAccessFile file(path);
+  InputFile file(path);
   PropheseeHeader header = read_prophesee_header(
-      file.read(0, std::min(kMostHeaderBytes, file.size_bytes())), file.name());
+      file.read_between(0, std::min(kMostHeaderBytes, file.end_byte())), file.name());
   if (!header.encoding) {
     throw InputError(
         "expected a header \"% Data file containing ...\", \"% evt 2.0\" or \"% evt 3.0\", got "
@@ -415,7 +391,7 @@ StoredParts open_prophesee(const std::filesystem::path& path,
   }
   if (header.encoding == PropheseeEncoding::kDat) {
     const std::int64_t end = header.end_byte + 2;
-    const std::string kind = file.read(header.end_byte, std::min(end, file.size_bytes()));
+    const std::string kind = file.read_between(header.end_byte, std::min(end, file.end_byte()));
     constexpr char kEvent2d = 0x00;
     constexpr char kEventCd = 0x0c;
     if (kind.size() < 2 || (kind[0] != kEvent2d && kind[0] != kEventCd) || kind[1] != 8) {
@@ -428,11 +404,12 @@ StoredParts open_prophesee(const std::filesystem::path& path,
     header.end_byte = end;
   }
   StoredParts parts{file.name(), sensor_size(header, sensor, file.name()), nullptr};
-  auto events = std::make_unique<PropheseeEvents>(path, *header.encoding, header.end_byte);
+  auto events =
+      std::make_unique<PropheseeEvents>(std::move(file), *header.encoding, header.end_byte);
   if (events->left_out() > 0) {
     parts.notes.push_back(
         fmt::format("events before the first time and place are left out: {}, in {}",
-                    events->left_out(), file.name()));
+                    events->left_out(), parts.name));
   }
   parts.events = std::move(events);
   return parts;

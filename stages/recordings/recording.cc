@@ -16,7 +16,7 @@ namespace eventgan {
 
 namespace {
 
-constexpr std::uint64_t kBeginningBytes = 1 << 16;
+constexpr std::uint64_t kBeginningBytes = 1 << 14;
 
 /// At the file's start, or behind a user's block, at 512 bytes or twice, four times, ... as many.
 bool has_hdf5_signature(const InputFile& file) {
@@ -80,8 +80,9 @@ std::filesystem::path event_file(const std::filesystem::path& path,
 }
 
 std::vector<std::filesystem::path> event_companions(const std::filesystem::path& event_file,
+                                                    std::optional<RecordingFormat> format,
                                                     const RecordingOptions& options) {
-  const auto format = find_recording_format(event_file, options);
+  if (!format) format = find_recording_format(event_file, options);
   const auto companions = format ? reader_of(*format).companions : nullptr;
   return companions ? companions(event_file, options) : std::vector<std::filesystem::path>();
 }

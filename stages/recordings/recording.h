@@ -22,8 +22,9 @@ struct FlowField {
 };
 
 /// A recording of an event camera: the events, and frames with their times if it has any, all on
-/// one clock and one pixel grid. Of a table (.npy, .npz, .csv) all events are read at once, those
-/// of the tables used last are kept; of the others nothing but the index is held in memory.
+/// one clock and one pixel grid. Of tables, AEDAT4 and Prophesee's files the events read last are
+/// kept, for all windows and threads: sixteen million of the whole process, or 220 MB. Of the
+/// others nothing but the index is held in memory.
 ///
 /// A frame that is not there is std::out_of_range. Thread safety: all may be called from several
 /// threads (calls into HDF5 take turns).
@@ -83,9 +84,10 @@ std::filesystem::path event_file(const std::filesystem::path& path,
                                  const RecordingOptions& options = {});
 
 /// What decides, beside this file, the times of frames and the places of events: images.txt of ECD;
-/// timestamps.txt and, with `rectify`, rectify_map.h5 of DSEC.
-std::vector<std::filesystem::path> event_companions(const std::filesystem::path& event_file,
-                                                    const RecordingOptions& options = {});
+/// timestamps.txt and, with `rectify`, rectify_map.h5 of DSEC. Without a format it is found.
+std::vector<std::filesystem::path> event_companions(
+    const std::filesystem::path& event_file, std::optional<RecordingFormat> format = std::nullopt,
+    const RecordingOptions& options = {});
 
 /// Opens a recording of the format, or of what is found without one: reads the frames' times and
 /// checks that everything is there and fits together; where a frame's events end is looked up when

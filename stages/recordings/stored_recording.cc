@@ -86,13 +86,15 @@ class StoredRecording final : public Recording {
     return boundaries_.at(frame, [&] {
       const std::vector<std::int64_t>& index = parts_.event_index;
       const double time_s = frame_times_s_[frame];
-      return search(time_s, index.empty() ? parts_.events->near(time_s) : index[frame]);
+      return search(time_s, index.empty() ? parts_.events->near(time_s).value_or(event_count_ / 2)
+                                          : index[frame]);
     });
   }
 
-  /// The frame before tells where to look first.
+  /// Unless the events tell, the frame before tells where to look first.
   std::int64_t events_until_time(double time_s) const {
-    if (frame_times_s_.empty()) return search(time_s, parts_.events->near(time_s));
+    if (const auto near = parts_.events->near(time_s)) return search(time_s, *near);
+    if (frame_times_s_.empty()) return search(time_s, event_count_ / 2);
     const auto next = std::ranges::upper_bound(frame_times_s_, time_s);
     if (next == frame_times_s_.begin()) return search(time_s, 0);
     return search(time_s,

@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <charconv>
 #include <cmath>
-#include <list>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -20,7 +17,9 @@
 #include "stages/base/archives/detail/numpy_arrays.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/archives/zip_archive.h"
+#include "stages/base/files/csv_records.h"
 #include "stages/base/files/input_file.h"
+#include "stages/recordings/detail/event_parts.h"
 #include "stages/recordings/detail/recording_reader.h"
 #include "stages/recordings/detail/stored_recording.h"
 
@@ -36,23 +35,11 @@ std::array<std::string, kColumns> names_of(const EventFields& columns) {
   return {columns.t, columns.x, columns.y, columns.p};
 }
 
-using Events = std::vector<StoredEvent>;
+/// A row's numbers, in the columns' order.
+using Row = std::array<double, kColumns>;
 
-/// A number into its place of an event.
-void put(StoredEvent& event, std::size_t column, double value, double ticks_per_s) {
-  switch (column) {
-    case kTime:
-      event.t_s = value / ticks_per_s;
-      return;
-    case kX:
-      event.x = value;
-      return;
-    case kY:
-      event.y = value;
-      return;
-    default:
-      event.polarity = value;
-  }
+StoredEvent event_of(const Row& row, double ticks_per_s) {
+  return {row[kX], row[kY], row[kTime] / ticks_per_s, row[kPolarity]};
 }
 
 // ---- NumPy
@@ -79,27 +66,30 @@ std::array<std::size_t, kColumns> places_of(const EventFields& columns, const st
   return places;
 }
 
-Events from_columns(const std::array<TypedArray, kColumns>& arrays, const EventFields& columns,
-                    const std::string& file) {
+CompactEvents from_columns(const std::array<TypedArray, kColumns>& arrays,
+                           const EventFields& columns, const std::string& file) {
   const std::array<std::string, kColumns> names = names_of(columns);
-  const double ticks_per_s = std::round(1 / columns.tick_s);
-  Events events;
+  const std::size_t count = arrays[kTime].size();
   for (std::size_t i = 0; i < kColumns; ++i) {
     const TypedArray& array = arrays[i];
-    if (array.shape.size() != 1 || array.is_text() || array.size() != arrays[kTime].size()) {
-      throw InputError("expected numbers [" + std::to_string(arrays[kTime].size()) + "], got " +
+    if (array.shape.size() != 1 || array.is_text() || array.size() != count) {
+      throw InputError("expected numbers [" + std::to_string(count) + "], got " +
                        (array.is_text() ? "text " : "") + array.shape_text() + ", in " + file +
                        " (" + names[i] + ")");
     }
-    events.resize(array.size());
-    for (std::size_t k = 0; k < events.size(); ++k) {
-      put(events[k], i, array.number(k), ticks_per_s);
-    }
+  }
+  const double ticks_per_s = std::round(1 / columns.tick_s);
+  CompactEvents events;
+  events.reserve(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    Row row{};
+    for (std::size_t i = 0; i < kColumns; ++i) row[i] = arrays[i].number(k);
+    events.push_back(event_of(row, ticks_per_s));
   }
   return events;
 }
 
-Events read_npy(const fs::path& path, const EventFields& columns) {
+CompactEvents read_npy(const fs::path& path, const EventFields& columns) {
   const std::string name = path.string();
   const InputFile file(path);
   const std::vector<std::byte> bytes = file.read_bytes(0, file.size_bytes());
@@ -111,11 +101,12 @@ Events read_npy(const fs::path& path, const EventFields& columns) {
       throw InputError("expected numbers [N, 4], got " + array.shape_text() + ", in " + name);
     }
     const double ticks_per_s = std::round(1 / columns.tick_s);
-    Events events(array.shape[0]);
-    for (std::size_t k = 0; k < events.size(); ++k) {
-      for (std::size_t i = 0; i < kColumns; ++i) {
-        put(events[k], i, array.number(k * kColumns + places[i]), ticks_per_s);
-      }
+    CompactEvents events;
+    events.reserve(array.shape[0]);
+    for (std::size_t k = 0; k < array.shape[0]; ++k) {
+      Row row{};
+      for (std::size_t i = 0; i < kColumns; ++i) row[i] = array.number(k * kColumns + places[i]);
+      events.push_back(event_of(row, ticks_per_s));
     }
     return events;
   }
@@ -132,7 +123,7 @@ Events read_npy(const fs::path& path, const EventFields& columns) {
   return from_columns(arrays, columns, name);
 }
 
-Events read_npz(const fs::path& path, const EventFields& columns) {
+CompactEvents read_npz(const fs::path& path, const EventFields& columns) {
   const ZipArchive archive(path);
   std::array<TypedArray, kColumns> arrays;
   const std::array<std::string, kColumns> names = names_of(columns);
@@ -148,83 +139,58 @@ Events read_npz(const fs::path& path, const EventFields& columns) {
 
 // ---- CSV
 
-std::vector<std::string_view> split(std::string_view line) {
-  constexpr std::string_view kBlanks = " \t\r";
-  std::vector<std::string_view> fields;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(',', begin), line.size());
-    std::string_view field = line.substr(begin, end - begin);
-    field.remove_prefix(std::min(field.find_first_not_of(kBlanks), field.size()));
-    fields.push_back(field.substr(0, field.find_last_not_of(kBlanks) + 1));
-    begin = end + 1;
-  }
-  return fields;
-}
-
 /// The columns' places in a header line; none unless it has all of them.
-std::optional<std::array<std::size_t, kColumns>> find_columns(std::string_view header,
+std::optional<std::array<std::size_t, kColumns>> find_columns(const CsvRecord& header,
                                                               const EventFields& columns) {
-  constexpr std::string_view kMark = "\xEF\xBB\xBF";
-  if (header.starts_with(kMark)) header.remove_prefix(kMark.size());
-  const std::vector<std::string_view> fields = split(header);
   std::array<std::size_t, kColumns> places{};
   const std::array<std::string, kColumns> names = names_of(columns);
   for (std::size_t i = 0; i < kColumns; ++i) {
-    if (std::ranges::count(fields, names[i]) != 1) return std::nullopt;
-    places[i] = static_cast<std::size_t>(std::ranges::find(fields, names[i]) - fields.begin());
+    if (std::ranges::count(header.fields, names[i]) != 1) return std::nullopt;
+    places[i] = static_cast<std::size_t>(std::ranges::find(header.fields, names[i]) -
+                                         header.fields.begin());
   }
   return places;
 }
 
-Events read_csv(const fs::path& path, const EventFields& columns) {
+CompactEvents read_csv(const fs::path& path, const EventFields& columns) {
   const std::string text = read_text_file(path);
-  const double ticks_per_s = std::round(1 / columns.tick_s);
-  std::optional<std::array<std::size_t, kColumns>> places;
-  std::size_t width = 0;
-  Events events;
-  std::int64_t number = 0;
-  const auto refuse = [&](const std::string& expected, const std::string& got) {
-    throw InputError("expected " + expected + ", got " + got + ", in " + path.string() + " (line " +
-                     std::to_string(number) + ")");
+  const std::array<std::string, kColumns> names = names_of(columns);
+  const auto refuse = [&](const std::string& fault, int line) {
+    throw InputError(fault + ", in " + path.string() + " (line " + std::to_string(line) + ")");
   };
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::string_view line(text.data() + begin, end - begin);
-    begin = end + 1;
-    ++number;
-    const std::vector<std::string_view> fields = split(line);
-    if (!places) {
-      places = find_columns(line, columns);
-      if (!places)
-        refuse("a header line with " + columns.t + ", " + columns.x + ", " + columns.y + " and " +
-                   columns.p,
-               "another");
-      width = fields.size();
-      continue;
-    }
-    if (fields.size() == 1 && fields[0].empty()) continue;
-    if (fields.size() != width) {
-      refuse(std::to_string(width) + " fields", std::to_string(fields.size()));
-    }
-    StoredEvent& event = events.emplace_back();
-    for (std::size_t i = 0; i < kColumns; ++i) {
-      const std::string_view field = fields[(*places)[i]];
-      double value = 0;
-      const auto [stop, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-      if (error != std::errc() || stop != field.data() + field.size()) {
-        refuse("a number of " + names_of(columns)[i], "another field");
-      }
-      put(event, i, value, ticks_per_s);
-    }
-  }
+  CsvReader reader(text);
+  const std::optional<CsvRecord> header = reader.next();
+  if (!header) refuse("expected a header line, got none", 1);
+  const auto places = find_columns(*header, columns);
   if (!places) {
-    ++number;
-    refuse("a header line", "none");
+    refuse("expected a header line with " + columns.t + ", " + columns.x + ", " + columns.y +
+               " and " + columns.p + ", got another",
+           header->line);
+  }
+  const double ticks_per_s = std::round(1 / columns.tick_s);
+  CompactEvents events;
+  events.reserve(static_cast<std::size_t>(std::ranges::count(text, '\n')));
+  while (const std::optional<CsvRecord> record = reader.next()) {
+    if (record->fields.empty()) refuse(record->fault, record->line);
+    if (record->fields.size() != header->fields.size()) {
+      refuse("expected " + std::to_string(header->fields.size()) + " fields, got " +
+                 std::to_string(record->fields.size()),
+             record->line);
+    }
+    Row row{};
+    for (std::size_t i = 0; i < kColumns; ++i) {
+      const std::string_view field = record->fields[(*places)[i]];
+      const auto [stop, error] = std::from_chars(field.data(), field.data() + field.size(), row[i]);
+      if (error != std::errc() || stop != field.data() + field.size()) {
+        refuse("expected a number of " + names[i] + ", got another field", record->line);
+      }
+    }
+    events.push_back(event_of(row, ticks_per_s));
   }
   return events;
 }
 
-Events read_table(const fs::path& path, const EventFields& columns) try {
+CompactEvents read_table(const fs::path& path, const EventFields& columns) try {
   if (path.extension() == ".npy") return read_npy(path, columns);
   if (path.extension() == ".npz") return read_npz(path, columns);
   return read_csv(path, columns);
@@ -234,81 +200,19 @@ Events read_table(const fs::path& path, const EventFields& columns) try {
   throw InputError(error.what());
 }
 
-/// The tables used last: a source may be of tens of thousands.
-class RecentTables {
+/// A table is one part.
+class TableEvents final : public EventParts {
  public:
-  /// Table `number`; what `read` gives if it is not kept.
-  template <class Read>
-  std::shared_ptr<const Events> get(std::int64_t number, Read read) {
-    {
-      const std::lock_guard lock(mutex_);
-      const auto known = std::ranges::find(tables_, number, &Table::number);
-      if (known != tables_.end()) {
-        tables_.splice(tables_.begin(), tables_, known);
-        return known->events;
-      }
-    }
-    auto events = std::make_shared<const Events>(read());
-    const std::lock_guard lock(mutex_);
-    // Another thread may have read it meanwhile.
-    const auto known = std::ranges::find(tables_, number, &Table::number);
-    if (known != tables_.end()) return known->events;
-    tables_.push_front({number, events});
-    kept_ += events->size();
-    while (kept_ > kMostEvents && tables_.size() > 1) {
-      kept_ -= tables_.back().events->size();
-      tables_.pop_back();
-    }
-    return events;
+  TableEvents(fs::path path, EventFields columns)
+      : EventParts(path.string()), path_(std::move(path)), columns_(std::move(columns)) {
+    add_part(read_part(0));
   }
 
  private:
-  struct Table {
-    std::int64_t number;
-    std::shared_ptr<const Events> events;
-  };
-  static constexpr std::size_t kMostEvents = std::size_t{1} << 22;  // 128 MiB
-
-  std::mutex mutex_;
-  std::list<Table> tables_;
-  std::size_t kept_ = 0;
-};
-
-class TableStore final : public EventStore {
- public:
-  TableStore(fs::path path, EventFields columns)
-      : path_(std::move(path)), columns_(std::move(columns)), count_(std::ssize(*events())) {}
-
-  std::int64_t count() const override { return count_; }
-
-  std::vector<StoredEvent> read(std::int64_t first, std::int64_t count) const override {
-    const std::shared_ptr<const Events> all = events();
-    if (std::ssize(*all) != count_) {
-      throw InputError("expected " + std::to_string(count_) + " events as before, got " +
-                       std::to_string(all->size()) + ", in " + path_.string());
-    }
-    const auto begin = all->begin() + first;
-    return {begin, begin + count};
-  }
-
-  /// Exactly, so that a search reads the table once and not at each step.
-  std::int64_t near(double time_s) const override {
-    const std::shared_ptr<const Events> all = events();
-    return std::ranges::upper_bound(*all, time_s, {}, &StoredEvent::t_s) - all->begin();
-  }
-
- private:
-  std::shared_ptr<const Events> events() const {
-    return recent_.get(number_, [&] { return read_table(path_, columns_); });
-  }
-
-  inline static RecentTables recent_;
-  inline static std::atomic<std::int64_t> opened_ = 0;
+  CompactEvents read_part(std::size_t) const override { return read_table(path_, columns_); }
 
   fs::path path_;
   EventFields columns_;
-  std::int64_t number_ = opened_++;
-  std::int64_t count_;
 };
 
 /// By its header.
@@ -332,7 +236,8 @@ bool is_event_table(const RecordingInput& input, const RecordingOptions& options
       return std::ranges::find(layout.fields, name, &NumpyField::name) != layout.fields.end();
     });
   }
-  return find_columns(text.substr(0, text.find('\n')), options.columns).has_value();
+  const auto header = CsvReader(text).next();
+  return header && find_columns(*header, options.columns).has_value();
 } catch (const std::runtime_error&) {  // reported when it is opened
   return false;
 }
@@ -349,7 +254,7 @@ std::unique_ptr<Recording> open_table_recording(const fs::path& path,
   }
   return make_stored_recording({.name = path.string(),
                                 .size = *options.sensor,
-                                .events = std::make_unique<TableStore>(path, options.columns)});
+                                .events = std::make_unique<TableEvents>(path, options.columns)});
 }
 
 constinit const RecordingReader kTableReader{

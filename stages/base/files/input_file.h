@@ -52,6 +52,11 @@ class InputFile {
   /// `count` bytes from `offset` on; nothing is allocated unless the file was that long.
   std::string read(std::uint64_t offset, std::uint64_t count) const;
   std::vector<std::byte> read_bytes(std::uint64_t offset, std::uint64_t count) const;
+  /// The same for those who count places with a sign: from `begin` up to `end`, at most end_byte().
+  std::string read_between(std::int64_t begin, std::int64_t end) const {
+    return read(static_cast<std::uint64_t>(begin), static_cast<std::uint64_t>(end - begin));
+  }
+  std::int64_t end_byte() const { return static_cast<std::int64_t>(size_bytes_); }
   /// Reads until `to` is full or the file ends; gives how many bytes.
   std::size_t read_some(std::uint64_t offset, std::span<char> to) const;
   /// All of it, up to where it ends now.

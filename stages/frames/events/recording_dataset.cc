@@ -41,7 +41,8 @@ struct Windows {
 
 /// One recording of the source.
 struct Recorded {
-  std::string path;  ///< as FrameRef::path is written
+  std::string path;        ///< as FrameRef::path is written
+  RecordingFormat format;  ///< as it was recognised
   std::unique_ptr<Recording> recording;
   std::vector<double> frame_times_s;
   std::array<double, 2> span{};                     ///< first and last time of a frame or an event
@@ -230,31 +231,29 @@ class RecordingDataset final : public Dataset {
     return Span{time_s - (*window_.duration_s - after_s), time_s + after_s};
   }
 
-  void add(const std::string& name, const std::string& path) {
+  void add(const std::string& name, const std::string& path, RecordingFormat format) {
     const auto [recorded, is_new] = recordings_.try_emplace(name);
     if (!is_new) {
       throw InputError("expected recordings of different names, got " + name + " twice, in " +
                        path);
     }
     recorded->second.path = path;
+    recorded->second.format = format;
   }
 
   void find_recordings(const SourceSpec& spec, const fs::path& base) {
-    const auto is_recording = [&](const fs::path& path) {
-      return find_recording_format(path, options_).has_value();
-    };
     const fs::path root = base / spec.root;
     /// `written`: as FrameRef::path is.
     const auto spelled = [&](const fs::path& written) {
       const fs::path file = event_file(base / written, options_);
       return (written / file.lexically_relative(base / written)).generic_string();
     };
-    if (is_recording(root)) {
+    if (const auto format = find_recording_format(root, options_)) {
       fs::path named = fs::absolute(root).lexically_normal();
       if (!named.has_filename()) named = named.parent_path();
       const bool is_folder = fs::is_directory(root);
       add((is_folder ? named.filename() : named.stem()).string(),
-          is_folder ? spelled(spec.root) : spec.root);
+          is_folder ? spelled(spec.root) : spec.root, *format);
       default_labels_ = named.parent_path();
       return;
     }
@@ -270,15 +269,15 @@ class RecordingDataset final : public Dataset {
     folder.require_folder("");
     std::vector<std::string> left_out;
     for (const std::string& name : folder.folders_in("")) {
-      if (is_recording(folder.on_disk(name))) {
-        add(name, spelled(folder.written(name)));
+      if (const auto format = find_recording_format(folder.on_disk(name), options_)) {
+        add(name, spelled(folder.written(name)), *format);
       } else {
         left_out.push_back(name);
       }
     }
     for (const fs::path name : folder.files_in("")) {
-      if (is_recording(folder.on_disk(name.string()))) {
-        add(name.stem().string(), folder.written(name.string()));
+      if (const auto format = find_recording_format(folder.on_disk(name.string()), options_)) {
+        add(name.stem().string(), folder.written(name.string()), *format);
       } else if (!is_label_file(name)) {
         left_out.push_back(name.string());
       }
@@ -352,13 +351,13 @@ class RecordingDataset final : public Dataset {
   void open(Recorded& recorded, const fs::path& base) {
     const fs::path path = base / recorded.path;
     const fs::path own = fs::absolute(path).lexically_normal();
-    for (const fs::path& file : event_companions(own, options_)) {
+    for (const fs::path& file : event_companions(own, recorded.format, options_)) {
       const fs::path beside = file.lexically_relative(own.parent_path());
       fs::path written = fs::path(recorded.path).parent_path() / beside;
       if (beside.has_parent_path()) written = written.lexically_normal();  // left/../../images
       annotation_files_.push_back(written.generic_string());
     }
-    recorded.recording = open_recording(path, {}, options_);
+    recorded.recording = open_recording(path, recorded.format, options_);
     const Recording& recording = *recorded.recording;
     for (std::int64_t i = 0; i < recording.frame_count(); ++i) {
       recorded.frame_times_s.push_back(recording.frame_time_s(i));

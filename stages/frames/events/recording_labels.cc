@@ -19,7 +19,7 @@
 #include "stages/base/archives/detail/typed_array.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/files/input_file.h"
-#include "stages/frames/csv_records.h"
+#include "stages/frames/csv_columns.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "stages/frames/csv_records.h"
+#include "stages/frames/csv_columns.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/own_labels/detail/find_labels.h"

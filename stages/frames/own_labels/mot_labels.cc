@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "manifests/values/text.h"
-#include "stages/frames/csv_records.h"
+#include "stages/base/files/csv_records.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
@@ -47,7 +47,7 @@ Number number(std::string_view column, const char* expected, Number least, Numbe
   throw BadLabel(std::string("expected ") + expected + ", got " + in_quotes(column));
 }
 
-NamedBox box_of(const std::vector<std::string>& columns) {
+NamedBox box_of(const std::vector<std::string_view>& columns) {
   enum { kFrame, kId, kLeft, kTop, kWidth, kHeight, kConf, kClass, kVisibility };
   constexpr std::size_t kOf2015 = 10;  // x, y, z in place of class and visibility
   if (columns.size() <= kConf || columns.size() > kOf2015) {
@@ -67,8 +67,8 @@ NamedBox box_of(const std::vector<std::string>& columns) {
   box.xyxy.right = box.xyxy.left + width;
   box.xyxy.bottom = box.xyxy.top + height;
   if (!(box.xyxy.right > box.xyxy.left && box.xyxy.bottom > box.xyxy.top)) {
-    throw BadLabel("expected a box of a width and height above 0, got " + columns[kWidth] + " x " +
-                   columns[kHeight]);
+    throw BadLabel("expected a box of a width and height above 0, got " +
+                   std::string(columns[kWidth]) + " x " + std::string(columns[kHeight]));
   }
   const bool counts = number(columns[kConf], "a conf from 0 to 1", 0.0, 1.0) > 0;
   MotClass mot = kClasses[0];

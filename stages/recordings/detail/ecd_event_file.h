@@ -14,21 +14,6 @@
 
 namespace eventgan {
 
-/// An InputFile by places in it that are counted with a sign, and reach from a begin to an end.
-class RandomAccessFile {
- public:
-  explicit RandomAccessFile(const std::filesystem::path& path) : file_(path) {}
-
-  const std::string& name() const { return file_.name(); }
-  std::int64_t size_bytes() const { return static_cast<std::int64_t>(file_.size_bytes()); }
-  std::string read(std::int64_t begin, std::int64_t end) const {
-    return file_.read(static_cast<std::uint64_t>(begin), static_cast<std::uint64_t>(end - begin));
-  }
-
- private:
-  InputFile file_;
-};
-
 /// Parses a line "t x y p" of an ECD `events.txt`: t in seconds, the others whole numbers,
 /// between blanks or tabs; without its line end, but for a CR. Throws EventFault.
 StoredEvent parse_ecd_event(std::string_view line);
@@ -69,7 +54,7 @@ class EcdEventFile {
   Line line_from(std::int64_t byte) const;
   [[noreturn]] void refuse(const EventFault& fault, std::int64_t line_begin) const;
 
-  RandomAccessFile file_;
+  InputFile file_;
 };
 
 }  // namespace eventgan

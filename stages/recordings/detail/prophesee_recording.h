@@ -14,9 +14,9 @@ namespace eventgan {
 /// of 24, 32 or 34 bits wraps, they go on. Events before the first that a RAW file gives a time and
 /// a place are left out and counted in a note; triggers and other words are passed over.
 ///
-/// The whole file is read once on opening; of it, only where every 65,536th event is stays in
-/// memory. `sensor` is the size where the header does not tell it. Throws InputError "expected X,
-/// got Y, in PATH (byte 4567)".
+/// The whole file is read once on opening. Of it, what the words before each 128 KiB have said
+/// stays in memory, and the events as long as RecentEvents keeps them. `sensor` is the size where
+/// the header does not tell it. Throws InputError "expected X, got Y, in PATH (byte 4567)".
 StoredParts open_prophesee(const std::filesystem::path& path,
                            const std::optional<ImageSize>& sensor);
 

@@ -23,7 +23,7 @@ class RecordingInput {
 
   const std::filesystem::path& path() const { return path_; }
   bool is_folder() const { return is_folder_; }
-  /// A file's first 64 KiB; empty if there are none to read.
+  /// A file's first 16 KiB; empty if there are none to read.
   std::string_view beginning() const { return beginning_; }
   /// Whether it is an HDF5 file that has the object, such as "events/t".
   bool has_hdf5_object(const std::string& object) const;

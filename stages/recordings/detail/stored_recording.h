@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,8 +29,8 @@ class EventStore {
   /// Their times alone, in seconds; throws likewise.
   virtual std::vector<double> times_s(std::int64_t first, std::int64_t count) const;
 
-  /// Where to look first for the event of a time; any number serves.
-  virtual std::int64_t near(double) const { return count() / 2; }
+  /// Where to look first for the event of a time; any number serves. None: nothing tells.
+  virtual std::optional<std::int64_t> near(double) const { return std::nullopt; }
 };
 
 /// The frames of a recording. Thread safe.

@@ -103,6 +103,25 @@ TEST_F(Convert, OpensAnImageOnceToPlanAndOnceToDecode) {
   EXPECT_EQ(opens(counter), std::vector<std::uint64_t>(12, 2));
 }
 
+TEST_F(Convert, OpensARecordingToRecogniseItAndReadsItOnce) {
+  constexpr int kEvents = 20'000;
+  std::string table = "t,x,y,p\n";
+  for (int t_us = 0; t_us < kEvents; ++t_us) table += std::to_string(t_us) + ",3,2,1\n";
+  testing::write_file(folder_ / "events.csv", table);
+  manifest_ = parse_job_manifest(
+      R"({"format": "eventgan-manifest", "version": 1, "name": "job", "seed": 1, "sources": [
+          {"dataset": "recording", "root": "events.csv", "window_s": 0.001,
+           "sensor": {"width": 4, "height": 3}}], "image": {}, "generator": {"kind": "events"},
+          "output": {"directory": "out", "samples_per_shard": 4}})",
+      folder_.path(), "manifest.json");
+  const LoadedGenerator loaded = load_generator(manifest_);
+  const InputCounter counter;
+  EXPECT_EQ(convert(manifest_, *loaded.generator, loaded.weights_hash, options()).written, 20);
+  const InputCounter::Count count = counter.of(folder_ / "events.csv");
+  EXPECT_EQ(count.opens, 2u);
+  EXPECT_LE(static_cast<double>(count.bytes), 1.2 * static_cast<double>(table.size()));
+}
+
 TEST_F(Convert, SaysWhetherVolumesAreRatesOrEventsDrawnOfThem) {
   generator_.know({0.01, 0.04});
   const auto first_shard = [&](const std::string& folder) {

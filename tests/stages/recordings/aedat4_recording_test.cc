@@ -7,10 +7,12 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <string>
 
 #include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
 #include "stages/recordings/recording.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
@@ -19,6 +21,7 @@
 namespace eventgan {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -147,8 +150,15 @@ class Aedat4Test : public ::testing::Test {
   std::unique_ptr<Recording> open(const TestFile& file) { return open(file.bytes()); }
 
   void expect_refused(const std::string& bytes, const std::string& reason) {
-    EXPECT_THAT([&] { open(bytes); }, ThrowsMessage<InputError>(HasSubstr(reason)));
-    EXPECT_THAT([&] { open(bytes); }, ThrowsMessage<InputError>(HasSubstr(path_.string())));
+    EXPECT_THAT([&] { open(bytes); },
+                ThrowsMessage<InputError>(AllOf(HasSubstr(reason), HasSubstr(path_.string()))));
+  }
+
+  /// A packet that the table tells of is read when its events are asked for.
+  void expect_refused_when_read(const std::string& bytes, const std::string& reason) {
+    const auto recording = open(bytes);
+    EXPECT_THAT([&] { recording->events_in(0, 2); },
+                ThrowsMessage<InputError>(AllOf(HasSubstr(reason), HasSubstr(path_.string()))));
   }
 
   /// Three packets of events, the second empty, two frames, and one of a stream that is not read.
@@ -197,6 +207,50 @@ TEST_F(Aedat4Test, ReadsAFileWithoutFrames) {
   EXPECT_EQ(open(file)->frame_count(), 0);
   file.packets.clear();
   EXPECT_EQ(open(file)->event_span(), std::nullopt);
+}
+
+/// Of `packets` packets of a thousand events, one each microsecond.
+TestFile long_file(int packets) {
+  constexpr std::int64_t kEvents = 1000;
+  TestFile file;
+  for (int i = 0; i < packets; ++i) {
+    std::vector<aedat4::Event> events;
+    for (std::int64_t k = 0; k < kEvents; ++k) events.emplace_back(i * kEvents + k, 1, 2, 1);
+    file.packets.push_back(events_packet(events));
+  }
+  return file;
+}
+
+TEST_F(Aedat4Test, IsReadOnceForAllWindows) {
+  TestFile file = long_file(40);
+  file.packets.push_back({kFrameStream, frame_table({.t_us = 39'999}), 1});
+  for (const bool has_table : {true, false}) {
+    file.has_table = has_table;
+    testing::write_file(path_, file.bytes());
+    const InputCounter counter;
+    const auto recording = open_recording(path_, find_recording_format(path_));
+    EXPECT_EQ(recording->event_span(), (std::array{0.0, 0.039999}));
+    std::size_t events = 0;
+    for (int i = 0; i < 80; ++i) {  // each of half a packet
+      events += recording->events_in(i * 500e-6 - 0.1e-6, (i + 1) * 500e-6 - 0.1e-6).size();
+    }
+    EXPECT_EQ(events, 40'000u);
+    EXPECT_EQ(counter.of(path_).opens, 2u);  // to recognise it, and to read it
+    EXPECT_LE(static_cast<double>(counter.of(path_).bytes),
+              1.2 * static_cast<double>(std::filesystem::file_size(path_)));
+  }
+}
+
+TEST_F(Aedat4Test, OfItsPacketsOnlyThoseOfTheWindowAreRead) {
+  testing::write_file(path_, long_file(40).bytes());
+  constexpr std::uint64_t kPacket = 16'000;
+  const InputCounter counter;
+  const auto recording = open_recording(path_, RecordingFormat::kAedat4);
+  EXPECT_EQ(recording->frame_count(), 0);
+  EXPECT_LT(counter.of(path_).bytes, kPacket / 2);  // the header and the table
+  // Of packets 20 and 21; their times are looked for up to 512 events around.
+  EXPECT_EQ(recording->events_in(0.0206, 0.0214).size(), 800u);
+  EXPECT_LT(counter.of(path_).bytes, 3 * kPacket);
 }
 
 // Grey as ITU-R BT.601 weighs: 0.114 * 10 + 0.587 * 100 + 0.299 * 200 = 119.64.
@@ -257,16 +311,25 @@ TEST_F(Aedat4Test, ReadsTablesOfBothAlignments) {
 }
 
 TEST_F(Aedat4Test, RefusesATableThatSaysOtherwise) {
-  const std::function<void(TestFile&)> changes[] = {
-      [](TestFile& file) { file.packets[0].count = 3; },
-      [](TestFile& file) { file.packets[1].count = 2; },
-      [](TestFile& file) { file.packets[3].count = 1; },
-      [](TestFile& file) { file.packets[0].begin_us -= 1; },
-      [](TestFile& file) { file.packets[5].end_us += 1; }};
-  for (const auto& change : changes) {
+  using Change = std::function<void(TestFile&)>;
+  const auto changed = [](const Change& change) {
     TestFile file = small();
     change(file);
-    expect_refused(file.bytes(), "in the table as it is");
+    return file.bytes();
+  };
+  const Change seen_on_opening[] = {[](TestFile& file) { file.packets[1].count = 2; },
+                                    [](TestFile& file) { file.packets[3].count = 1; },
+                                    [](TestFile& file) { file.packets[0].end_us = 1; },
+                                    [](TestFile& file) { file.packets[5].begin_us -= 1; }};
+  for (const Change& change : seen_on_opening) {
+    expect_refused(changed(change), "in the table as it is");
+  }
+  const Change seen_when_read[] = {[](TestFile& file) { file.packets[0].count = 3; },
+                                   [](TestFile& file) { file.packets[0].begin_us -= 1; },
+                                   [](TestFile& file) { file.packets[5].begin_us += 1; },
+                                   [](TestFile& file) { file.packets[5].end_us += 1; }};
+  for (const Change& change : seen_when_read) {
+    expect_refused_when_read(changed(change), "in the table as it is");
   }
   TestFile file = small();
   expect_refused(file.bytes() + "rest", "expected a sound table FTAB");
@@ -366,17 +429,27 @@ TEST_F(Aedat4Test, RefusesBrokenPackets) {
   // With a table it is no matter of an unplugged camera.
   std::string longer = whole;
   const std::size_t size_at = file.header(-1).size() + 4;
-  longer.replace(size_at, 4, number_bytes(1 << 28));
-  expect_refused(longer, "expected a packet of 268435464 bytes, got");
-  longer.replace(size_at, 4, number_bytes(-1));
-  expect_refused(longer, "got -1 bytes of stream 0");
-  longer.replace(size_at, 4, number_bytes(0));
-  expect_refused(longer, "got 0 bytes of stream 0");
+  for (const std::int32_t size_bytes : {1 << 28, -1, 0}) {
+    longer.replace(size_at, 4, number_bytes(size_bytes));
+    expect_refused_when_read(longer, "in the table as it is, stream 0, " +
+                                         std::to_string(size_bytes) + " bytes at byte");
+    // Without a table nothing else tells.
+    std::string unplugged = longer;
+    unplugged.replace(0, file.header(-1).size(), file.header(-1));
+    if (size_bytes > 0) continue;
+    expect_refused(unplugged, "got " + std::to_string(size_bytes) + " bytes of stream 0");
+  }
   for (const int compression : {1, 3}) {
     file.compression = compression;
     std::string damaged = file.bytes();
     damaged[file.header(-1).size() + 8] ^= 1;
-    expect_refused(damaged, compression == 1 ? "expected an LZ4 frame" : "expected a Zstandard");
+    const std::string reason = compression == 1 ? "expected an LZ4 frame" : "expected a Zstandard";
+    expect_refused_when_read(damaged, reason);
+    TestFile unplugged = file;
+    unplugged.has_table = false;
+    damaged = unplugged.bytes();
+    damaged[file.header(-1).size() + 8] ^= 1;
+    expect_refused(damaged, reason);
   }
   // A frame that ends before it is whole, as the packet says its size.
   file.compression = 0;

@@ -23,37 +23,6 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
 
-class RandomAccessFileTest : public ::testing::Test {
- protected:
-  testing::TemporaryFolder folder_;
-  std::filesystem::path path_ = folder_ / "file";
-};
-
-TEST_F(RandomAccessFileTest, ReadsParts) {
-  testing::write_file(path_, "0123456789");
-  const RandomAccessFile file(path_);
-  EXPECT_EQ(file.size_bytes(), 10);
-  EXPECT_EQ(file.read(3, 6), "345");
-  EXPECT_EQ(file.read(0, 10), "0123456789");
-  EXPECT_EQ(file.read(10, 10), "");
-}
-
-TEST_F(RandomAccessFileTest, RefusesWhatIsNoFile) {
-  EXPECT_THAT([&] { RandomAccessFile file(path_); },
-              ThrowsMessage<InputError>(
-                  HasSubstr("got 'No such file or directory', in " + path_.string())));
-  EXPECT_THAT([&] { RandomAccessFile file(folder_.path()); },
-              ThrowsMessage<InputError>(HasSubstr("got 'Is a directory'")));
-}
-
-TEST_F(RandomAccessFileTest, TellsOfAFileThatShrinks) {
-  testing::write_file(path_, "0123456789");
-  const RandomAccessFile file(path_);
-  std::filesystem::resize_file(path_, 5);
-  EXPECT_EQ(file.read(0, 5), "01234");
-  EXPECT_THAT([&] { file.read(0, 10); }, ThrowsMessage<InputError>(HasSubstr("has shrunk")));
-}
-
 TEST(EcdEventLineTest, ParsesNumbersBetweenBlanks) {
   for (const char* line : {"0.003811000 96 133 0", "0.003811\t96  133 0\r", "3.811e-3 96 133 0 "}) {
     const StoredEvent event = parse_ecd_event(line);

@@ -120,7 +120,7 @@ TEST(FindRecordingFormat, TellsByWhatIsThere) {
   testing::write_file(folder / "seq/images/timestamps.txt", "");
   RecordingOptions rectified;
   rectified.rectify = true;
-  EXPECT_THAT(event_companions(columns, rectified),
+  EXPECT_THAT(event_companions(columns, RecordingFormat::kDsec, rectified),
               ::testing::ElementsAre(folder / "seq/events/left/rectify_map.h5",
                                      folder / "seq/images/timestamps.txt"));
   testing::write_file(folder / "events.csv", "t,x,y,p\n");

@@ -173,19 +173,5 @@ TEST_F(TableRecordingTest, AFileIsReadAgainWhenItIsOpenedAgain) {
   EXPECT_EQ(recording->events_in(0, 1).size(), 1u);  // as it was
 }
 
-TEST_F(TableRecordingTest, AFileThatBecameAnotherMeanwhileIsRefused) {
-  testing::write_file(folder_ / "a.npy", structured({{5, 0, 2, 1}}));
-  const auto recording = open("a.npy");
-  // One of so many events that the first is not kept.
-  const std::vector<std::uint8_t> rows(4 << 22);
-  testing::write_file(folder_ / "large.npy", npy_file("|u1", {1 << 22, 4}, rows));
-  EXPECT_EQ(open("large.npy")->event_span(), (std::array{0.0, 0.0}));
-  EXPECT_EQ(recording->events_in(0, 1).size(), 1u);
-  EXPECT_EQ(open("large.npy")->event_span(), (std::array{0.0, 0.0}));
-  testing::write_file(folder_ / "a.npy", structured({{5, 0, 2, 1}, {6, 0, 2, 1}}));
-  EXPECT_THAT([&] { recording->events_in(0, 1); },
-              ThrowsMessage<InputError>(HasSubstr("expected 1 events as before, got 2, in")));
-}
-
 }  // namespace
 }  // namespace eventgan

@@ -132,6 +132,11 @@ TEST(InputFile, RefusesPartsBeyondTheEnd) {
   EXPECT_THROW(file.read(7, 0), InputError);
   EXPECT_THROW(file.read_bytes(1, ~std::uint64_t{0}), InputError);
   EXPECT_EQ(file.read(5, 1), "f");
+  EXPECT_EQ(file.end_byte(), 6);
+  EXPECT_EQ(file.read_between(2, 4), "cd");
+  EXPECT_EQ(file.read_between(6, 6), "");
+  EXPECT_THROW(file.read_between(2, 7), InputError);
+  EXPECT_THROW(file.read_between(2, 1), InputError);
 }
 
 TEST(InputFile, SaysThatAFileBecameShorter) {

@@ -5,10 +5,15 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
 #include "tests/stages/recordings/small_recording.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -386,6 +391,46 @@ TEST_F(WithoutFramesTest, NothingIsGuessed) {
   EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("expected events or frames")));
   spec_.recording.sensor.reset();
   EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("\"sensor\" in the manifest")));
+}
+
+/// Windows of 50,000 events, one each microsecond, that several threads ask for.
+TEST_F(RecordingDatasetTest, AFileOfEventsIsOpenedTwiceAndReadOnce) {
+  constexpr std::uint32_t kEvents = 50'000;
+  std::string table = "t,x,y,p\n";
+  std::string dat = "% Data file containing CD events.\n% Version 2\n\x0c\x08";
+  for (std::uint32_t t_us = 0; t_us < kEvents; ++t_us) {
+    table += std::to_string(t_us) + ",3,2,1\n";
+    for (const std::uint32_t word : {t_us, std::uint32_t{1} << 28 | 2 << 14 | 3}) {
+      dat.append(reinterpret_cast<const char*>(&word), sizeof(word));
+    }
+  }
+  testing::write_file(folder_ / "table.csv", table);
+  testing::write_file(folder_ / "camera.dat", dat);
+  spec_.recording.sensor = ImageSize{3, 4};
+  spec_.window.duration_s = 500e-6;
+  for (const char* name : {"table.csv", "camera.dat"}) {
+    spec_.root = name;
+    const InputCounter counter;
+    const auto dataset = open();
+    const auto& windows = dataset->labelled_frames();
+    EXPECT_EQ(windows.size(), 100u);
+    std::atomic<std::size_t> next = 0, found = 0;
+    std::vector<std::thread> threads;
+    for (int i = 0; i < 4; ++i) {
+      threads.emplace_back([&] {
+        for (std::size_t k = next++; k < windows.size(); k = next++) {
+          found += dataset->events(windows[k].label_key)->events.size();
+        }
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(found, kEvents);
+    const InputCounter::Count count = counter.of(folder_ / name);
+    EXPECT_EQ(count.opens, 2u) << name;  // to recognise it, and to read it
+    EXPECT_LE(static_cast<double>(count.bytes),
+              1.2 * static_cast<double>(std::filesystem::file_size(folder_ / name)))
+        << name;
+  }
 }
 
 }  // namespace

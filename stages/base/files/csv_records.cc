@@ -1,42 +1,48 @@
-#include "stages/frames/csv_records.h"
+#include "stages/base/files/csv_records.h"
 
-#include <fmt/format.h>
 #include <utf8.h>
 
 #include <algorithm>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/text.h"
 
 namespace eventgan {
 namespace {
 
-/// Takes the field at the start of `text`, and what ends it: a comma, a line end, or nothing. None
-/// if its quotes do not match; then nothing is taken.
-std::optional<std::string> take_field(std::string_view& text) {
+/// Takes the field at the start of `text`, and what ends it: a comma, a line end, or nothing, into
+/// the record. If its quotes do not match, nothing is taken, and it gives false.
+bool take_field(std::string_view& text, CsvRecord& record) {
   const std::size_t begin = std::min(text.find_first_not_of(" \t"), text.size());
-  std::string field;
+  std::string_view field;
   std::size_t end = begin;
   if (begin < text.size() && text[begin] == '"') {
-    for (end = begin + 1;; ++end) {
-      const std::size_t quote = text.find('"', end);
-      if (quote == std::string_view::npos) return std::nullopt;
-      field.append(text.substr(end, quote - end));
-      end = quote + 1;
-      if (end == text.size() || text[end] != '"') break;
-      field += '"';
+    std::string unquoted;  // up to the last doubled quote
+    std::size_t from = begin + 1;
+    for (;;) {
+      end = text.find('"', from);
+      if (end == std::string_view::npos) return false;
+      field = text.substr(from, end - from);
+      if (++end == text.size() || text[end] != '"') break;
+      unquoted.append(field) += '"';
+      from = end + 1;
+    }
+    if (!unquoted.empty()) {
+      unquoted.append(field);
+      record.unquoted.push_back(std::make_unique<const std::string>(std::move(unquoted)));
+      field = *record.unquoted.back();
     }
     const std::size_t stop = std::min(text.find_first_of(",\n", end), text.size());
-    if (!trimmed(text.substr(end, stop - end)).empty()) return std::nullopt;
+    if (!trimmed(text.substr(end, stop - end)).empty()) return false;
     end = stop;
   } else {
     end = std::min(text.find_first_of(",\n", begin), text.size());
     field = trimmed(text.substr(begin, end - begin));
-    if (field.find('"') != std::string::npos) return std::nullopt;
+    if (field.find('"') != std::string_view::npos) return false;
   }
   text.remove_prefix(end);
-  return field;
+  record.fields.push_back(field);
+  return true;
 }
 
 std::size_t line_length(std::string_view text) {
@@ -62,42 +68,22 @@ std::optional<CsvRecord> CsvReader::next() {
   record.line = line_;
   std::string_view after = rest_;
   for (bool goes_on = true; goes_on;) {
-    std::optional<std::string> field = take_field(after);
-    if (!field) {
+    if (!take_field(after, record)) {
       record.fault = "expected a field without quotes, or in quotes as a whole, got other quotes";
       record.fields.clear();
       after = rest_.substr(line_length(rest_));
       break;
     }
-    record.fields.push_back(std::move(*field));
     goes_on = after.starts_with(',');
     if (!after.empty()) after.remove_prefix(1);
   }
   record.bytes = rest_.substr(0, rest_.size() - after.size());
   if (!utf8::is_valid(record.bytes)) {
     record.fault = "expected UTF-8, got other bytes";
-    record.fields.clear();
   }
   line_ += static_cast<int>(std::ranges::count(record.bytes, '\n'));
   rest_ = after;
   return record;
-}
-
-Outcome<std::vector<std::optional<std::size_t>>> csv_columns(
-    const CsvRecord& header, std::span<const std::string_view> names, std::size_t required) {
-  std::vector<std::optional<std::size_t>> places(names.size());
-  for (std::size_t i = 0; i < header.fields.size(); ++i) {
-    const auto name = std::ranges::find(names, header.fields[i]);
-    if (name == names.end() || places[static_cast<std::size_t>(name - names.begin())]) {
-      return SampleFault{fmt::format("expected columns {}, each once, got \"{}\"",
-                                     fmt::join(names, ", "), escape_controls(header.fields[i]))};
-    }
-    places[static_cast<std::size_t>(name - names.begin())] = i;
-  }
-  for (std::size_t i = 0; i < required; ++i) {
-    if (!places[i]) return SampleFault{fmt::format("expected a column {}, got none", names[i])};
-  }
-  return places;
 }
 
 }  // namespace eventgan

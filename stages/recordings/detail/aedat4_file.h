@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "manifests/values/frames.h"
+#include "stages/base/files/input_file.h"
+#include "stages/recordings/detail/event_check.h"
+#include "stages/recordings/detail/event_parts.h"
+
+namespace eventgan {
+
+inline constexpr std::string_view kAedat4FirstLine = "#!AER-DAT4.0\r\n";
+
+/// A packet as it lies in a file, or as the file's table of packets tells of it.
+struct PacketPlace {
+  std::int64_t byte = 0;  ///< where its content begins
+  std::int64_t size_bytes = 0;
+  int stream = 0;
+  std::int64_t count = -1;  ///< of events or frames; -1: it is of neither
+  // Of events, if there are any:
+  std::int64_t begin_us = 0;
+  std::int64_t end_us = 0;
+
+  std::int64_t end() const { return byte + size_bytes; }
+  double begin_s() const { return static_cast<double>(begin_us) / 1e6; }
+  /// Whether it can have so many events of such times, none before `last_us`.
+  bool may_have_events_from(std::int64_t last_us) const;
+};
+
+/// Throws EventFault unless the table tells of a packet as it is; older writers left out all but
+/// its place.
+void check_packet(const PacketPlace& is, const PacketPlace& told);
+
+/// A file in AEDAT 4.0 (docs.inivation.com): its header, where its packets are, and what is in
+/// them. Thread safe. All throw InputError "expected X, got Y, in PATH (byte 4567)".
+class Aedat4File {
+ public:
+  struct Stream {
+    std::string type;  ///< "EVTS", "FRME", ...
+    ImageSize size;
+  };
+  struct Header {
+    std::int64_t end_byte = 0;     ///< where the packets begin
+    std::int64_t table_byte = -1;  ///< -1: there is no table
+    int compression = 0;
+    std::map<int, Stream> streams;
+  };
+  struct Frame {
+    double time_s = 0;
+    bool is_grey = true;
+    GreyImage image;
+  };
+
+  /// Reads the header.
+  explicit Aedat4File(const std::filesystem::path& path);
+
+  const std::string& name() const { return file_.name(); }
+  const Header& header() const { return header_; }
+
+  /// The packets that the file's table tells of, in the file's order; none if it has no table.
+  std::vector<PacketPlace> read_table() const;
+
+  /// Where the packets are, in the file's order. Those of the table follow each other as it says,
+  /// which is looked at when they are read. A last one that is cut off where there is no table is
+  /// noted.
+  std::vector<PacketPlace> find_packets(const std::vector<PacketPlace>& table,
+                                        std::vector<std::string>& notes) const;
+
+  /// Reads a packet, whose first event is the recording's `first` and not before `last_us`. What
+  /// was not known of it is known then; what was must be so.
+  CompactEvents events(PacketPlace& packet, std::int64_t first, std::int64_t last_us) const;
+
+  /// The frame of a packet, which must be of this size; its time is the middle of its exposure.
+  Frame frame(const PacketPlace& packet, ImageSize size) const;
+
+  /// Runs `read`; an EventFault in it is of what lies at `byte`.
+  template <class Read>
+  auto at(std::int64_t byte, Read read) const {
+    try {
+      return read();
+    } catch (const EventFault& fault) {
+      refuse(fault.what(), byte);
+    }
+  }
+  [[noreturn]] void refuse(const std::string& fault, std::int64_t byte) const;
+
+ private:
+  std::string read(std::int64_t begin, std::int64_t end) const;
+  std::string unpack(std::string bytes) const;
+  std::string content(const PacketPlace& packet) const;
+
+  InputFile file_;
+  Header header_;
+};
+
+}  // namespace eventgan

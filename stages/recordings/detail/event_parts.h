@@ -1,0 +1,116 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "stages/recordings/detail/event_check.h"
+#include "stages/recordings/detail/stored_recording.h"
+
+namespace eventgan {
+
+/// Events in their order, in 13 bytes each. What does not fit into whole numbers, and so is no
+/// event, is kept beside them as it is.
+class CompactEvents {
+ public:
+  void reserve(std::size_t count);
+  void push_back(const StoredEvent& event);
+
+  std::int64_t size() const { return std::ssize(t_s_); }
+  StoredEvent operator[](std::int64_t place) const;
+  const std::vector<double>& times_s() const { return t_s_; }
+
+ private:
+  std::vector<double> t_s_;
+  std::vector<std::int16_t> x_, y_;
+  std::vector<std::int8_t> polarity_;
+  std::map<std::int64_t, StoredEvent> others_;  ///< by their places
+};
+
+/// The events that were read last, whoever reads them, so that windows and threads share them:
+/// those used longest ago go where there are more than `most_events`, but never the latest. Thread
+/// safe: of several threads that ask for the same, one reads and the others wait for it.
+class RecentEvents {
+ public:
+  explicit RecentEvents(std::int64_t most_events) : most_events_(most_events) {}
+
+  /// Of the whole process: sixteen million events, or 220 MB.
+  static RecentEvents& of_process();
+
+  using Events = std::shared_ptr<const CompactEvents>;
+  /// What `read` gives, unless it is kept. What it throws passes through.
+  Events get(const void* reader, std::size_t part, const std::function<CompactEvents()>& read);
+
+  /// Of a reader that is gone.
+  void forget(const void* reader);
+
+ private:
+  using Key = std::pair<const void*, std::size_t>;
+  struct Entry {
+    std::mutex reading;
+    Events events;             ///< null until they are read; guarded by `reading`
+    std::int64_t counted = 0;  ///< of kept_
+    std::list<Key>::iterator age;
+  };
+  void drop(const Key& key);
+
+  const std::int64_t most_events_;
+  std::mutex mutex_;  ///< of all but `Entry::events`
+  std::map<Key, std::shared_ptr<Entry>> entries_;
+  std::list<Key> ages_;  ///< the one used last is first
+  std::int64_t kept_ = 0;
+};
+
+/// The events of a file that is read in parts: a table as a whole, the packets of AEDAT4. A part is
+/// read when one of its events is first asked for, and then as long as RecentEvents keeps it, not
+/// again.
+class EventParts : public EventStore {
+ public:
+  ~EventParts() override { recent_.forget(this); }
+
+  std::int64_t count() const final { return count_; }
+  std::vector<StoredEvent> read(std::int64_t first, std::int64_t count) const final;
+  std::vector<double> times_s(std::int64_t first, std::int64_t count) const final;
+
+  /// Exactly, if the times never decrease: a search for it reads two parts at most.
+  std::optional<std::int64_t> near(double time_s) const final;
+
+ protected:
+  /// `name` is for messages.
+  explicit EventParts(std::string name, RecentEvents& recent = RecentEvents::of_process())
+      : name_(std::move(name)), recent_(recent) {}
+
+  /// While it is opened: the next part, which has events, the first at `begin_s`.
+  void add_part(std::int64_t count, double begin_s);
+  /// The same, of what has been read already; nothing if it is empty.
+  void add_part(CompactEvents events);
+
+  /// The events of a part. If they are not as many as it was added with, the file has changed,
+  /// which is told the caller as InputError. Thread safe.
+  virtual CompactEvents read_part(std::size_t part) const = 0;
+
+  /// Of the part's first event.
+  std::int64_t first_of(std::size_t part) const { return firsts_[part]; }
+
+ private:
+  RecentEvents::Events part(std::size_t number) const;
+  /// Calls `take(events, begin, end)` for the places in each part that has some of these.
+  template <class Take>
+  void for_each_part(std::int64_t first, std::int64_t count, Take take) const;
+
+  std::string name_;
+  RecentEvents& recent_;
+  std::vector<std::int64_t> firsts_;  ///< the number of each part's first event
+  std::vector<double> begins_s_;
+  std::int64_t count_ = 0;
+};
+
+}  // namespace eventgan

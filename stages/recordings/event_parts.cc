@@ -1,0 +1,163 @@
+#include "stages/recordings/detail/event_parts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "manifests/values/faults.h"
+
+namespace eventgan {
+namespace {
+
+/// False for NaN as well.
+template <class Whole>
+bool fits(double value) {
+  using Limits = std::numeric_limits<Whole>;
+  return value >= Limits::min() && value <= Limits::max() && value == std::trunc(value);
+}
+
+}  // namespace
+
+void CompactEvents::reserve(std::size_t count) {
+  t_s_.reserve(count);
+  x_.reserve(count);
+  y_.reserve(count);
+  polarity_.reserve(count);
+}
+
+void CompactEvents::push_back(const StoredEvent& event) {
+  const bool is_whole = fits<std::int16_t>(event.x) && fits<std::int16_t>(event.y) &&
+                        fits<std::int8_t>(event.polarity);
+  if (!is_whole) others_.emplace(size(), event);
+  t_s_.push_back(event.t_s);
+  x_.push_back(is_whole ? static_cast<std::int16_t>(event.x) : std::int16_t{0});
+  y_.push_back(is_whole ? static_cast<std::int16_t>(event.y) : std::int16_t{0});
+  polarity_.push_back(is_whole ? static_cast<std::int8_t>(event.polarity) : std::int8_t{0});
+}
+
+StoredEvent CompactEvents::operator[](std::int64_t place) const {
+  if (!others_.empty()) {
+    if (const auto other = others_.find(place); other != others_.end()) return other->second;
+  }
+  const auto i = static_cast<std::size_t>(place);
+  return {static_cast<double>(x_[i]), static_cast<double>(y_[i]), t_s_[i],
+          static_cast<double>(polarity_[i])};
+}
+
+RecentEvents& RecentEvents::of_process() {
+  static RecentEvents recent(std::int64_t{1} << 24);
+  return recent;
+}
+
+RecentEvents::Events RecentEvents::get(const void* reader, std::size_t part,
+                                       const std::function<CompactEvents()>& read) {
+  const Key key(reader, part);
+  std::shared_ptr<Entry> entry;
+  {
+    const std::lock_guard lock(mutex_);
+    std::shared_ptr<Entry>& kept = entries_[key];
+    if (!kept) {
+      kept = std::make_shared<Entry>();
+      kept->age = ages_.insert(ages_.begin(), key);
+    }
+    ages_.splice(ages_.begin(), ages_, kept->age);
+    entry = kept;
+  }
+  const std::lock_guard reading(entry->reading);
+  if (entry->events) return entry->events;
+  entry->events = std::make_shared<const CompactEvents>(read());
+
+  const std::lock_guard lock(mutex_);
+  const auto kept = entries_.find(key);
+  if (kept == entries_.end() || kept->second != entry) return entry->events;  // dropped meanwhile
+  entry->counted = entry->events->size();
+  kept_ += entry->counted;
+  ages_.splice(ages_.begin(), ages_, entry->age);
+  while (kept_ > most_events_ && ages_.size() > 1) drop(ages_.back());
+  return entry->events;
+}
+
+void RecentEvents::forget(const void* reader) {
+  const std::lock_guard lock(mutex_);
+  for (;;) {
+    const auto next = entries_.lower_bound(Key(reader, 0));
+    if (next == entries_.end() || next->first.first != reader) return;
+    drop(Key(next->first));
+  }
+}
+
+void RecentEvents::drop(const Key& key) {
+  const auto entry = entries_.find(key);
+  kept_ -= entry->second->counted;
+  ages_.erase(entry->second->age);
+  entries_.erase(entry);
+}
+
+void EventParts::add_part(std::int64_t count, double begin_s) {
+  firsts_.push_back(count_);
+  begins_s_.push_back(begin_s);
+  count_ += count;
+}
+
+void EventParts::add_part(CompactEvents events) {
+  if (events.size() == 0) return;
+  add_part(events.size(), events.times_s().front());
+  recent_.get(this, firsts_.size() - 1, [&] { return std::move(events); });
+}
+
+RecentEvents::Events EventParts::part(std::size_t number) const {
+  return recent_.get(this, number, [&] {
+    const std::int64_t end = number + 1 < firsts_.size() ? firsts_[number + 1] : count_;
+    CompactEvents events = read_part(number);
+    if (events.size() == end - firsts_[number]) return events;
+    throw InputError("expected " + std::to_string(end - firsts_[number]) +
+                     " events as before, got " + std::to_string(events.size()) + ", in " + name_);
+  });
+}
+
+template <class Take>
+void EventParts::for_each_part(std::int64_t first, std::int64_t count, Take take) const {
+  const auto behind = std::ranges::upper_bound(firsts_, first);
+  for (auto at = static_cast<std::size_t>(behind - firsts_.begin()); count > 0; ++at) {
+    const RecentEvents::Events events = part(at - 1);
+    const std::int64_t begin = first - firsts_[at - 1];
+    const std::int64_t end = std::min(begin + count, events->size());
+    take(*events, begin, end);
+    first += end - begin;
+    count -= end - begin;
+  }
+}
+
+std::vector<StoredEvent> EventParts::read(std::int64_t first, std::int64_t count) const {
+  std::vector<StoredEvent> result;
+  result.reserve(static_cast<std::size_t>(count));
+  for_each_part(first, count,
+                [&](const CompactEvents& events, std::int64_t begin, std::int64_t end) {
+                  for (std::int64_t i = begin; i < end; ++i) result.push_back(events[i]);
+                });
+  return result;
+}
+
+std::vector<double> EventParts::times_s(std::int64_t first, std::int64_t count) const {
+  std::vector<double> result;
+  result.reserve(static_cast<std::size_t>(count));
+  for_each_part(first, count,
+                [&](const CompactEvents& events, std::int64_t begin, std::int64_t end) {
+                  const auto times = events.times_s().begin();
+                  result.insert(result.end(), times + begin, times + end);
+                });
+  return result;
+}
+
+std::optional<std::int64_t> EventParts::near(double time_s) const {
+  const auto behind = std::ranges::upper_bound(begins_s_, time_s);
+  if (behind == begins_s_.begin()) return 0;
+  const auto number = static_cast<std::size_t>(behind - begins_s_.begin()) - 1;
+  const RecentEvents::Events events = part(number);
+  return firsts_[number] +
+         (std::ranges::upper_bound(events->times_s(), time_s) - events->times_s().begin());
+}
+
+}  // namespace eventgan

@@ -1,0 +1,191 @@
+#include "stages/recordings/detail/event_parts.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "manifests/values/faults.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+
+CompactEvents compact(const std::vector<StoredEvent>& events) {
+  CompactEvents result;
+  for (const StoredEvent& event : events) result.push_back(event);
+  return result;
+}
+
+CompactEvents events_at(const std::vector<double>& times_s) {
+  CompactEvents result;
+  for (const double time_s : times_s) result.push_back({1, 2, time_s, 1});
+  return result;
+}
+
+TEST(CompactEvents, HoldAnyNumbers) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<StoredEvent> events = {
+      {0, 32'767, 0.1, 1}, {1.5, 0, -3, 1},    {-32'768, 0, 1e300, -1},
+      {32'768, 2, 3, 0},   {3, -40'000, 4, 0}, {3, 4, 5, 1e300},
+      {1, 2, 6, -128},     {1, 2, 7, -129},    {1, 2, nan, 127},
+      {nan, nan, 8, nan},  {5, 6, 9, 0}};
+  const CompactEvents kept = compact(events);
+  ASSERT_EQ(kept.size(), std::ssize(events));
+  const auto same = [](double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); };
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const StoredEvent event = kept[static_cast<std::int64_t>(i)];
+    EXPECT_TRUE(same(event.x, events[i].x) && same(event.y, events[i].y) &&
+                same(event.t_s, events[i].t_s) && same(event.polarity, events[i].polarity))
+        << i;
+    EXPECT_TRUE(same(kept.times_s()[i], events[i].t_s)) << i;
+  }
+}
+
+/// Three parts, of times 1, 2, 2; 3; 5, 6 s.
+class TestParts final : public EventParts {
+ public:
+  explicit TestParts(RecentEvents& recent) : EventParts("FILE", recent) {
+    for (const auto& times_s : parts) add_part(std::ssize(times_s), times_s.front());
+  }
+
+  std::vector<std::vector<double>> parts = {{1, 2, 2}, {3}, {5, 6}};
+  mutable std::vector<std::size_t> reads;
+
+ private:
+  CompactEvents read_part(std::size_t part) const override {
+    reads.push_back(part);
+    return events_at(parts[part]);
+  }
+};
+
+std::vector<double> times_of(const std::vector<StoredEvent>& events) {
+  std::vector<double> times_s;
+  for (const StoredEvent& event : events) times_s.push_back(event.t_s);
+  return times_s;
+}
+
+TEST(EventParts, AreReadWhereTheyAreAskedForAndOnce) {
+  RecentEvents recent(100);
+  const TestParts events(recent);
+  EXPECT_EQ(events.count(), 6);
+  EXPECT_THAT(events.reads, IsEmpty());
+  EXPECT_THAT(times_of(events.read(1, 2)), ElementsAre(2, 2));
+  EXPECT_THAT(events.reads, ElementsAre(0));
+  EXPECT_THAT(events.times_s(2, 3), ElementsAre(2, 3, 5));
+  EXPECT_THAT(times_of(events.read(0, 6)), ElementsAre(1, 2, 2, 3, 5, 6));
+  EXPECT_THAT(times_of(events.read(6, 0)), IsEmpty());
+  EXPECT_THAT(events.reads, ElementsAre(0, 1, 2));
+}
+
+TEST(EventParts, TellHowManyEventsAreAtOrBeforeATime) {
+  RecentEvents recent(100);
+  const TestParts events(recent);
+  const std::pair<double, std::int64_t> expected[] = {{0.5, 0}, {1, 1}, {1.5, 1}, {2, 3}, {2.5, 3},
+                                                      {3, 4},   {4, 4}, {5, 5},   {6, 6}, {9, 6}};
+  for (const auto& [time_s, count] : expected) EXPECT_EQ(events.near(time_s), count) << time_s;
+  class NoParts final : public EventParts {
+   public:
+    explicit NoParts(RecentEvents& recent) : EventParts("FILE", recent) { add_part({}); }
+
+   private:
+    CompactEvents read_part(std::size_t) const override { throw std::logic_error("no part"); }
+  };
+  const NoParts none(recent);
+  EXPECT_EQ(none.count(), 0);
+  EXPECT_EQ(none.near(1), 0);
+}
+
+TEST(EventParts, ThatAreNotAsTheyWereAreRefused) {
+  RecentEvents recent(100);
+  TestParts events(recent);
+  events.parts[1].push_back(4);
+  EXPECT_THAT(times_of(events.read(0, 3)), ElementsAre(1, 2, 2));
+  EXPECT_THAT([&] { events.read(2, 2); },
+              ThrowsMessage<InputError>("expected 1 events as before, got 2, in FILE"));
+}
+
+TEST(EventParts, ThoseUsedLongestAgoGo) {
+  RecentEvents recent(4);
+  const TestParts events(recent);
+  events.read(0, 4);  // parts 0 and 1: four events
+  events.read(0, 1);
+  events.read(4, 1);  // part 2 of two: part 1 goes, then part 0
+  EXPECT_THAT(events.reads, ElementsAre(0, 1, 2));
+  events.read(4, 2);
+  events.read(3, 1);
+  EXPECT_THAT(events.reads, ElementsAre(0, 1, 2, 1));
+  events.read(0, 1);
+  EXPECT_THAT(events.reads, ElementsAre(0, 1, 2, 1, 0));
+  events.read(3, 1);
+  EXPECT_THAT(events.reads, ElementsAre(0, 1, 2, 1, 0));
+}
+
+TEST(RecentEvents, TheLatestStaysHoweverLargeItIs) {
+  RecentEvents recent(1);
+  const TestParts events(recent);
+  events.read(0, 1);
+  events.read(1, 2);
+  EXPECT_THAT(events.reads, ElementsAre(0));
+}
+
+TEST(RecentEvents, WhatCouldNotBeReadIsReadAgain) {
+  RecentEvents recent(10);
+  const auto fail = []() -> CompactEvents { throw InputError("unreadable"); };
+  EXPECT_THAT([&] { recent.get(&recent, 0, fail); }, ThrowsMessage<InputError>("unreadable"));
+  EXPECT_EQ(recent.get(&recent, 0, [] { return events_at({7}); })->times_s()[0], 7);
+}
+
+TEST(RecentEvents, OfAReaderThatIsGoneAreForgotten) {
+  RecentEvents recent(10);
+  const int readers[2] = {};
+  for (const int& reader : readers) {
+    for (std::size_t part = 0; part < 3; ++part) {
+      recent.get(&reader, part, [] { return events_at({7}); });
+    }
+  }
+  recent.forget(&readers[0]);
+  const auto fail = []() -> CompactEvents { throw InputError("is read"); };
+  EXPECT_THAT([&] { recent.get(&readers[0], 1, fail); }, ThrowsMessage<InputError>("is read"));
+  EXPECT_EQ(recent.get(&readers[1], 1, fail)->size(), 1);
+}
+
+TEST(RecentEvents, OfManyThreadsOneReads) {
+  RecentEvents recent(3);
+  std::atomic<int> reads = 0, wrong = 0;
+  const auto run = [](const auto& body) {
+    std::vector<std::thread> threads;
+    for (int i = 0; i < 8; ++i) threads.emplace_back(body);
+    for (std::thread& thread : threads) thread.join();
+  };
+  run([&] {
+    const auto events = recent.get(&recent, 0, [&] {
+      ++reads;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      return events_at({1, 2});
+    });
+    wrong += events->size() != 2;
+  });
+  EXPECT_EQ(reads, 1);
+  run([&] {  // more than are kept
+    for (std::size_t i = 0; i < 200; ++i) {
+      const auto time_s = static_cast<double>(i % 7);
+      const auto events = recent.get(&reads, i % 7, [&] { return events_at({time_s, 9}); });
+      wrong += events->times_s()[0] != time_s;
+    }
+  });
+  EXPECT_EQ(wrong, 0);
+}
+
+}  // namespace
+}  // namespace eventgan
