@@ -8,6 +8,8 @@
 namespace eventgan {
 
 std::vector<TextLine> split_lines(std::string_view text) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
   std::vector<TextLine> lines;
   while (!text.empty()) {
     const std::size_t length = std::min(text.find('\n'), text.size() - 1) + 1;
@@ -27,6 +29,14 @@ std::vector<std::string_view> split_columns(std::string_view line) {
     begin = line.find_first_not_of(kSpace, end);
   }
   return columns;
+}
+
+std::optional<std::int64_t> parse_whole(std::string_view token) {
+  if (const auto number = parse_number<std::int64_t>(token)) return number;
+  constexpr double kMost = 9007199254740992;  // 2^53: beyond, a double is not exact
+  const auto number = parse_number<double>(token);
+  if (!number || std::abs(*number) > kMost || *number != std::trunc(*number)) return std::nullopt;
+  return static_cast<std::int64_t>(*number);
 }
 
 std::string in_quotes(std::string_view text) {
