@@ -165,6 +165,12 @@ LabelSpec read_labels(const StrictValue& value) {
   StrictObject object = value.object();
   spec.format = object.at("format").choice(kLabelFormatWords);
   spec.path = read_path(object.at("path"));
+  if (const auto from = object.find("edges_from")) {
+    spec.edges_from = from->integer(0, 1);
+    if (spec.format != LabelFormat::kVoc && spec.format != LabelFormat::kMot) {
+      from->fault("no such key for this format (only for voc and mot)");
+    }
+  }
   object.finish();
   return spec;
 }
