@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 namespace eventgan {
 
@@ -56,6 +57,17 @@ namespace {
 constexpr std::size_t kColumns = 15;
 constexpr float kIgnoredLevel = 2;  // of truncation in KITTI tracking
 
+template <class Number>
+std::optional<Number> parse_column(std::string_view token) {
+  if constexpr (std::is_integral_v<Number>) {
+    const auto number = parse_whole(token);
+    return number && std::in_range<Number>(*number) ? std::optional(static_cast<Number>(*number))
+                                                    : std::nullopt;
+  } else {
+    return parse_number<Number>(token);
+  }
+}
+
 /// Takes one column after the other and remembers the first that is not the number it should be.
 class ColumnReader {
  public:
@@ -82,7 +94,7 @@ class ColumnReader {
   void read(Number& number, const char* name, const char* expected, Fits fits) {
     const std::string_view token = columns_.front();
     columns_ = columns_.subspan(1);
-    const auto parsed = parse_number<Number>(token);
+    const auto parsed = parse_column<Number>(token);
     if (parsed && fits(*parsed)) {
       number = *parsed;
     } else if (!complaint_) {

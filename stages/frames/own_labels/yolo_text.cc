@@ -164,7 +164,8 @@ class YoloLine {
     const auto number = parse_whole(columns_[0]);
     const std::int64_t classes = std::ssize(schema_.names.class_names);
     if (!number || *number < 0 || *number >= classes) {
-      throw BadLabel("expected a class 0.." + std::to_string(classes - 1) + ", got " +
+      throw BadLabel("expected a class 0.." + std::to_string(classes - 1) + ", since there " +
+                     (classes == 1 ? "is " : "are ") + count_text(classes, "name") + ", got " +
                      in_quotes(columns_[0]));
     }
     box.class_id = static_cast<int>(*number);

@@ -27,7 +27,7 @@ MotSequence parse_mot_sequence(std::string_view text, const std::string& path);
 
 /// How a gt.txt is to be read, beyond what it says.
 struct MotForm {
-  int edges_from = 1;                    ///< as LabelSpec::edges_from
+  int edges_from = 1;                         ///< as LabelSpec::edges_from
   std::vector<std::string> class_names = {};  ///< of class 1, 2, ...; empty: MOT's own
   bool is_visdrone = false;
 };

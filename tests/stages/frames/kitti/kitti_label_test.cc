@@ -274,6 +274,10 @@ TEST(KittiLabel, OccludedMustBeAWholeNumber) {
             "label_2/000008.txt:1");
 }
 
+TEST(KittiLabel, AWholeNumberMayHaveDecimals) {
+  EXPECT_EQ(parsed(car_with(2, "2.0")).boxes, parsed(car_with(2, "2")).boxes);
+}
+
 TEST(KittiLabel, ReadsTheOriginalLabels) {
   EVENTGAN_SHARED_DATA_OR_SKIP(data);
   const auto text = testing::read_file(data / "kitti_object/training/label_2/000008.txt");

@@ -99,10 +99,13 @@ TEST(YoloText, WhatProgramsPutAroundNumbersIsPassedOver) {
 
 TEST(YoloText, AnythingElseIsAFaultOfItsLine) {
   EXPECT_EQ(fault_of("0 0.5 0.5 0.1 0.1\n2 0.5 0.5 0.1 0.1"),
-            "expected a class 0..1, got '2', in a.txt:2");
-  EXPECT_EQ(fault_of("-1 0.5 0.5 0.1 0.1"), "expected a class 0..1, got '-1', in a.txt:1");
-  EXPECT_EQ(fault_of("0.5 0.5 0.5 0.1 0.1"), "expected a class 0..1, got '0.5', in a.txt:1");
-  EXPECT_EQ(fault_of("1e30 0.5 0.5 0.1 0.1"), "expected a class 0..1, got '1e30', in a.txt:1");
+            "expected a class 0..1, since there are 2 names, got '2', in a.txt:2");
+  EXPECT_EQ(fault_of("-1 0.5 0.5 0.1 0.1"),
+            "expected a class 0..1, since there are 2 names, got '-1', in a.txt:1");
+  EXPECT_EQ(fault_of("0.5 0.5 0.5 0.1 0.1"),
+            "expected a class 0..1, since there are 2 names, got '0.5', in a.txt:1");
+  EXPECT_EQ(fault_of("1e30 0.5 0.5 0.1 0.1"),
+            "expected a class 0..1, since there are 2 names, got '1e30', in a.txt:1");
   EXPECT_EQ(fault_of("0 1.1 0.5 0.1 0.1"), "expected a share 0..1, got '1.1', in a.txt:1");
   EXPECT_EQ(fault_of("0 0.5 0.5 -0.1 0.1"), "expected a share 0..1, got '-0.1', in a.txt:1");
   EXPECT_EQ(fault_of("0 nan 0.5 0.1 0.1"), "expected a number, got 'nan', in a.txt:1");
