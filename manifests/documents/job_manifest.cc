@@ -66,11 +66,16 @@ void list_pairs(Fields& fields, PairSpec& spec) {
 }
 
 void list_labels(Fields& fields, LabelSpec& spec) {
-  fields.at("format", spec.format, words(kLabelFormatWords),
-            "coco: JSON, instances or person keypoints. yolo: a folder of text files, data.yaml or "
-            "classes.txt. voc: a folder of Pascal VOC's XML files. mot: gt.txt, or a folder of "
-            "sequences with it. csv: a table image,class,left,top,right,bottom[,track].");
+  fields.kind_at(
+      "format", spec.format, words(kLabelFormatWords),
+      "coco: JSON, instances or person keypoints. yolo: a folder of text files, data.yaml or "
+      "classes.txt. voc: a folder of Pascal VOC's XML files. mot: gt.txt, or a folder of "
+      "sequences with it. csv: a table image,class,left,top,right,bottom[,track].");
   fields.at("path", spec.path, paths(), "The file or folder.");
+  fields.only_for({LabelFormat::kVoc, LabelFormat::kMot})
+      .find("edges_from", spec.edges_from, integers(0, 1),
+            "the number of the image's left and top edge in the files. Default: what the files "
+            "tell, which a note says.");
 }
 
 void list_columns(Fields& fields, EventFields& spec) {
@@ -293,8 +298,9 @@ void list_output(Fields& fields, OutputSpec& spec) {
 
 void list_errors(Fields& fields, ErrorSpec& spec) {
   fields.find("policy", spec.policy, words(kPolicyWords),
-              "fail: the first ends the run. quarantine: such a sample keeps its slot, marked "
-              "invalid, and the run goes on.");
+              "fail: the first ends the run, and so does the first box of your own labels that is "
+              "left out. quarantine: such a sample keeps its slot, marked invalid, and the run "
+              "goes on.");
   fields.find("max_count", spec.max_count, integers(0, 1'000'000'000),
               "More quarantined samples than this end the run.");
   fields.find("max_fraction", spec.max_fraction, numbers(0, 1),

@@ -84,6 +84,8 @@ struct PairSpec {
 struct LabelSpec {
   LabelFormat format = LabelFormat::kCoco;
   std::string path;  ///< file or folder, as written in the manifest
+  /// voc, mot: what number the image's left and top edge has, 0 or 1; none: what the files tell.
+  std::optional<int> edges_from = std::nullopt;
 };
 
 /// Which fields of a table of events are what: names of a header, of a structured array's fields,

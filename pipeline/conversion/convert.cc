@@ -1,6 +1,8 @@
 #include "pipeline/conversion/convert.h"
 
+#include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -183,6 +185,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
   ShardSink sink(job, shared, report.quarantined_in_plan());
   const PlannedShards by_others = run_conversion("make shards", job, earlier.left, sink, &shared);
   add_made(job, sink.committed(), by_others, report);
+  std::ranges::copy(sink.notes(), std::back_inserter(report.notes));
   report.too_many_faults =
       beyond_limits(manifest.errors, report.quarantined_in_plan(), report.plan_pairs);
   report.stopped = options.stop_requested() && !report.complete();

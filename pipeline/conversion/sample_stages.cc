@@ -158,6 +158,10 @@ void SampleStages::read_labels(SampleMessage& message, const Dataset& dataset) c
     return;
   }
   message.sample.annotation = std::move(*annotation);
+  const std::vector<std::string>& left_out = message.sample.annotation.left_out;
+  if (!left_out.empty() && !message.failed() && manifest_.errors.policy == ErrorPolicy::kFail) {
+    message.fail(left_out.front());
+  }
   if (!message.failed()) {
     Outcome<VolumeLabels> labels = map_labels(message.sample.annotation, message.prepared.placement,
                                               dataset.label_place(planned.label_key));

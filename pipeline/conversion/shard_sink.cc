@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <iterator>
 #include <string>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "manifests/documents/commit_record.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
+#include "manifests/values/text.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/memory.h"
@@ -123,6 +125,11 @@ void ShardSink::add(const SampleMessage& message) {
   } else {
     ++record_.valid;
   }
+  for (const std::string& reason : message.sample.annotation.left_out) {
+    constexpr std::size_t kListed = 3;
+    ++boxes_left_out_;
+    if (left_out_.size() < kListed) left_out_.push_back(reason);
+  }
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     record_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }
@@ -165,6 +172,13 @@ bool ShardSink::commit() {
   quarantined_ += std::ssize(record_.quarantined);
   committed_.push_back({shard_, std::move(record_)});
   return true;
+}
+
+std::vector<std::string> ShardSink::notes() const {
+  if (boxes_left_out_ == 0) return {};
+  const char* const more = boxes_left_out_ > std::ssize(left_out_) ? "; ..." : "";
+  return {count_text(boxes_left_out_, "box", " of labels left out: ") +
+          joined(left_out_, "; ", std::identity()) + more};
 }
 
 void ShardSink::abandon() {

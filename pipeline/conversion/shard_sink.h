@@ -32,6 +32,8 @@ class ShardSink final : public SampleSink {
   bool closed() const override;
 
   const std::vector<CommittedShard>& committed() const { return committed_; }
+  /// What a person should know of the labels of all samples that were added: boxes left out.
+  std::vector<std::string> notes() const;
 
  private:
   const ConversionJob& job_;
@@ -42,6 +44,8 @@ class ShardSink final : public SampleSink {
   const PlannedShard* shard_ = nullptr;  // under way, or the last one
   std::unique_ptr<ShardWriter> writer_;  // of the shard under way
   CommitRecord record_;                  // of the shard under way
+  std::int64_t boxes_left_out_ = 0;
+  std::vector<std::string> left_out_;  // of the first of them, why
 };
 
 }  // namespace eventgan

@@ -16,11 +16,9 @@ namespace {
 
 /// A line each; blank ones, white space around, and a byte order mark are passed over.
 std::set<std::string> read_ids(const SourceRoot& base, const std::string& path) {
-  constexpr std::string_view kMark = "\xEF\xBB\xBF";
   const std::string text = base.read_or_throw(path);
   std::set<std::string> ids;
-  for (const TextLine& line :
-       split_lines(std::string_view(text).substr(text.starts_with(kMark) ? kMark.size() : 0))) {
+  for (const TextLine& line : split_lines(text)) {
     const std::string_view id = trimmed(line.bytes);
     if (!id.empty()) ids.emplace(id);
   }

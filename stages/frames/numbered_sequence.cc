@@ -67,8 +67,7 @@ NumberedSequence NumberedSequence::list(const std::filesystem::path& folder,
     std::string name;
   };
   std::map<std::int64_t, Listed> found;
-  std::vector<std::string> left_out;
-  auto [folders, names] = list_folder(folder);
+  auto [folders, names, left_out] = list_folder(folder);
   // A folder named as a frame is one that cannot be read, not one that is not there.
   std::erase_if(folders, [&](const auto& name) { return !parse_name(name, prefix, extensions); });
   names.insert(names.end(), folders.begin(), folders.end());

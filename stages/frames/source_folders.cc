@@ -1,8 +1,11 @@
 #include "stages/frames/source_folders.h"
 
+#include <utf8.h>
+
 #include <algorithm>
 #include <system_error>
 
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "stages/base/files/input_file.h"
@@ -21,9 +24,15 @@ FolderListing list_folder(const std::filesystem::path& folder) {
   std::filesystem::directory_iterator entries(folder, error);
   if (error == std::errc::no_such_file_or_directory) return listing;
   for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
+    std::string name = entries->path().filename().string();
+    if (name.starts_with("._")) continue;
+    if (!utf8::is_valid(name)) {
+      listing.unnameable.push_back(escape_controls(name) + " (no UTF-8)");
+      continue;
+    }
     std::error_code ignored;  // a dangling link is a file that cannot be read later
     auto& names = entries->is_directory(ignored) ? listing.folders : listing.files;
-    names.push_back(entries->path().filename().string());
+    names.push_back(std::move(name));
   }
   if (error) {
     throw InputError("expected a readable folder, got '" + error.message() + "', in " +
@@ -31,6 +40,7 @@ FolderListing list_folder(const std::filesystem::path& folder) {
   }
   std::ranges::sort(listing.folders);
   std::ranges::sort(listing.files);
+  std::ranges::sort(listing.unnameable);
   return listing;
 }
 

@@ -10,10 +10,14 @@
 
 namespace eventgan {
 
-/// The names in a folder, each list sorted.
+/// The names in a folder, each list sorted. What macOS puts beside a file on foreign disks and into
+/// archives, "._NAME", is in none of them: it has the name's extension and nothing of its contents.
 struct FolderListing {
   std::vector<std::string> folders;
   std::vector<std::string> files;  ///< all that is no folder, dangling links too
+  /// "NAME (no UTF-8)" of files and folders with such names, as they come out of other systems'
+  /// archives, other bytes written as \xff: plans, shards and JSON cannot name them.
+  std::vector<std::string> unnameable;
 };
 
 /// What a note says of some files: "2 labels without an image in clip: a.json, b.json". After

@@ -4,6 +4,7 @@ and 100,000 images of COCO, planned in linear time."""
 import csv
 import json
 import os
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -305,6 +306,109 @@ class OwnLabels(program.InFolder):
             np.testing.assert_allclose(np.array(got)[:, :5], np.array(lines[name])[:, :5], atol=PIXELS / 64)
         for annotation in json.loads((self.export("coco") / "person_keypoints_train.json").read_text())["annotations"]:
             np.testing.assert_allclose(annotation["keypoints"], [16, 24, 2, 0, 0, 0, 8, 36, 1], atol=PIXELS)
+
+    # ---- As other programs write them
+
+    def expected(self, squares, classes=("car",)):
+        """Of each image its square, of one class after the other."""
+        return {name: [(classes[i % len(classes)], *edges)] for i, (name, edges) in enumerate(squares.items())}
+
+    def test_mot_with_classes_of_its_own(self):
+        squares = self.make_images()
+        names = ["tram", "dog", "car"]
+        rows = "".join(f"{i + 1}.0,{i - 1},{left},{top},{right - left},{bottom - top},1,{i % 3 + 1},1.0\n"
+                       for i, (left, top, right, bottom) in enumerate(squares.values()))
+        for labels, edges_from, shift in (("labels.txt", {}, 0), ("labels.txt", {"edges_from": 1}, 1)):
+            gt = self.folder / f"mot{shift}" / "gt"
+            gt.mkdir(parents=True)
+            (gt / "gt.txt").write_text(rows)
+            (gt / labels).write_text("\ufeff" + "\n".join(names))
+            (gt.parent / "seqinfo.ini").write_text("[Sequence]\nname=a\nseqLength=6\n")
+            out = self.job({"format": "mot", "path": f"mot{shift}", **edges_from}, name=f"out{shift}")
+            self.assert_boxes(self.expected({name: np.array(edges) - shift for name, edges in squares.items()}, names))
+            self.assertEqual([sample["tracks"] for sample in self.samples.values()], [[0], [1], [2], [3], [4]])
+            self.assertIn("with the classes of labels.txt", out)
+            self.assertIn("id 0 taken as it is: 1 time, first in", out)
+
+    def test_mot_of_visdrone(self):
+        squares = self.make_images()
+        (self.folder / "annotations").mkdir()
+        (self.folder / "sequences").mkdir()
+        (self.folder / "images").rename(self.folder / "sequences" / "uav1_v")
+        (self.folder / "annotations" / "uav1_v.txt").write_text("".join(
+            f"{i + 1},7,{left + 1},{top + 1},{right - left},{bottom - top},{int(i != 3)},{[4, 9, 0][i % 3]},0,{i % 3}\n"
+            for i, (left, top, right, bottom) in enumerate(squares.values())))
+        out = self.job({"format": "mot", "path": "annotations"}, "sequences")
+        self.assert_boxes({f"uav1_v/{name}": box for name, box in
+                           self.expected(squares, ["car", "bus", "ignored regions"]).items()})
+        self.assertEqual([sample["boxes"][0][2] for sample in self.samples.values()], [False, True, True, False, True])
+        self.assertIn("1 file with VisDrone's classes in column 8: annotations/uav1_v.txt", out)
+
+    def test_voc_from_0_without_sizes(self):
+        squares = self.make_images()
+        (self.folder / "xml").mkdir()
+        for name, (left, top, right, bottom) in squares.items():
+            corner = 0 if name == "000004" else left  # one in the image's corner
+            squares[name][0] = corner
+            (self.folder / "xml" / f"{name}.xml").write_text(
+                f"<annotation><object><name>car</name><truncated>0.06</truncated><difficult>Unspecified</difficult>"
+                f"<bndbox><xmin>{corner}</xmin><ymin>{top}</ymin><xmax>{right}</xmax><ymax>{bottom}</ymax></bndbox>"
+                f"</object></annotation>")
+        out = self.job({"format": "voc", "path": "xml"})
+        self.assert_boxes(self.expected(squares))
+        self.assertIn("edges count from 0 in xml, since one is at 0 in xml/000004.xml", out)
+        self.assertIn("<difficult> that is no 0 or 1 taken for unknown: 6 times, first in xml/000000.xml", out)
+        out = self.job({"format": "voc", "path": "xml", "edges_from": 1}, name="from_1")
+        self.assert_boxes(self.expected({name: np.array(edges) - [1, 1, 0, 0] for name, edges in squares.items()}))
+        self.assertNotIn("edges count", out)
+
+    def yolo_with_faults(self):
+        """A square each; one of them as an outline, and some beside boxes that are none."""
+        squares = self.make_images()
+        (self.folder / "labels").mkdir()
+        (self.folder / "labels" / "classes.txt").write_text("\ufeffcar\n")
+        for i, (name, (left, top, right, bottom)) in enumerate(squares.items()):
+            box = (f"{(left + right) / 128} {(top + bottom) / 96} {(right - left) / 64} {(bottom - top) / 48}")
+            outline = (f"{left / 64} {top / 48} {right / 64} {top / 48} {right / 64} {bottom / 48}")
+            before = {1: "0 1.009 0.5 0.001 0.5\n", 2: "0 0.5 0.5 0 0.5\n"}.get(i, "")
+            (self.folder / "labels" / f"{name}.txt").write_text(
+                f"\ufeff{before}0.0 {outline if i == 3 else box}\n")
+        squares["000005"] = [64 * (1.0004 - 0.25), 12, 64 * (1.0004 + 0.25), 36]
+        (self.folder / "labels" / "000005.txt").write_text("0 1.0004 0.5 0.5 0.5\n")
+        return squares
+
+    def test_yolo_with_outlines_and_boxes_that_are_none(self):
+        squares = self.yolo_with_faults()
+        (self.folder / "labels" / "._000002.txt").write_bytes(b"\0\5\x16\7Mac OS X")
+        out = self.job({"format": "yolo", "path": "labels"})
+        self.assert_boxes(self.expected(squares))
+        self.assertIn("note: 2 boxes of labels left out: expected a box within the image of 64x48, got one from (64.",
+                      out)
+        self.assertIn("expected a box of a width and height above 0, got 0 x 24, in labels/000002.txt:1", out)
+
+    def test_a_box_left_out_ends_the_run_where_the_first_fault_does(self):
+        self.yolo_with_faults()
+        source = {"dataset": "frames", "root": "images", "labels": {"format": "yolo", "path": "labels"},
+                  "pairs": pairs([1])}
+        path = self.write_manifest(manifest([source], generator={"kind": "difference"}, errors={"policy": "fail"}))
+        _, errors = run("convert", path, "--progress", "none", expect=65)
+        self.assertIn("expected a box within the image of 64x48, got one from (64.", errors)
+
+    def test_a_name_that_is_not_utf8_costs_its_image_alone(self):
+        squares = self.make_images()
+        (self.folder / "labels").mkdir()
+        (self.folder / "data.yaml").write_text("names: [car]\n")
+        for name, (left, top, right, bottom) in squares.items():
+            (self.folder / "labels" / f"{name}.txt").write_text(
+                f"0 {(left + right) / 128} {(top + bottom) / 96} {(right - left) / 64} {(bottom - top) / 48}\n")
+        for folder, ending in (("images", ".png"), ("labels", ".txt")):
+            shutil.copy(self.folder / folder / f"000003{ending}",
+                        os.fsencode(self.folder / folder) + b"/stra\xdfe" + ending.encode())
+        out, _ = run("convert", self.folder, "--output", self.folder / "whole", "--progress", "none")
+        self.assertIn(r"stra\xdfe.png (no UTF-8)", out)
+        out = self.job({"format": "yolo", "path": "."})
+        self.assertEqual(len(self.samples), 5)
+        self.assert_boxes(self.expected(squares))
 
     # ---- Real frames
 

@@ -80,8 +80,8 @@ TEST(FuzzCorpusSeeds, AreReadWhereTheyAreSound) {
   const auto labels = [&](const char* name) {
     return testing::read_file(corpus / std::filesystem::path(name));
   };
-  EXPECT_FALSE(is_fault(parse_voc_labels(labels("voc/two"), "two")));
-  EXPECT_EQ(parse_mot_labels(labels("mot/two"), "two").size(), 2u);
+  EXPECT_FALSE(is_fault(parse_voc_labels(labels("voc/two"), 1, "two")));
+  EXPECT_EQ(parse_mot_labels(labels("mot/two"), {}, "two").size(), 2u);
   EXPECT_EQ(parse_mot_sequence(labels("mot/seqinfo"), "seqinfo").frames_per_second, 30);
   EXPECT_EQ(parse_csv_labels(labels("csv/three"), "three").size(), 3u);
   const CocoIndex coco = index_coco(InputFile(corpus / "coco" / "persons"), "persons");

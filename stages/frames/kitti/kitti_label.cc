@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 namespace eventgan {
 
 std::vector<TextLine> split_lines(std::string_view text) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
   std::vector<TextLine> lines;
   while (!text.empty()) {
     const std::size_t length = std::min(text.find('\n'), text.size() - 1) + 1;
@@ -29,6 +32,14 @@ std::vector<std::string_view> split_columns(std::string_view line) {
   return columns;
 }
 
+std::optional<std::int64_t> parse_whole(std::string_view token) {
+  if (const auto number = parse_number<std::int64_t>(token)) return number;
+  constexpr double kMost = 9007199254740992;  // 2^53: beyond, a double is not exact
+  const auto number = parse_number<double>(token);
+  if (!number || std::abs(*number) > kMost || *number != std::trunc(*number)) return std::nullopt;
+  return static_cast<std::int64_t>(*number);
+}
+
 std::string in_quotes(std::string_view text) {
   constexpr std::size_t kMaxLength = 40;
   std::string shown(text.substr(0, kMaxLength));
@@ -45,6 +56,17 @@ namespace {
 
 constexpr std::size_t kColumns = 15;
 constexpr float kIgnoredLevel = 2;  // of truncation in KITTI tracking
+
+template <class Number>
+std::optional<Number> parse_column(std::string_view token) {
+  if constexpr (std::is_integral_v<Number>) {
+    const auto number = parse_whole(token);
+    return number && std::in_range<Number>(*number) ? std::optional(static_cast<Number>(*number))
+                                                    : std::nullopt;
+  } else {
+    return parse_number<Number>(token);
+  }
+}
 
 /// Takes one column after the other and remembers the first that is not the number it should be.
 class ColumnReader {
@@ -72,7 +94,7 @@ class ColumnReader {
   void read(Number& number, const char* name, const char* expected, Fits fits) {
     const std::string_view token = columns_.front();
     columns_ = columns_.subspan(1);
-    const auto parsed = parse_number<Number>(token);
+    const auto parsed = parse_column<Number>(token);
     if (parsed && fits(*parsed)) {
       number = *parsed;
     } else if (!complaint_) {

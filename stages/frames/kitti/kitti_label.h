@@ -26,7 +26,8 @@ struct TextLine {
   int number = 0;
 };
 
-/// The lines of `text`, which concatenated are `text` again. Views into `text`.
+/// The lines of `text`, which concatenated are `text` again, but for a byte order mark before it
+/// (Windows' editors write one into UTF-8). Views into `text`.
 std::vector<TextLine> split_lines(std::string_view text);
 
 /// The columns of a line between spaces, tabs and line ends (LF or CRLF). Views into `line`.
@@ -52,6 +53,10 @@ std::optional<Number> parse_number(std::string_view token) {
   }
   return number;
 }
+
+/// The whole token as a whole number, also where a tool has written it as "2.0" (as NumPy and
+/// pandas do), or nothing.
+std::optional<std::int64_t> parse_whole(std::string_view token);
 
 /// Foreign text for a message: in quotes, cut to 40 characters, all but printable ASCII as '?'.
 std::string in_quotes(std::string_view text);

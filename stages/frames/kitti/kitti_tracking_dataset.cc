@@ -24,7 +24,7 @@ TrackingLabels::TrackingLabels(std::string text, std::string path)
   for (const TextLine& line : split_lines(text_)) {
     const auto columns = split_columns(line.bytes);
     if (columns.empty()) continue;
-    const auto frame = parse_number<std::int64_t>(columns[0]);
+    const auto frame = parse_whole(columns[0]);
     if (frame && *frame >= 0 && *frame <= kMaxKittiFrame) {
       lines_[*frame].push_back({static_cast<std::size_t>(line.bytes.data() - text_.data()),
                                 line.bytes.size(), line.number});
@@ -53,7 +53,7 @@ Outcome<Annotation> TrackingLabels::annotation(std::int64_t frame) const {
     const std::string where = place_in_file(path_, line.number);
     auto box = parse_kitti_object(columns, KittiColumns::kTracking, where);
     if (is_fault(box)) return box.fault();
-    const auto track = parse_number<std::int64_t>(columns[1]);
+    const auto track = parse_whole(columns[1]);
     if (!track) {
       return SampleFault{"expected a whole number for track id, got " + in_quotes(columns[1]) +
                          ", in " + where};

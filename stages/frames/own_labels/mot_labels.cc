@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
+#include <cmath>
+#include <functional>
 #include <optional>
 #include <set>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
+#include "stages/frames/own_labels/detail/yolo_text.h"
 #include "stages/frames/source_folders.h"
 
 namespace eventgan {
@@ -40,54 +42,77 @@ constexpr std::array<MotClass, 13> kClasses = {{{"pedestrian"},
                                                 {"reflection", true},
                                                 {"crowd", true}}};
 
-template <class Number>
-Number number(std::string_view column, const char* expected, Number least, Number most) {
-  const auto value = parse_number<Number>(column);
+/// VisDrone's, from 0 (VisDrone2018-MOT-toolkit, README).
+constexpr std::array<MotClass, 12> kVisDroneClasses = {{{"ignored regions", true},
+                                                        {"pedestrian"},
+                                                        {"people"},
+                                                        {"bicycle"},
+                                                        {"car"},
+                                                        {"van"},
+                                                        {"truck"},
+                                                        {"tricycle"},
+                                                        {"awning-tricycle"},
+                                                        {"bus"},
+                                                        {"motor"},
+                                                        {"others"}}};
+
+enum { kFrame, kId, kLeft, kTop, kWidth, kHeight, kConf, kClass, kTruncation, kOcclusion, kMost };
+
+double number(std::string_view column, const char* expected, double least, double most) {
+  const auto value = parse_number<double>(column);
   if (value && *value >= least && *value <= most) return *value;
   throw BadLabel(std::string("expected ") + expected + ", got " + in_quotes(column));
 }
 
-NamedBox box_of(const std::vector<std::string_view>& columns) {
-  enum { kFrame, kId, kLeft, kTop, kWidth, kHeight, kConf, kClass, kVisibility };
-  constexpr std::size_t kOf2015 = 10;  // x, y, z in place of class and visibility
-  if (columns.size() <= kConf || columns.size() > kOf2015) {
+std::int64_t whole(std::string_view column, const std::string& expected, std::int64_t least,
+                   std::int64_t most) {
+  const auto value = parse_whole(column);
+  if (value && *value >= least && *value <= most) return *value;
+  throw BadLabel("expected " + expected + ", got " + in_quotes(column));
+}
+
+/// Which of `count` classes a column names, from 0.
+std::size_t class_of(std::string_view column, int first, std::size_t count) {
+  const std::int64_t last = first + static_cast<std::int64_t>(count) - 1;
+  const std::string expected = fmt::format("a class from {} to {}", first, last);
+  return static_cast<std::size_t>(whole(column, expected, first, last) - first);
+}
+
+/// Adds the box of a row to its frame.
+void add_row(const std::vector<std::string_view>& columns, const MotForm& form,
+             ImageLabels& labels) {
+  if (columns.size() <= kConf || columns.size() > kMost) {
     throw BadLabel("expected 7 to 10 columns, got " + std::to_string(columns.size()));
   }
   NamedBox read;
   Box& box = read.box;
   constexpr std::int64_t kMostId = std::int64_t{1} << 53;
-  box.track_id = number<std::int64_t>(columns[kId], "an id from 1", 1, kMostId);
+  box.track_id = whole(columns[kId], "an id from 1", -1, kMostId);
+  if (box.track_id < 0) labels.remarks.push_back("id -1 taken for none");
+  if (box.track_id == 0 && !form.is_visdrone) labels.remarks.push_back("id 0 taken as it is");
   const auto pixel = [&](std::size_t column, const char* expected) {
     return number(columns[column], expected, -kFarthest_px, kFarthest_px);
   };
-  box.xyxy.left = pixel(kLeft, "a number of pixels for bb_left") - 1;
-  box.xyxy.top = pixel(kTop, "a number of pixels for bb_top") - 1;
-  const double width = pixel(kWidth, "a number of pixels for bb_width");
-  const double height = pixel(kHeight, "a number of pixels for bb_height");
-  box.xyxy.right = box.xyxy.left + width;
-  box.xyxy.bottom = box.xyxy.top + height;
-  if (!(box.xyxy.right > box.xyxy.left && box.xyxy.bottom > box.xyxy.top)) {
-    throw BadLabel("expected a box of a width and height above 0, got " +
-                   std::string(columns[kWidth]) + " x " + std::string(columns[kHeight]));
-  }
-  const bool counts = number(columns[kConf], "a conf from 0 to 1", 0.0, 1.0) > 0;
+  box.xyxy.left = pixel(kLeft, "a number of pixels for bb_left") - form.edges_from;
+  box.xyxy.top = pixel(kTop, "a number of pixels for bb_top") - form.edges_from;
+  box.xyxy.right = box.xyxy.left + pixel(kWidth, "a number of pixels for bb_width");
+  box.xyxy.bottom = box.xyxy.top + pixel(kHeight, "a number of pixels for bb_height");
+  const bool is_unknown = parse_number<double>(columns[kConf]) == -1;
+  const double conf = is_unknown ? 1 : number(columns[kConf], "a conf from 0 to 1", 0, 1);
+  if (is_unknown) labels.remarks.push_back("conf -1 taken for 1");
   MotClass mot = kClasses[0];
-  if (columns.size() == kOf2015) {
-    for (std::size_t i = kClass; i < kOf2015; ++i) {
-      number(columns[i], "a finite number for x, y and z", std::numeric_limits<double>::lowest(),
-             std::numeric_limits<double>::max());
-    }
-  } else if (columns.size() > kClass) {
-    const auto most = static_cast<int>(kClasses.size());
-    const int kind = number(columns[kClass], "a class from 1 to 13", 1, most);
-    mot = kClasses[static_cast<std::size_t>(kind - 1)];
-    if (columns.size() > kVisibility) {
-      number(columns[kVisibility], "a visibility from 0 to 1", 0.0, 1.0);
-    }
+  if (form.is_visdrone) {
+    mot = kVisDroneClasses[class_of(columns[kClass], 0, kVisDroneClasses.size())];
+    box.truncation = static_cast<float>(whole(columns[kTruncation], "0 or 1 as truncation", 0, 1));
+    box.occlusion = static_cast<int>(whole(columns[kOcclusion], "0, 1 or 2 as occlusion", 0, 2));
+  } else if (!form.class_names.empty() && columns.size() > kClass) {
+    mot = {form.class_names[class_of(columns[kClass], 1, form.class_names.size())]};
+  } else if (columns.size() > kClass && columns.size() < kMost) {
+    mot = kClasses[class_of(columns[kClass], 1, kClasses.size())];
   }
   read.class_name = mot.name;
-  box.ignore = !counts || mot.ignore;
-  return read;
+  box.ignore = conf == 0 || mot.ignore;
+  labels.boxes.push_back(std::move(read));
 }
 
 /// What stands in one section of an .ini file, key by key.
@@ -125,32 +150,47 @@ Section read_section(std::string_view text, std::string_view name, const std::st
 }  // namespace
 
 MotSequence parse_mot_sequence(std::string_view text, const std::string& path) {
-  constexpr std::string_view kMark = "\xEF\xBB\xBF";
-  if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
   const Section section = read_section(text, "[Sequence]", path);
-  const auto line = [&](const char* key) {
+  const auto value = [&](const char* key, double least, double most) -> std::optional<double> {
     const auto found = section.find(key);
-    if (found != section.end() && !found->second.bytes.empty()) return found->second;
-    throw InputError(std::string("expected a value of ") + key + ", got none, in " + path);
+    if (found == section.end() || found->second.bytes.empty()) return std::nullopt;
+    const auto [bytes, line] = found->second;
+    const auto number = parse_number<double>(bytes);
+    const bool is_sound = number && *number >= least && *number <= most;
+    if (is_sound && (least < 1 || *number == std::trunc(*number))) return number;
+    throw InputError(fmt::format("expected a number above 0, got {} for {}, in {}",
+                                 in_quotes(bytes), key, place_in_file(path, line)));
   };
-  const auto value = [&]<class Number>(const char* key, Number least, Number most) {
-    const TextLine found = line(key);
-    try {
-      return number(found.bytes, "a number above 0", least, most);
-    } catch (const BadLabel& bad) {
-      throw InputError(bad.what() +
-                       (std::string(" for ") + key + ", in " + place_in_file(path, found.number)));
-    }
-  };
-  constexpr int kMostSide = static_cast<int>(kFarthest_px);
   MotSequence sequence;
   sequence.frames_per_second = value("frameRate", 1e-6, 1e6);
-  sequence.length = value("seqLength", std::int64_t{1}, kMaxKittiFrame);
-  sequence.size = {value("imHeight", 1, kMostSide), value("imWidth", 1, kMostSide)};
+  if (const auto length = value("seqLength", 1, kMaxKittiFrame)) {
+    sequence.length = static_cast<std::int64_t>(*length);
+  }
+  const auto height = value("imHeight", 1, kFarthest_px), width = value("imWidth", 1, kFarthest_px);
+  if (height && width) sequence.size = {static_cast<int>(*height), static_cast<int>(*width)};
   return sequence;
 }
 
+bool is_visdrone_table(std::string_view text) {
+  CsvReader reader(text);
+  bool has_class = false;
+  while (const std::optional<CsvRecord> line = reader.next()) {
+    if (!line->fault.empty() || line->fields.size() != kMost) return false;
+    const auto is_up_to = [&](std::size_t column, std::int64_t most) {
+      const auto value = parse_whole(line->fields[column]);
+      return value && *value >= 0 && *value <= most;
+    };
+    if (!is_up_to(kClass, std::ssize(kVisDroneClasses) - 1) || !is_up_to(kTruncation, 1) ||
+        !is_up_to(kOcclusion, 2)) {
+      return false;
+    }
+    has_class = has_class || !is_up_to(kClass, 0);
+  }
+  return has_class;
+}
+
 std::map<std::int64_t, Outcome<ImageLabels>> parse_mot_labels(std::string_view text,
+                                                              const MotForm& form,
                                                               const std::string& path) {
   std::map<std::int64_t, Outcome<ImageLabels>> frames;
   std::set<std::pair<std::int64_t, std::int64_t>> seen;  // frame and id
@@ -158,7 +198,7 @@ std::map<std::int64_t, Outcome<ImageLabels>> parse_mot_labels(std::string_view t
   while (const std::optional<CsvRecord> line = reader.next()) {
     const std::string place = place_in_file(path, line->line);
     if (!line->fault.empty()) throw InputError(line->fault + ", in " + place);
-    const auto frame = parse_number<std::int64_t>(line->fields[0]);
+    const auto frame = parse_whole(line->fields[kFrame]);
     if (!frame || *frame < 1 || *frame > kMaxKittiFrame) {
       throw InputError("expected a frame number from 1, got " + in_quotes(line->fields[0]) +
                        ", in " + place);
@@ -166,14 +206,13 @@ std::map<std::int64_t, Outcome<ImageLabels>> parse_mot_labels(std::string_view t
     Outcome<ImageLabels>& outcome = frames[*frame];
     if (is_fault(outcome)) continue;
     try {
-      NamedBox box = box_of(line->fields);
-      if (!seen.emplace(*frame, box.box.track_id).second) {
-        throw BadLabel("expected each id once in a frame, got " + std::to_string(box.box.track_id) +
-                       " twice");
-      }
       auto& labels = *outcome;
       labels.original.append(line->bytes);
-      labels.boxes.push_back(std::move(box));
+      add_row(line->fields, form, labels);
+      const std::int64_t id = labels.boxes.back().box.track_id;
+      if (id >= 0 && !seen.emplace(*frame, id).second) {
+        throw BadLabel("expected each id once in a frame, got " + std::to_string(id) + " twice");
+      }
     } catch (const BadLabel& bad) {
       outcome = bad.in(place);
     }
@@ -186,7 +225,7 @@ namespace {
 class MotLabels : public ReadLabels {
  public:
   MotLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
-      : ReadLabels(std::move(labelled)), root_(spec.path, base) {
+      : ReadLabels(std::move(labelled)), root_(spec.path, base), edges_from_(spec.edges_from) {
     std::map<std::string, Frames> sequences;
     for (std::size_t i = 0; i < source().frames.size(); ++i) {
       const SourceFrame& frame = source().frames[i];
@@ -211,6 +250,7 @@ class MotLabels : public ReadLabels {
       notes_.push_back(
           counted(without, "sequence", " without gt/gt.txt or gt.txt in " + root_.written("")));
     }
+    note_forms();
     std::vector<std::string> unused;
     for (const std::string& name : is_file ? std::vector<std::string>() : root_.folders_in("")) {
       const bool is_other = name != "gt" && !sequences.contains(name);
@@ -237,13 +277,55 @@ class MotLabels : public ReadLabels {
  private:
   using Frames = std::map<std::int64_t, std::size_t>;  ///< by FrameRef::index
 
-  /// SEQUENCE/gt/gt.txt, SEQUENCE/gt.txt; of the only one gt/gt.txt and gt.txt too.
+  /// SEQUENCE/gt/gt.txt, SEQUENCE/gt.txt, SEQUENCE.txt; of the only one gt/gt.txt and gt.txt too.
   std::optional<std::string> find_file(const std::string& sequence) const {
     const std::string folder = sequence.empty() ? "" : sequence + "/";
-    for (const char* name : {"gt/gt.txt", "gt.txt"}) {
-      if (root_.has_file(folder + name)) return folder + name;
+    for (const std::string& name : {folder + "gt/gt.txt", folder + "gt.txt", sequence + ".txt"}) {
+      if (root_.has_file(name)) return name;
     }
     return std::nullopt;
+  }
+
+  /// What a sequence's table has in its columns: labels.txt beside it tells, or its numbers.
+  MotForm form_of(const std::string& file, const std::string& text) {
+    MotForm form;
+    const SourceRoot folder = root_.above(file);
+    if (folder.has_file("labels.txt")) {
+      const std::string path = folder.written("labels.txt");
+      annotation_files_.push_back(path);
+      form.class_names =
+          parse_yolo_classes(folder.read_or_throw("labels.txt"), path).names.class_names;
+      form.edges_from = 0;
+      with_names_.push_back(root_.written(file));
+    } else if (is_visdrone_table(text)) {
+      form.is_visdrone = true;
+      of_visdrone_.push_back(root_.written(file));
+    }
+    if (edges_from_) form.edges_from = *edges_from_;
+    return form;
+  }
+
+  /// Tells what is read otherwise than MOTChallenge writes it, and copies of a sequence.
+  void note_forms() {
+    if (!with_names_.empty()) {
+      const std::string edges =
+          edges_from_ ? ""
+                      : ", with edges from 0 as CVAT writes them (or as \"edges_from\" in the "
+                        "manifest's labels says)";
+      notes_.push_back(counted(with_names_, "file", " with the classes of labels.txt" + edges));
+    }
+    if (!of_visdrone_.empty()) {
+      notes_.push_back(counted(of_visdrone_, "file", " with VisDrone's classes in column 8"));
+    }
+    if (!copies_.empty()) {
+      notes_.push_back(
+          counted(copies_, "sequence", " with the labels of another") +
+          " (MOT17 has each three times, for three detectors). To take each once, put those to "
+          "take, "
+          "or links to them, into a folder and give that as root: else train and val may share "
+          "images");
+    }
+    remarks_.move_to(notes_);
   }
 
   /// seqinfo.ini in the folder of gt.txt, or above it where that is named gt.
@@ -270,11 +352,12 @@ class MotLabels : public ReadLabels {
     };
     if (source().is_video || std::ranges::all_of(frames, tells_number)) return;
     const std::int64_t count = std::ssize(frames);
-    if (info ? count == info->length : count >= last_number) return;
+    const auto length = info ? info->length : std::nullopt;
+    if (length ? count == *length : count >= last_number) return;
     const std::filesystem::path first(source().frames[frames.begin()->second].name);
     throw InputError(fmt::format(
         "expected numbered images, or all {} frames of {}, got {} without numbers, in {}",
-        info ? info->length : last_number, path, count,
+        length.value_or(last_number), path, count,
         source().root.written(first.parent_path().generic_string())));
   }
 
@@ -282,35 +365,45 @@ class MotLabels : public ReadLabels {
     const std::string path = root_.written(file);
     annotation_files_.push_back(path);
     const std::optional<MotSequence> info = read_info(file);
-    if (info) rates_[sequence] = info->frames_per_second;
+    if (info && info->frames_per_second) rates_[sequence] = *info->frames_per_second;
     // MOT's first frame is 1: that of a video is 0, and so may that of images be.
     const bool from_0 = source().is_video || frames.begin()->first == 0;
     if (from_0 && !source().is_video) {
       notes_.push_back("frame 1 of " + path + " is " +
                        source().root.written(source().frames[frames.begin()->second].name));
     }
-    auto by_number = parse_mot_labels(root_.read_or_throw(file), path);
+    const std::string text = root_.read_or_throw(file);
+    const auto [first, is_new] = of_text_.emplace(std::hash<std::string>()(text), sequence);
+    if (!is_new && !text.empty()) copies_.push_back(sequence + " (of " + first->second + ")");
+    auto by_number = parse_mot_labels(text, form_of(file, text), path);
     if (from_0) require_all(frames, info, by_number.empty() ? 0 : by_number.rbegin()->first, path);
     for (auto& [number, labels] : by_number) {
       const std::string key = file + "#" + std::to_string(number);
       classes_.add(labels);
-      if (info && !is_fault(labels)) labels->size = info->size;
+      if (!is_fault(labels)) {
+        if (info) labels->size = info->size;
+        remarks_.add(*labels, label_place(key));
+      }
       by_key_.emplace(key, std::move(labels));
       const auto frame = frames.find(from_0 ? number - 1 : number);
       if (frame != frames.end()) {
         give(frame->second, key);
       } else {
-        const std::filesystem::path first(source().frames[frames.begin()->second].name);
+        const std::filesystem::path other(source().frames[frames.begin()->second].name);
         const std::string name =
-            fmt::format("{:06}{}", from_0 ? number - 1 : number, first.extension().string());
-        give_absent((first.parent_path() / name).generic_string(), key);
+            fmt::format("{:06}{}", from_0 ? number - 1 : number, other.extension().string());
+        give_absent((other.parent_path() / name).generic_string(), key);
       }
     }
   }
 
   SourceRoot root_;
+  std::optional<int> edges_from_;  ///< as the manifest says
   ClassList classes_;
+  Remarks remarks_;
   std::map<std::string, double> rates_;
+  std::map<std::size_t, std::string> of_text_;  ///< the first sequence of a table, by its hash
+  std::vector<std::string> with_names_, of_visdrone_, copies_;
 };
 
 std::optional<std::filesystem::path> find_mot(const FoundFrames& frames,

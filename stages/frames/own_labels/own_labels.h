@@ -53,8 +53,8 @@ struct AbsentFrame {
 
 /// Labels of one's own for the frames of a source. What `label_key`s are, and where each format's
 /// labels lie, the readers below say. Coordinates are in pixels of the image turned upright as
-/// its EXIF orientation says. A box is a fault of its image if it is nowhere within it; one that
-/// reaches beyond an edge is kept as it is.
+/// its EXIF orientation says. A box that is nowhere within its image is left out (add_box); one
+/// that reaches beyond an edge is kept as it is.
 ///
 /// Thread safety: all methods may be called from several threads at once.
 class OwnLabels {
@@ -131,9 +131,11 @@ struct LabelReader {
 };
 
 /// MOT's gt.txt (parse_mot_labels): `path` is the file of the only sequence, or a folder that has
-/// SEQUENCE/gt/gt.txt or SEQUENCE/gt.txt; of images right in ROOT gt/gt.txt or gt.txt. Frame 1 is
-/// the image numbered 1, or the first where images are numbered from 0 (which a note tells), or a
-/// video's frame 0. Images without numbers are counted in their order, and must be all of the
+/// SEQUENCE/gt/gt.txt, SEQUENCE/gt.txt or SEQUENCE.txt; of images right in ROOT gt/gt.txt or
+/// gt.txt. labels.txt beside it names the classes, and then edges count from 0; the columns tell
+/// VisDrone's tables. Notes tell which these are, and which sequences have the same labels. Frame 1
+/// is the image numbered 1, or the first where images are numbered from 0 (which a note tells), or
+/// a video's frame 0. Images without numbers are counted in their order, and must be all of the
 /// sequence (seqLength, or the last frame with labels), else InputError. seqinfo.ini beside it, or
 /// above its folder gt, gives the sequence's rate and the images' size. The label_key is
 /// "GT_FILE#FRAME", GT_FILE below `path`.
@@ -168,13 +170,14 @@ extern const LabelReader kCocoReader;
 /// A line is "class xc yc w h", shares of the image's width and height from its left and upper
 /// edge; with kpt_shape [J, 2 or 3] "class xc yc w h" and J times "px py [v]", v as COCO's; a joint
 /// at 0, 0 without v is not annotated. Joints are named by data.yaml's kpt_names, by COCO's names
-/// if there are 17, else "0", "1", ... Outlines (segmentation) are refused.
+/// if there are 17, else "0", "1", ... An outline (segmentation) is the box around it.
 extern const LabelReader kYoloReader;
 
 /// Pascal VOC's XML files (parse_voc_labels): found as YOLO's texts are, with the last folder
 /// "JPEGImages" or "images" replaced by "Annotations". All are read at opening, since classes are
 /// numbered by their names' order, as with MOT's and tables' labels; an image without boxes has a
-/// file without <object>.
+/// file without <object>. Edges count from LabelSpec::edges_from; else from 0 where a box of the
+/// source begins there, as none of VOC's own can, and from 1 where none does. A note tells.
 extern const LabelReader kVocReader;
 
 /// A table (parse_csv_labels): `path` is the file; images are named as by COCO's file_name. The

@@ -1,8 +1,11 @@
 #include "stages/frames/own_labels/detail/voc_labels.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
 #include <pugixml.hpp>
 #include <string_view>
-#include <type_traits>
 #include <utility>
 
 #include "stages/frames/kitti/kitti_label.h"
@@ -31,26 +34,42 @@ std::string_view text_of(const pugi::xml_node& element) {
   throw BadLabel(std::string("expected text alone in <") + element.name() + ">, got more");
 }
 
-template <class Number>
-Number number(const pugi::xml_node& parent, const char* name, Number least, Number most) {
-  const std::string_view text = text_of(one(parent, name));
-  const auto value = parse_number<Number>(text);
-  if (value && *value >= least && *value <= most) return *value;
-  throw BadLabel(std::string("expected a ") + (std::is_integral_v<Number> ? "whole " : "") +
-                 "number of pixels for <" + name + ">, got " + in_quotes(text));
-}
-
 double pixel(const pugi::xml_node& box, const char* name) {
-  return number(box, name, -kFarthest_px, kFarthest_px);
+  const std::string_view text = text_of(one(box, name));
+  const auto value = parse_number<double>(text);
+  if (value && std::abs(*value) <= kFarthest_px) return *value;
+  throw BadLabel(std::string("expected a number of pixels for <") + name + ">, got " +
+                 in_quotes(text));
 }
 
-/// 0 or 1; -1 if it is not there.
-int flag(const pugi::xml_node& object, const char* name) {
+/// What <size> says; nothing, as some programs write it, where it is absent, empty or 0.
+std::optional<ImageSize> size_of(const pugi::xml_node& annotation) {
+  const pugi::xml_node size = at_most_one(annotation, "size");
+  const auto side = [&](const char* name) {
+    const pugi::xml_node element = at_most_one(size, name);
+    const std::string_view text = element ? text_of(element) : "0";
+    const auto pixels = text.empty() ? 0 : parse_whole(text);
+    if (pixels && *pixels >= 0 && *pixels <= static_cast<std::int64_t>(kFarthest_px)) {
+      return static_cast<int>(*pixels);
+    }
+    throw BadLabel(std::string("expected a whole number of pixels for <") + name + ">, got " +
+                   in_quotes(text));
+  };
+  const ImageSize said{side("height"), side("width")};
+  return said.height > 0 && said.width > 0 ? std::optional(said) : std::nullopt;
+}
+
+/// A share 0..1; -1 if it is not there, or is something else, which is a remark.
+double flag(const pugi::xml_node& object, const char* name, ImageLabels& labels) {
   const pugi::xml_node element = at_most_one(object, name);
   if (!element) return -1;
   const std::string_view text = text_of(element);
-  if (text == "0" || text == "1") return text == "1" ? 1 : 0;
-  throw BadLabel(std::string("expected 0 or 1 for <") + name + ">, got " + in_quotes(text));
+  if (text == "true" || text == "True") return 1;
+  if (text == "false" || text == "False") return 0;
+  const auto share = parse_number<double>(text);
+  if (share && *share >= 0 && *share <= 1) return *share;
+  labels.remarks.push_back(std::string("<") + name + "> that is no 0 or 1 taken for unknown");
+  return -1;
 }
 
 /// pugixml leaves an entity that it does not know as it is.
@@ -66,30 +85,17 @@ std::string class_name(const pugi::xml_node& object) {
                  in_quotes(name));
 }
 
-Rectangle rectangle(const pugi::xml_node& object, ImageSize size) {
-  const pugi::xml_node box = one(object, "bndbox");
-  const double xmin = pixel(box, "xmin");
-  const double ymin = pixel(box, "ymin");
-  const double xmax = pixel(box, "xmax");
-  const double ymax = pixel(box, "ymax");
-  if (xmin >= 1 && ymin >= 1 && xmax >= xmin && ymax >= ymin && xmax <= size.width &&
-      ymax <= size.height) {
-    return {xmin - 1, ymin - 1, xmax, ymax};
-  }
-  const auto written = [&](const char* name) { return std::string(box.child_value(name)); };
-  throw BadLabel("expected a box from 1, 1 to " + std::to_string(size.width) + ", " +
-                 std::to_string(size.height) + ", as VOC counts, got " + written("xmin") + ", " +
-                 written("ymin") + " to " + written("xmax") + ", " + written("ymax"));
-}
-
-NamedBox read_object(const pugi::xml_node& object, ImageSize size) {
+void read_object(const pugi::xml_node& object, int edges_from, ImageLabels& labels) {
   NamedBox read;
   read.class_name = class_name(object);
-  read.box.xyxy = rectangle(object, size);
-  read.box.ignore = flag(object, "difficult") == 1;
-  read.box.truncation = static_cast<float>(flag(object, "truncated"));
-  read.box.occlusion = flag(object, "occluded");
-  return read;
+  const pugi::xml_node box = one(object, "bndbox");
+  read.box.xyxy = {pixel(box, "xmin") - edges_from, pixel(box, "ymin") - edges_from,
+                   pixel(box, "xmax"), pixel(box, "ymax")};
+  read.box.ignore = flag(object, "difficult", labels) == 1;
+  read.box.truncation = static_cast<float>(flag(object, "truncated", labels));
+  const double occluded = flag(object, "occluded", labels);
+  read.box.occlusion = occluded == 0 || occluded == 1 ? static_cast<int>(occluded) : -1;
+  labels.boxes.push_back(std::move(read));
 }
 
 /// The document's element <annotation>, if it is a document of that and nothing before it.
@@ -105,24 +111,22 @@ pugi::xml_node annotation_of(const pugi::xml_document& document) {
 }
 
 /// `place` becomes that of the object where a fault of one is thrown.
-ImageLabels read_annotation(const pugi::xml_document& document, std::string& place) {
+ImageLabels read_annotation(const pugi::xml_document& document, int edges_from,
+                            std::string& place) {
   const pugi::xml_node annotation = annotation_of(document);
   ImageLabels labels;
-  constexpr int kMostSide = static_cast<int>(kFarthest_px);
-  const pugi::xml_node size = one(annotation, "size");
-  const int width = number(size, "width", 1, kMostSide);
-  labels.size = ImageSize{number(size, "height", 1, kMostSide), width};
+  labels.size = size_of(annotation);
   const std::string file = place;
   for (const pugi::xml_node& object : annotation.children("object")) {
     place = file + " (object " + std::to_string(labels.boxes.size() + 1) + ")";
-    labels.boxes.push_back(read_object(object, *labels.size));
+    read_object(object, edges_from, labels);
   }
   return labels;
 }
 
 }  // namespace
 
-Outcome<ImageLabels> parse_voc_labels(std::string xml, const std::string& path) {
+Outcome<ImageLabels> parse_voc_labels(std::string xml, int edges_from, const std::string& path) {
   std::string place = path;
   try {
     // A shard's text ends there.
@@ -132,7 +136,7 @@ Outcome<ImageLabels> parse_voc_labels(std::string xml, const std::string& path) 
         document.load_buffer(xml.data(), xml.size(),
                              pugi::parse_default | pugi::parse_doctype | pugi::parse_trim_pcdata);
     if (!result) throw BadLabel("expected XML, got '" + std::string(result.description()) + "'");
-    ImageLabels labels = read_annotation(document, place);
+    ImageLabels labels = read_annotation(document, edges_from, place);
     labels.original = std::move(xml);
     return labels;
   } catch (const BadLabel& bad) {
@@ -149,14 +153,30 @@ class VocLabels : public FilePerImage {
   VocLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
       : FilePerImage(spec, base, std::move(labelled), kVocFiles) {
     ClassList classes;
+    Remarks remarks;
+    std::string at_0;  // a file with an edge there
+    bool has_boxes = false;
     for (const FrameLabel& label : labels()) {
-      if (!label.key.empty()) classes.add(read(label.key));
+      if (label.key.empty()) continue;
+      const Outcome<ImageLabels> read = read_file(label.key);
+      classes.add(read);
+      if (is_fault(read)) continue;
+      remarks.add(*read, label_place(label.key));
+      has_boxes = has_boxes || !read->boxes.empty();
+      const auto is_at_0 = [](const NamedBox& box) {
+        const auto [left, top, right, bottom] = box.box.xyxy;
+        return (left >= 0 && left < 1) || (top >= 0 && top < 1);
+      };
+      if (at_0.empty() && std::ranges::any_of(read->boxes, is_at_0)) at_0 = label_place(label.key);
     }
     schema_.class_names = classes.names();
+    edges_from_ = spec.edges_from.value_or(at_0.empty() ? 1 : 0);
+    if (has_boxes && !spec.edges_from) note_edges(at_0);
+    remarks.move_to(notes_);
   }
 
   Outcome<Annotation> annotation(const std::string& label_key) const override {
-    Outcome<ImageLabels> labels = read(label_key);
+    Outcome<ImageLabels> labels = read_file(label_key);
     if (is_fault(labels)) return labels.fault();
     auto& read = *labels;
     Outcome<ImageSize> size = image_size(label_key, read.size);
@@ -165,11 +185,26 @@ class VocLabels : public FilePerImage {
   }
 
  private:
-  Outcome<ImageLabels> read(const std::string& label_key) const {
+  Outcome<ImageLabels> read_file(const std::string& label_key) const {
     Outcome<std::string> text = root().read(label_key);
     if (is_fault(text)) return text.fault();
-    return parse_voc_labels(*std::move(text), label_place(label_key));
+    return parse_voc_labels(*std::move(text), edges_from_, label_place(label_key));
   }
+
+  /// A pixel is not much, and nobody would find out otherwise.
+  void note_edges(const std::string& at_0) {
+    const std::string begin =
+        "edges count from " + std::to_string(edges_from_) + " in " + root().written("");
+    notes_.push_back(
+        at_0.empty()
+            ? begin +
+                  ", as Pascal VOC's do, since none is at 0 (CVAT's, VoTT's and Roboflow's "
+                  "count from 0: \"edges_from\": 0 in the manifest's labels)"
+            : begin + ", since one is at 0 in " + at_0 +
+                  " (if that is a slip: \"edges_from\": 1 in the manifest's labels)");
+  }
+
+  int edges_from_ = 0;  ///< until all files are read: edges as they are written
 };
 
 std::optional<std::filesystem::path> find_voc(const FoundFrames& frames,

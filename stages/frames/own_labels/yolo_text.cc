@@ -150,29 +150,27 @@ class YoloLine {
   YoloLine(const std::vector<std::string_view>& columns, const YoloSchema& schema, ImageSize image)
       : columns_(columns), schema_(schema), image_(image) {}
 
-  void read(Annotation& annotation) {
+  /// `place` is the line's.
+  void read(const std::string& place, Annotation& annotation) {
     const std::size_t joints = schema_.names.joint_names.size();
     const std::size_t numbers = schema_.has_visibility ? 3 : 2;
     const std::size_t expected = 5 + joints * numbers;
-    if (columns_.size() != expected) {
+    const bool is_outline = joints == 0 && columns_.size() >= 7 && columns_.size() % 2 == 1;
+    if (columns_.size() != expected && !is_outline) {
       throw BadLabel("expected " + std::to_string(expected) + " columns, got " +
-                     std::to_string(columns_.size()) + surplus(joints));
+                     std::to_string(columns_.size()));
     }
     Box box;
-    const auto number = parse_number<int>(columns_[0]);
-    const auto classes = static_cast<int>(schema_.names.class_names.size());
+    const auto number = parse_whole(columns_[0]);
+    const std::int64_t classes = std::ssize(schema_.names.class_names);
     if (!number || *number < 0 || *number >= classes) {
-      throw BadLabel("expected a class 0.." + std::to_string(classes - 1) + ", got " +
+      throw BadLabel("expected a class 0.." + std::to_string(classes - 1) + ", since there " +
+                     (classes == 1 ? "is " : "are ") + count_text(classes, "name") + ", got " +
                      in_quotes(columns_[0]));
     }
-    box.class_id = *number;
-    const double x = share(1) * image_.width, y = share(2) * image_.height;
-    const double half_width = share(3) * image_.width / 2;
-    const double half_height = share(4) * image_.height / 2;
-    box.xyxy = {x - half_width, y - half_height, x + half_width, y + half_height};
-    if (!overlaps(box.xyxy, image_)) throw BadLabel(outside_text(box.xyxy, image_));
-    annotation.boxes.push_back(box);
-    if (joints == 0) return;
+    box.class_id = static_cast<int>(*number);
+    box.xyxy = is_outline ? around_outline() : centred();
+    if (!add_box(box, image_, place, annotation) || joints == 0) return;
     Person person;
     person.box = box.xyxy;
     bool any = false;
@@ -184,10 +182,23 @@ class YoloLine {
   }
 
  private:
-  /// What the columns may be in place of a box's.
-  std::string surplus(std::size_t joints) const {
-    const bool is_outline = joints == 0 && columns_.size() >= 7 && columns_.size() % 2 == 1;
-    return is_outline ? " (an outline, which is not read, or joints without kpt_shape)" : "";
+  Rectangle centred() const {
+    const double x = share(1) * image_.width, y = share(2) * image_.height;
+    const double half_width = share(3) * image_.width / 2;
+    const double half_height = share(4) * image_.height / 2;
+    return {x - half_width, y - half_height, x + half_width, y + half_height};
+  }
+
+  /// The upright rectangle around an outline, whose points are behind the class.
+  Rectangle around_outline() const {
+    double left = share(1), top = share(2), right = left, bottom = top;
+    for (std::size_t i = 3; i < columns_.size(); i += 2) {
+      left = std::min(left, share(i));
+      top = std::min(top, share(i + 1));
+      right = std::max(right, share(i));
+      bottom = std::max(bottom, share(i + 1));
+    }
+    return {left * image_.width, top * image_.height, right * image_.width, bottom * image_.height};
   }
 
   double number_at(std::size_t column) const {
@@ -199,9 +210,9 @@ class YoloLine {
   }
 
   double share(std::size_t column) const {
-    constexpr double kRounding = 1e-6;
+    constexpr double kTolerance = 0.01;  // as Ultralytics has it
     const double number = number_at(column);
-    if (number >= -kRounding && number <= 1 + kRounding) return number;
+    if (number >= -kTolerance && number <= 1 + kTolerance) return number;
     throw BadLabel("expected a share 0..1, got " + in_quotes(columns_[column]));
   }
 
@@ -219,8 +230,9 @@ class YoloLine {
     } else if (number_at(column) == 0 && number_at(column + 1) == 0) {
       return missing;
     }
-    return {{share(column) * image_.width - kHalf, share(column + 1) * image_.height - kHalf},
-            visible};
+    const double x = std::clamp(share(column), 0.0, 1.0);
+    const double y = std::clamp(share(column + 1), 0.0, 1.0);
+    return {{x * image_.width - kHalf, y * image_.height - kHalf}, visible};
   }
 
   const std::vector<std::string_view>& columns_;
@@ -265,10 +277,11 @@ Outcome<Annotation> parse_yolo_text(std::string text, const YoloSchema& schema, 
   for (const TextLine& line : split_lines(text)) {
     const auto columns = split_columns(line.bytes);
     if (columns.empty()) continue;
+    const std::string place = place_in_file(path, line.number);
     try {
-      YoloLine(columns, schema, image).read(annotation);
+      YoloLine(columns, schema, image).read(place, annotation);
     } catch (const BadLabel& bad) {
-      return bad.in(place_in_file(path, line.number));
+      return bad.in(place);
     }
   }
   annotation.original = std::move(text);

@@ -106,12 +106,13 @@ NumberedSequence number(const Images& images) {
 
 ImageFolder list_image_folder(const fs::path& folder) {
   const auto is_hidden = [](const std::string& name) { return name.starts_with('.'); };
-  auto [folders, files] = list_folder(folder);
+  auto [folders, files, unnameable] = list_folder(folder);
   std::erase_if(folders, is_hidden);
   std::erase_if(files, is_hidden);
 
   ImageFolder listed;
   listed.folders = std::move(folders);
+  listed.left_out = std::move(unnameable);
   Images images(natural_less);
   for (const fs::path name : files) {
     const std::size_t rank = extension_rank(name);

@@ -27,7 +27,8 @@ struct ImageFolder {
   /// only in the extension's letters, the first by name counts.
   std::map<std::string, std::string> sidecars;
   std::vector<std::string> folders;  ///< names of the folders in it, sorted
-  /// Other files, and images and .json files that give way to another of their name; sorted.
+  /// Other files, images and .json files that give way to another of their name, and what no plan
+  /// can name (FolderListing::unnameable); sorted.
   std::vector<std::string> left_out;
 };
 

@@ -88,7 +88,7 @@ TEST(JobManifest, HoldsEveryValueGiven) {
       {"dataset": "human36m", "root": "g", "layout": "official", "every": 5,
        "pairs": {"gaps": [2]}},
       {"dataset": "frames", "root": "h", "frames_per_second": 29.97,
-       "labels": {"format": "voc", "path": "i"}, "pairs": {"gaps": [2]}}],
+       "labels": {"format": "voc", "path": "i", "edges_from": 0}, "pairs": {"gaps": [2]}}],
     "image": {"width": 861, "height": 260, "fit": "crop", "grey": "after_resize", "blur": 5},
     "generator": {"weights": "untrained:8", "engine": "onednn", "device": "cuda",
                   "precision": "int8",
@@ -120,6 +120,7 @@ TEST(JobManifest, HoldsEveryValueGiven) {
   ASSERT_TRUE(manifest.sources[3].labels);
   EXPECT_EQ(manifest.sources[3].labels->format, LabelFormat::kVoc);
   EXPECT_EQ(manifest.sources[3].labels->path, "i");
+  EXPECT_EQ(manifest.sources[3].labels->edges_from, 0);
   EXPECT_EQ(manifest.image.size, (ImageSize{.height = 260, .width = 861}));
   EXPECT_EQ(manifest.image.fit, ImageFit::kCrop);
   EXPECT_EQ(manifest.image.preset, "");

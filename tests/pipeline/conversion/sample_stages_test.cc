@@ -565,6 +565,18 @@ TEST_F(SampleStagesTest, ALabelOutsideTheImageIsAFault) {
   EXPECT_THAT(message.sample.fault, ::testing::HasSubstr("in clip/1.txt"));
 }
 
+TEST_F(SampleStagesTest, ABoxLeftOutIsAFaultOnlyWhereThePolicyIsFail) {
+  Annotation annotation;
+  annotation.left_out = {"expected a box within the image, got another, in clip/1.txt:2"};
+  dataset_->set_annotation(1, annotation);
+  SampleMessage message = run();
+  EXPECT_FALSE(message.failed()) << message.sample.fault;
+  EXPECT_EQ(message.sample.annotation.left_out, annotation.left_out);
+  manifest_.errors.policy = ErrorPolicy::kFail;
+  message = run();
+  EXPECT_EQ(message.sample.fault, annotation.left_out[0] + " (0001)");
+}
+
 TEST_F(SampleStagesTest, AVolumeThatIsNotFiniteIsAFaultThatNamesTheFrames) {
   generator_.fail_on((51 / 255.0f - 0.5f) * 2);
   const SampleMessage message = run();

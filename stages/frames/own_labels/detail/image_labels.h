@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
@@ -37,6 +38,23 @@ struct ImageLabels {
   std::string original;           ///< the file's bytes about it, unchanged
   std::vector<NamedBox> boxes;    ///< pixels of the image, edges (manifests/values/labels.h)
   std::optional<ImageSize> size;  ///< of the image, where the file tells it
+  /// What is in it that the format does not have, and how it was taken, for Remarks.
+  std::vector<std::string> remarks = {};
+};
+
+/// The remarks on many images, each once.
+class Remarks {
+ public:
+  void add(const ImageLabels& labels, const std::string& place);
+  /// "REMARK: 3 times, first in PATH".
+  void move_to(std::vector<std::string>& notes);
+
+ private:
+  struct Found {
+    std::int64_t times = 0;
+    std::string first;
+  };
+  std::map<std::string, Found> found_;
 };
 
 /// The names of all classes, in the order of their names.
@@ -66,6 +84,12 @@ class ReadLabels : public OwnLabels {
 
   std::map<std::string, Outcome<ImageLabels>> by_key_;
 };
+
+/// Adds a box of an image of that size to the image's annotation, and returns true, if it has an
+/// area and some of it lies within the image: detectors' losses cannot take another. Else the
+/// reason goes to Annotation::left_out, so that one bad box does not lose the image's others.
+/// `place` is where the box stands, for the reason.
+bool add_box(const Box& box, ImageSize image, const std::string& place, Annotation& annotation);
 
 /// Whether some of the box is within the image.
 bool overlaps(const Rectangle& box, ImageSize image);

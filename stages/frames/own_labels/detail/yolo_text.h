@@ -23,9 +23,11 @@ YoloSchema parse_yolo_yaml(const std::string& text, const std::string& path);
 /// classes.txt: a name a line. Throws InputError if there is none, one is empty or there twice.
 YoloSchema parse_yolo_classes(std::string_view text, const std::string& path);
 
-/// An image's text (open_yolo_labels): its boxes, and with joints its persons, in pixels of an
-/// image of that size; `original` is the text. A fault names `path` and the line: another number of
-/// columns, a class beyond the names, a share that is not within 0..1 by more than 1e-6.
+/// An image's text (kYoloReader): its boxes, and with joints its persons, in pixels of an image of
+/// that size; `original` is the text. An outline among boxes (class and at least three points, of a
+/// dataset without joints) is the box around it. A fault names `path` and the line: another number
+/// of columns, a class beyond the names, a share beyond 0..1 by more than 0.01; by less a box
+/// reaches beyond the image, and a joint is moved to its edge.
 Outcome<Annotation> parse_yolo_text(std::string text, const YoloSchema& schema, ImageSize image,
                                     const std::string& path);
 

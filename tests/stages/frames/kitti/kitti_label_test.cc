@@ -34,6 +34,16 @@ TEST(SplitLines, KeepsEveryByte) {
   EXPECT_THAT(bytes_of("a\r\n\n\nb"), ElementsAre("a\r\n", "\n", "\n", "b"));
 }
 
+TEST(SplitLines, ByteOrderMarksAreNoPartOfThem) {
+  const auto lines = split_lines(
+      "\xEF\xBB\xBF"
+      "a\n\xEF\xBB\xBF");
+  ASSERT_EQ(lines.size(), 2u);
+  EXPECT_EQ(lines[0].bytes, "a\n");
+  EXPECT_EQ(lines[1].bytes, "\xEF\xBB\xBF");
+  EXPECT_TRUE(split_lines("\xEF\xBB\xBF").empty());
+}
+
 TEST(SplitColumns, SeparatesAtSpacesTabsAndLineEnds) {
   EXPECT_THAT(split_columns("  a\tb   c \r\n"), ElementsAre("a", "b", "c"));
   EXPECT_THAT(split_columns("a"), ElementsAre("a"));
@@ -56,6 +66,18 @@ TEST(ParseNumber, TakesTheWholeTokenOnly) {
 TEST(ParseNumber, RefusesWhatAFloatCannotHold) {
   EXPECT_FALSE(parse_number<float>("1e300"));
   EXPECT_TRUE(parse_number<double>("1e300"));
+}
+
+TEST(ParseWhole, TakesTheDecimalsThatToolsWrite) {
+  for (const char* token : {"2", "2.0", "2.", "2e0", "0.2e1", "02.000"}) {
+    EXPECT_EQ(parse_whole(token), 2) << token;
+  }
+  EXPECT_EQ(parse_whole("-1.0"), -1);
+  EXPECT_EQ(parse_whole("9223372036854775807"), 9223372036854775807);
+  EXPECT_EQ(parse_whole("9007199254740992.0"), 9007199254740992);
+  for (const char* token : {"", "2.5", "2,0", "2.0x", " 2", "nan", "inf", "1e16", "1e400"}) {
+    EXPECT_FALSE(parse_whole(token)) << token;
+  }
 }
 
 TEST(ParseNumber, WhatIsTooSmallIsZero) {
@@ -169,6 +191,12 @@ TEST(KittiLabel, KeepsTheTextByteForByte) {
   }
 }
 
+TEST(KittiLabel, AByteOrderMarkIsPassedOver) {
+  const std::string line = "Car 0 0 -10 1 2 3 4 -1 -1 -1 -1000 -1000 -1000 -10\n";
+  EXPECT_EQ(parsed("\xEF\xBB\xBF" + line).boxes, parsed(line).boxes);
+  EXPECT_EQ(parsed("\xEF\xBB\xBF" + line).original, "\xEF\xBB\xBF" + line);
+}
+
 TEST(KittiLabel, AnEmptyFileHasNoObjects) { EXPECT_TRUE(parsed("").boxes.empty()); }
 
 TEST(KittiLabel, TakesAScoreAndLeavesItOut) {
@@ -244,6 +272,10 @@ TEST(KittiLabel, OccludedMustBeAWholeNumber) {
   EXPECT_EQ(fault(car_with(2, "1.5")),
             "expected a whole number from 0 to 3, or -1 for occluded, got '1.5', in "
             "label_2/000008.txt:1");
+}
+
+TEST(KittiLabel, AWholeNumberMayHaveDecimals) {
+  EXPECT_EQ(parsed(car_with(2, "2.0")).boxes, parsed(car_with(2, "2")).boxes);
 }
 
 TEST(KittiLabel, ReadsTheOriginalLabels) {

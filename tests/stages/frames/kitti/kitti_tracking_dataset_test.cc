@@ -103,6 +103,12 @@ TEST(TrackingLabels, AMalformedLineIsAFaultOfItsFrameOnly) {
             "expected a whole number for track id, got 'x', in label_02/0001.txt:3");
 }
 
+TEST(TrackingLabels, WholeNumbersMayHaveDecimals) {
+  const TrackingLabels labels("\xEF\xBB\xBF" + line("4.0", "3.0", "Car"), "l.txt");
+  EXPECT_THAT(labels.frames(), ::testing::ElementsAre(4));
+  EXPECT_EQ(labels.annotation(4)->boxes.at(0).track_id, 3);
+}
+
 TEST(TrackingLabels, ALineOfAnUnknownFrameIsAFaultOfAll) {
   for (const char* number : {"x", "-1", "1.5", "1000000000"}) {
     const TrackingLabels labels(line("0", "0", "Car") + line(number, "0", "Car"), "l.txt");

@@ -100,6 +100,84 @@ TEST_F(NamedLabels, ClassesAreNumberedByName) {
   EXPECT_THAT(read(*dataset, "a.xml").original, HasSubstr("got \"eel\", in x/a.xml"));
 }
 
+/// VOC's file of a cat with these edges.
+std::string cat(const std::string& xmin, const std::string& ymin, const std::string& xmax,
+                const std::string& more = "") {
+  return "<annotation><object><name>cat</name><bndbox><xmin>" + xmin + "</xmin><ymin>" + ymin +
+         "</ymin><xmax>" + xmax + "</xmax><ymax>20</ymax></bndbox>" + more +
+         "</object></annotation>";
+}
+
+TEST_F(NamedLabels, OneEdgeAt0TellsThatVocsCountFrom0) {
+  const struct {
+    const char *first, *second;
+    std::optional<int> edges_from;
+    double left;
+    const char* note;
+  } cases[] = {
+      {"10", "5", {}, 9, "edges count from 1 in x, as Pascal VOC's do, since none is at 0"},
+      {"10", "0", {}, 10, "edges count from 0 in x, since one is at 0 in x/b.xml"},
+      {"10", "0.5", {}, 10, "edges count from 0 in x, since one is at 0 in x/b.xml"},
+      {"10", "-4", {}, 9, "edges count from 1 in x"},  // of a box that is cut off
+      {"10", "0", 1, 9, nullptr},
+      {"10", "5", 0, 10, nullptr},
+  };
+  image("i/a.png");
+  image("i/b.png");
+  for (const auto& one : cases) {
+    text("x/a.xml", cat(one.first, "7", "40"));
+    text("x/b.xml", cat("3", one.second, "40"));
+    SourceSpec spec;
+    spec.root = "i";
+    spec.labels = LabelSpec{LabelFormat::kVoc, "x", one.edges_from};
+    const auto dataset = open_frames_dataset(spec, folder_.path());
+    const double from = 10 - one.left;
+    EXPECT_EQ(read(*dataset, "a.xml").boxes.at(0).xyxy, (Rectangle{one.left, 7 - from, 40, 20}));
+    EXPECT_EQ(read(*dataset, "b.xml").boxes.at(0).xyxy,
+              (Rectangle{3 - from, std::stod(one.second) - from, 40, 20}));
+    if (one.note) {
+      EXPECT_THAT(dataset->notes(), ElementsAre(HasSubstr(one.note)));
+    } else {
+      EXPECT_THAT(dataset->notes(), IsEmpty());
+    }
+  }
+}
+
+TEST_F(NamedLabels, WhatVocHasBesideItsFormatIsANote) {
+  for (const char* name : {"a", "b", "c"}) image("i/" + std::string(name) + ".png");
+  const std::string mark = "<difficult>Unspecified</difficult>";
+  text("x/a.xml", cat("5", "5", "9", mark));
+  text("x/b.xml", cat("5", "5", "9", mark));
+  text("x/c.xml", cat("50", "5", "60", mark + "<truncated>0.25</truncated>"));
+  const auto dataset = open(LabelFormat::kVoc, "i", "x");
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre(HasSubstr("edges count from 1"),
+                          "<difficult> that is no 0 or 1 taken for unknown: 3 times, first in "
+                          "x/a.xml"));
+  EXPECT_THAT(read(*dataset, "c.xml").boxes, IsEmpty());
+  EXPECT_THAT(read(*dataset, "c.xml").left_out,
+              ElementsAre("expected a box within the image of 40x30, got one from (49, 4) to (60, "
+                          "20), in x/c.xml"));
+}
+
+TEST_F(NamedLabels, NamesThatNoPlanCanHaveAreLeftOut) {
+  image("i/a.png");
+  image(
+      "i/stra\xdf"
+      "e.png");
+  text("x/a.xml", cat("5", "5", "9"));
+  text(
+      "x/stra\xdf"
+      "e.xml",
+      cat("5", "5", "9"));
+  text("x/._a.xml", "Mac OS X");
+  const auto dataset = open(LabelFormat::kVoc, "i", "x");
+  ASSERT_EQ(dataset->labelled_frames().size(), 1u);
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("x/a.xml"));
+  EXPECT_THAT(dataset->notes(),
+              ::testing::Contains("1 file left out in i: stra\\xdfe.png (no UTF-8)"));
+}
+
 constexpr const char* kInfo =
     "[Sequence]\nname=s\nimDir=img1\nframeRate=25\nseqLength=3\nimWidth=40\nimHeight=30\n"
     "imExt=.png\n";
@@ -133,9 +211,11 @@ TEST_F(NamedLabels, MotLiesInTheSequence) {
   EXPECT_EQ(annotation.boxes[1].class_id, 1);
   EXPECT_TRUE(annotation.boxes[1].ignore);
   EXPECT_EQ(annotation.original, "2,5,1,1,10,10,1,3,1\n2,6,1,1,5,5,0,1,1\n");
-  EXPECT_EQ(read(*dataset, frames[1].label_key).original,
-            "expected a box within the image of 40x30, got one from (99, 0) to (104, 5), in "
-            "m/s/gt/gt.txt#3");
+  const Annotation outside = read(*dataset, frames[1].label_key);
+  EXPECT_THAT(outside.boxes, IsEmpty());
+  EXPECT_THAT(outside.left_out,
+              ElementsAre("expected a box within the image of 40x30, got one from "
+                          "(99, 0) to (104, 5), in m/s/gt/gt.txt#3"));
   EXPECT_EQ(frames[2].sample_id, "s/000009");
   EXPECT_EQ(dataset->paired_frame(frames[2], 0).state, PairedFrame::State::kMissing);
   EXPECT_EQ(dataset->paired_frame(frames[2], 0).frame.path, "m/s/img1/000009.png");
@@ -217,6 +297,60 @@ TEST_F(NamedLabels, MotOfImagesWithoutNumbersNeedsAllOfThem) {
               ::testing::Contains("1 sequence of labels without images left out in n: gone"));
 }
 
+TEST_F(NamedLabels, MotsTablesOfOtherProgramsAreToldOf) {
+  for (const char* name : {"s", "t", "u"}) image("m/" + std::string(name) + "/img1/000001.png");
+  text("m/s/gt/gt.txt", "1,1,10,5,20,10,1,2,1\n1,-1,1,1,5,5,-1,1,1\n");
+  text("m/s/gt/labels.txt",
+       "\xEF\xBB\xBF"
+       "tram\ndog\n");
+  text("m/t.txt", "1,0,11,6,20,10,1,4,0,1\n");
+  text("m/u/gt/gt.txt", "1,1,11,6,20,10,1,3,1\n");
+  const auto dataset = open(LabelFormat::kMot, "m", "m");
+  EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("car", "dog", "tram"));
+  EXPECT_THAT(dataset->annotation_files(),
+              ElementsAre("m/s/gt/gt.txt", "m/s/gt/labels.txt", "m/t.txt", "m/u/gt/gt.txt"));
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("1 file with the classes of labels.txt, with edges from 0 as CVAT writes "
+                          "them (or as \"edges_from\" in the manifest's labels says): "
+                          "m/s/gt/gt.txt",
+                          "1 file with VisDrone's classes in column 8: m/t.txt",
+                          "conf -1 taken for 1: 1 time, first in m/s/gt/gt.txt#1",
+                          "id -1 taken for none: 1 time, first in m/s/gt/gt.txt#1"));
+  for (const char* key : {"s/gt/gt.txt#1", "t.txt#1", "u/gt/gt.txt#1"}) {
+    const Annotation annotation = read(*dataset, key);
+    ASSERT_FALSE(annotation.boxes.empty()) << annotation.original;
+    EXPECT_EQ(annotation.boxes[0].xyxy, (Rectangle{10, 5, 30, 15})) << key;
+  }
+  SourceSpec spec;
+  spec.root = "m";
+  spec.labels = LabelSpec{LabelFormat::kMot, "m", 1};
+  const auto from_1 = open_frames_dataset(spec, folder_.path());
+  EXPECT_EQ(read(*from_1, "s/gt/gt.txt#1").boxes.at(0).xyxy, (Rectangle{9, 4, 29, 14}));
+}
+
+TEST_F(NamedLabels, CopiesOfASequenceAreToldOf) {
+  for (const char* name : {"M-02-DPM", "M-02-SDP", "M-04-DPM"}) {
+    image("m/" + std::string(name) + "/img1/000001.png");
+  }
+  text("m/M-02-DPM/gt/gt.txt", "1,1,1,1,5,5,1,1,1\n");
+  text("m/M-02-SDP/gt/gt.txt", "1,1,1,1,5,5,1,1,1\n");
+  text("m/M-04-DPM/gt/gt.txt", "1,1,2,1,5,5,1,1,1\n");
+  EXPECT_THAT(open(LabelFormat::kMot, "m", "m")->notes(),
+              ElementsAre(HasSubstr("M-02-SDP (of M-02-DPM) (MOT17 has each three times")));
+  EXPECT_THAT(open(LabelFormat::kMot, "m", "m")->notes().at(0),
+              HasSubstr("1 sequence with the labels of another: "));
+}
+
+TEST_F(NamedLabels, MotsLengthAloneIsEnough) {
+  for (const char* name : {"1", "2"}) image("m/s/img1/00000" + std::string(name) + ".png");
+  text("m/s/gt/gt.txt", "1.0,1.0,1,1,5,5,1\n");
+  text("m/s/seqinfo.ini", "[Sequence]\nname=s\nseqLength=2\n");
+  const auto dataset = open(LabelFormat::kMot, "m", "m");
+  ASSERT_EQ(dataset->labelled_frames().size(), 1u);
+  EXPECT_TRUE(std::isnan(dataset->labelled_frames()[0].frame.time_s));
+  EXPECT_EQ(read(*dataset, "s/gt/gt.txt#1").boxes.size(), 1u);
+}
+
 TEST_F(NamedLabels, ATableNamesItsImages) {
   image("i/a/1.png");
   image("i/a/2.png");
@@ -234,9 +368,9 @@ TEST_F(NamedLabels, ATableNamesItsImages) {
   EXPECT_EQ(read(*dataset, frames[0].label_key).boxes.at(0).class_id, 1);
   EXPECT_EQ(read(*dataset, frames[0].label_key).original, "a/1.png,cat,0,1,2,3\n");
   EXPECT_EQ(frames[1].sample_id, "b/2");
-  EXPECT_EQ(read(*dataset, frames[1].label_key).original,
-            "expected a box within the image of 40x30, got one from (41, 1) to (50, 3), in "
-            "t.csv#i/b/2.png");
+  EXPECT_THAT(read(*dataset, frames[1].label_key).left_out,
+              ElementsAre("expected a box within the image of 40x30, got one from (41, 1) to "
+                          "(50, 3), in t.csv#i/b/2.png"));
   EXPECT_EQ(frames[2].sample_id, "b/3");
   EXPECT_THAT(read(*dataset, frames[2].label_key).boxes, IsEmpty());
   EXPECT_EQ(frames[3].sample_id, "gone");
@@ -270,8 +404,8 @@ TEST_F(NamedLabels, OfVideosTheFrameNumberStandsForTheImage) {
   EXPECT_EQ(read(*dataset, (*frames)[1].label_key).boxes.at(0).class_id, 1);
   EXPECT_EQ((*frames)[2].sample_id, "clip/6") << "the video has no such frame";
   EXPECT_EQ(dataset->paired_frame((*frames)[2], 0).state, PairedFrame::State::kMissing);
-  EXPECT_THAT(read(*dataset, (*frames)[3].label_key).original,
-              HasSubstr("expected a box within the image of 64x48"));
+  EXPECT_THAT(read(*dataset, (*frames)[3].label_key).left_out,
+              ElementsAre(HasSubstr("expected a box within the image of 64x48")));
   EXPECT_THAT(dataset->notes(),
               ElementsAre("1 entry left out in v: other.json",
                           HasSubstr("no label for 6 of 9 frames in v/boxes.csv")));

@@ -12,6 +12,7 @@
 namespace eventgan {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
@@ -26,14 +27,14 @@ std::string annotation(const std::string& objects) {
 
 std::string object(const std::string& content) { return "<object>" + content + "</object>"; }
 
-ImageLabels read_voc(const std::string& xml) {
-  const auto outcome = parse_voc_labels(xml, "a.xml");
+ImageLabels read_voc(const std::string& xml, int edges_from = 1) {
+  const auto outcome = parse_voc_labels(xml, edges_from, "a.xml");
   EXPECT_FALSE(is_fault(outcome)) << outcome.fault().reason;
   return *outcome;
 }
 
-std::string voc_fault(const std::string& xml) {
-  const auto outcome = parse_voc_labels(xml, "a.xml");
+std::string voc_fault(const std::string& xml, int edges_from = 1) {
+  const auto outcome = parse_voc_labels(xml, edges_from, "a.xml");
   return is_fault(outcome) ? outcome.fault().reason : "no fault";
 }
 
@@ -109,18 +110,24 @@ TEST(VocLabels, FilesThatAreNotOneAreNamed) {
   EXPECT_EQ(voc_fault("\xff\xfe" + wide), "expected text, got a NUL in it, in a.xml");
 }
 
+std::string with_size(const std::string& size) { return "<annotation>" + size + "</annotation>"; }
+
 TEST(VocLabels, SizesAreOfAnImage) {
-  const auto with_size = [](const std::string& size) {
-    return voc_fault("<annotation>" + size + "</annotation>");
-  };
-  EXPECT_EQ(with_size(""), "expected <size>, got none, in a.xml");
-  EXPECT_EQ(with_size("<size/><size/>"), "expected <size> once, got it twice, in a.xml");
-  EXPECT_EQ(with_size("<size><width>5</width></size>"), "expected <height>, got none, in a.xml");
-  for (const char* width : {"0", "-5", "5.5", "", "nan", "1000001", "99999999999", "5<b/>"}) {
-    EXPECT_THAT(
-        with_size("<size><width>" + std::string(width) + "</width><height>5</height></size>"),
-        HasSubstr("<width>"))
-        << width;
+  EXPECT_EQ(read_voc(with_size("<size><width>640.0</width><height>48e1</height></size>")).size,
+            (ImageSize{480, 640}));
+  EXPECT_EQ(voc_fault(with_size("<size/><size/>")), "expected <size> once, got it twice, in a.xml");
+  for (const char* width : {"-5", "5.5", "nan", "1000001", "99999999999", "5<b/>"}) {
+    const std::string fault = voc_fault(
+        with_size("<size><width>" + std::string(width) + "</width><height>5</height></size>"));
+    EXPECT_THAT(fault, HasSubstr("<width>")) << width;
+  }
+}
+
+TEST(VocLabels, MayLeaveTheSizeToTheImage) {
+  for (const char* size :
+       {"", "<size/>", "<size><width>5</width></size>", "<size><width/><height>5</height></size>",
+        "<size><width>0</width><height>0</height><depth>3</depth></size>"}) {
+    EXPECT_EQ(read_voc(with_size(size)).size, std::nullopt) << size;
   }
 }
 
@@ -146,38 +153,44 @@ TEST(VocLabels, ObjectsAreNamedByTheirNumber) {
   EXPECT_EQ(second("<name>a<b/></name>" + std::string(kBox)),
             "expected text alone in <name>, got more");
   for (const char* flag : {"difficult", "truncated", "occluded"}) {
-    const auto with = [&](const std::string& value) {
-      return second("<name>a</name>" + std::string(kBox) + "<" + flag + ">" + value + "</" + flag +
-                    ">");
-    };
-    for (const char* value : {"2", "-1", "", "yes", "01"}) {
-      EXPECT_EQ(with(value),
-                std::string("expected 0 or 1 for <") + flag + ">, got '" + value + "'");
-    }
-    EXPECT_EQ(with(std::string("1</") + flag + "><" + flag + ">0"),
+    EXPECT_EQ(second("<name>a</name>" + std::string(kBox) + "<" + flag + ">1</" + flag + "><" +
+                     flag + ">0</" + flag + ">"),
               std::string("expected <") + flag + "> once, got it twice");
+  }
+  for (const char* number : {"nan", "inf", "-1e7", "1e999", "", "1 2", "0x5", "5,5"}) {
+    EXPECT_EQ(second("<name>a</name><bndbox><xmin>1</xmin><ymin>" + std::string(number) +
+                     "</ymin><xmax>9</xmax><ymax>9</ymax></bndbox>"),
+              "expected a number of pixels for <ymin>, got '" + std::string(number) + "'");
   }
 }
 
-TEST(VocLabels, BoxesLieInTheImage) {
-  const auto box = [](const char* xmin, const char* ymin, const char* xmax, const char* ymax) {
-    const std::string written = std::string("<xmin>") + xmin + "</xmin><ymin>" + ymin +
-                                "</ymin><xmax>" + xmax + "</xmax><ymax>" + ymax + "</ymax>";
-    return voc_fault(annotation(object("<name>a</name><bndbox>" + written + "</bndbox>")));
+TEST(VocLabels, MarksThatAreNoMarksAreUnknown) {
+  const auto marked = [](const std::string& marks) {
+    return read_voc(annotation(object("<name>a</name>" + std::string(kBox) + marks)));
   };
-  EXPECT_EQ(box("1", "1", "30", "20"), "no fault");
-  EXPECT_EQ(box("0", "1", "30", "20"),
-            "expected a box from 1, 1 to 30, 20, as VOC counts, got 0, 1 to 30, 20, in a.xml "
-            "(object 1)");
-  for (const auto& outside :
-       {box("1", "0.5", "30", "20"), box("1", "1", "31", "20"), box("1", "1", "30", "20.25"),
-        box("9", "1", "8.5", "20"), box("1", "9", "30", "8"), box("-5", "-5", "-1", "-1")}) {
-    EXPECT_THAT(outside, HasSubstr("expected a box from 1, 1 to 30, 20"));
+  const ImageLabels share = marked("<truncated>0.0625</truncated><difficult>True</difficult>");
+  EXPECT_EQ(share.boxes.at(0).box,
+            (Box{.xyxy = {0, 0, 30, 20}, .truncation = 0.0625f, .ignore = true}));
+  EXPECT_THAT(share.remarks, IsEmpty());
+  for (const char* value : {"2", "-1", "", "yes", "Unspecified", "nan"}) {
+    const std::string text = value;
+    const ImageLabels read =
+        marked("<difficult>" + text + "</difficult><truncated>" + text + "</truncated>");
+    EXPECT_EQ(read.boxes.at(0).box, (Box{.xyxy = {0, 0, 30, 20}})) << value;
+    EXPECT_THAT(read.remarks, ElementsAre("<difficult> that is no 0 or 1 taken for unknown",
+                                          "<truncated> that is no 0 or 1 taken for unknown"));
   }
-  for (const char* number : {"nan", "inf", "-1e7", "1e999", "", "1 2", "0x5", "5,5"}) {
-    EXPECT_THAT(box("1", number, "30", "20"),
-                HasSubstr("expected a number of pixels for <ymin>, got '" + std::string(number)));
-  }
+}
+
+TEST(VocLabels, EdgesCountFromWhereTheSetSays) {
+  const auto box = [](int edges_from, const std::string& edges) {
+    return read_voc(annotation(object("<name>a</name><bndbox>" + edges + "</bndbox>")), edges_from)
+        .boxes.at(0)
+        .box.xyxy;
+  };
+  const std::string edges = "<xmin>0</xmin><ymin>2.5</ymin><xmax>31</xmax><ymax>20</ymax>";
+  EXPECT_EQ(box(1, edges), (Rectangle{-1, 1.5, 31, 20}));  // beyond the image: as other labels are
+  EXPECT_EQ(box(0, edges), (Rectangle{0, 2.5, 31, 20}));
 }
 
 // The boxes lie beside the files in YOLO's form too, made of them by a program that took xmin for

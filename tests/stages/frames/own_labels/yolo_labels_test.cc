@@ -37,26 +37,83 @@ TEST(YoloText, ABoxIsCentreAndSizeAsShares) {
   EXPECT_EQ(annotation.boxes[1].xyxy, (Rectangle{-10, 15, 10, 45}));
   EXPECT_EQ(annotation.original, text);
   EXPECT_EQ(fault_of(""), "no fault");
-  EXPECT_EQ(fault_of("0 1.0000005 -0.0000005 0.5 0.5"), "no fault") << "rounding";
+}
+
+Annotation read_yolo(const std::string& text) {
+  const auto read = parse_yolo_text(text, classes(), kYoloImage, "a.txt");
+  EXPECT_FALSE(is_fault(read)) << read.fault().reason;
+  return *read;
+}
+
+// Of 40 x 30: 1.01 is 40.4 and 30.3, -0.01 is -0.4 and -0.3.
+TEST(YoloText, ASharesRoundingReachesBeyondTheImage) {
+  const Annotation annotation = read_yolo("0 0.5 0.5 1.01 0.5\n0 -0.01 1.01 0.5 0.5");
+  ASSERT_EQ(annotation.boxes.size(), 2u);
+  EXPECT_EQ(annotation.boxes[0].xyxy, (Rectangle{20 - 20.2, 7.5, 20 + 20.2, 22.5}));
+  EXPECT_EQ(annotation.boxes[1].xyxy, (Rectangle{-0.4 - 10, 30.3 - 7.5, -0.4 + 10, 30.3 + 7.5}));
+  EXPECT_EQ(fault_of("0 0.5 0.5 1.0101 0.5"), "expected a share 0..1, got '1.0101', in a.txt:1");
+  EXPECT_EQ(fault_of("0 -0.0101 0.5 1 0.5"), "expected a share 0..1, got '-0.0101', in a.txt:1");
+}
+
+TEST(YoloText, AnOutlineIsTheBoxAroundIt) {
+  const Annotation annotation =
+      read_yolo("1 0.25 0.3 0.5 0.2 0.125 0.4 0.2 0.4\n0 0.5 0.5 0.25 0.2\n0 0 0 1.005 0 1 1");
+  ASSERT_EQ(annotation.boxes.size(), 3u);
+  EXPECT_EQ(annotation.boxes[0].class_id, 1);
+  EXPECT_EQ(annotation.boxes[0].xyxy, (Rectangle{5, 6, 20, 12}));
+  EXPECT_EQ(annotation.boxes[1].xyxy, (Rectangle{15, 12, 25, 18}));
+  EXPECT_EQ(annotation.boxes[2].xyxy, (Rectangle{0, 0, 1.005 * 40, 30}));
+  EXPECT_EQ(fault_of("0 0.1 0.2 0.3 x 0.1 0.2"), "expected a number, got 'x', in a.txt:1");
+  EXPECT_EQ(fault_of("0 0.1 0.2 0.3 0.1 0.1 2"), "expected a share 0..1, got '2', in a.txt:1");
+  EXPECT_THAT(read_yolo("0 0.1 0.1 0.2 0.1 0.3 0.1").left_out,
+              ElementsAre(HasSubstr("expected a box of a width and height above 0, got 8 x 0")));
+}
+
+TEST(YoloText, ABadBoxDoesNotLoseTheOthers) {
+  const Annotation annotation =
+      read_yolo("0 0.5 0.5 0 0.1\n1 0.5 0.5 0.25 0.2\n0 1.01 0.5 0.01 0.5");
+  ASSERT_EQ(annotation.boxes.size(), 1u);
+  EXPECT_EQ(annotation.boxes[0].class_id, 1);
+  EXPECT_THAT(
+      annotation.left_out,
+      ElementsAre("expected a box of a width and height above 0, got 0 x 3, in a.txt:1",
+                  HasSubstr("expected a box within the image of 40x30, got one from (40.")));
+  EXPECT_THAT(annotation.left_out[1], ::testing::EndsWith(", in a.txt:3"));
+}
+
+TEST(YoloText, WhatProgramsPutAroundNumbersIsPassedOver) {
+  const std::string text =
+      "\xEF\xBB\xBF"
+      "1.0 0.5 0.5 0.25 0.2\n1e0 0.5 0.5 0.25 0.2\n";
+  const Annotation annotation = read_yolo(text);
+  ASSERT_EQ(annotation.boxes.size(), 2u);
+  EXPECT_EQ(annotation.boxes[0].class_id, 1);
+  EXPECT_EQ(annotation.boxes[1].class_id, 1);
+  EXPECT_EQ(annotation.original, text);
+  EXPECT_THAT(parse_yolo_classes("\xEF\xBB\xBF"
+                                 "car\n",
+                                 "c")
+                  .names.class_names,
+              ElementsAre("car"));
 }
 
 TEST(YoloText, AnythingElseIsAFaultOfItsLine) {
   EXPECT_EQ(fault_of("0 0.5 0.5 0.1 0.1\n2 0.5 0.5 0.1 0.1"),
-            "expected a class 0..1, got '2', in a.txt:2");
-  EXPECT_EQ(fault_of("-1 0.5 0.5 0.1 0.1"), "expected a class 0..1, got '-1', in a.txt:1");
-  EXPECT_EQ(fault_of("0.0 0.5 0.5 0.1 0.1"), "expected a class 0..1, got '0.0', in a.txt:1");
+            "expected a class 0..1, since there are 2 names, got '2', in a.txt:2");
+  EXPECT_EQ(fault_of("-1 0.5 0.5 0.1 0.1"),
+            "expected a class 0..1, since there are 2 names, got '-1', in a.txt:1");
+  EXPECT_EQ(fault_of("0.5 0.5 0.5 0.1 0.1"),
+            "expected a class 0..1, since there are 2 names, got '0.5', in a.txt:1");
+  EXPECT_EQ(fault_of("1e30 0.5 0.5 0.1 0.1"),
+            "expected a class 0..1, since there are 2 names, got '1e30', in a.txt:1");
   EXPECT_EQ(fault_of("0 1.1 0.5 0.1 0.1"), "expected a share 0..1, got '1.1', in a.txt:1");
   EXPECT_EQ(fault_of("0 0.5 0.5 -0.1 0.1"), "expected a share 0..1, got '-0.1', in a.txt:1");
   EXPECT_EQ(fault_of("0 nan 0.5 0.1 0.1"), "expected a number, got 'nan', in a.txt:1");
   EXPECT_EQ(fault_of("0 0.5 0,5 0.1 0.1"), "expected a number, got '0,5', in a.txt:1");
   EXPECT_EQ(fault_of("0 1e999 0.5 0.1 0.1"), "expected a number, got '1e999', in a.txt:1");
-  EXPECT_EQ(fault_of("0 0.5 0.5 0 0.1"),
-            "expected a box of a width and height above 0, got 0 x 3, in a.txt:1");
   EXPECT_EQ(fault_of("0 0.5 0.5 0.1"), "expected 5 columns, got 4, in a.txt:1");
   EXPECT_EQ(fault_of("0 0.5 0.5 0.1 0.1 0.9"), "expected 5 columns, got 6, in a.txt:1");
-  EXPECT_EQ(fault_of("0 0.1 0.1 0.2 0.1 0.2 0.2"),
-            "expected 5 columns, got 7 (an outline, which is not read, or joints without "
-            "kpt_shape), in a.txt:1");
+  EXPECT_EQ(fault_of("0 0.1 0.1 0.2 0.1 0.2 0.2 0.3"), "expected 5 columns, got 8, in a.txt:1");
   EXPECT_THAT(fault_of(std::string("0 0.5 0.5 0.1 0.1\0", 18)), HasSubstr("expected"));
 }
 
