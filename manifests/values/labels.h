@@ -106,6 +106,8 @@ struct Annotation {
   /// P, row-major [3][4], of the image's camera (KITTI's P2): w [u, v, 1] = P [X, Y, Z, 1], in
   /// pixels of the source image and m in the rectified frame of camera 0.
   std::optional<std::array<double, 12>> projection = {};
+  /// Why boxes of it are not in `boxes`: "expected X, got Y, in PATH:LINE" each.
+  std::vector<std::string> left_out = {};
   bool operator==(const Annotation&) const = default;
 };
 

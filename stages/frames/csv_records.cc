@@ -4,6 +4,7 @@
 #include <utf8.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "manifests/documents/detail/json_text.h"
@@ -12,10 +13,12 @@
 namespace eventgan {
 namespace {
 
-/// Takes the field at the start of `text`, and what ends it: a comma, a line end, or nothing. None
-/// if its quotes do not match; then nothing is taken.
-std::optional<std::string> take_field(std::string_view& text) {
-  const std::size_t begin = std::min(text.find_first_not_of(" \t"), text.size());
+/// Takes the field at the start of `text`, up to what ends it: a separator, a line end, or nothing.
+/// None if its quotes do not match; then nothing is taken.
+std::optional<std::string> take_field(std::string_view& text, char separator) {
+  const std::array ends{separator, '\n', '\0'};
+  const char* const blanks = separator == '\t' ? " " : " \t";
+  const std::size_t begin = std::min(text.find_first_not_of(blanks), text.size());
   std::string field;
   std::size_t end = begin;
   if (begin < text.size() && text[begin] == '"') {
@@ -27,11 +30,11 @@ std::optional<std::string> take_field(std::string_view& text) {
       if (end == text.size() || text[end] != '"') break;
       field += '"';
     }
-    const std::size_t stop = std::min(text.find_first_of(",\n", end), text.size());
+    const std::size_t stop = std::min(text.find_first_of(ends.data(), end), text.size());
     if (!trimmed(text.substr(end, stop - end)).empty()) return std::nullopt;
     end = stop;
   } else {
-    end = std::min(text.find_first_of(",\n", begin), text.size());
+    end = std::min(text.find_first_of(ends.data(), begin), text.size());
     field = trimmed(text.substr(begin, end - begin));
     if (field.find('"') != std::string::npos) return std::nullopt;
   }
@@ -46,7 +49,7 @@ std::size_t line_length(std::string_view text) {
 
 }  // namespace
 
-CsvReader::CsvReader(std::string_view text) : rest_(text) {
+CsvReader::CsvReader(std::string_view text, char separator) : rest_(text), separator_(separator) {
   constexpr std::string_view kMark = "\xEF\xBB\xBF";
   if (rest_.starts_with(kMark)) rest_.remove_prefix(kMark.size());
 }
@@ -62,7 +65,7 @@ std::optional<CsvRecord> CsvReader::next() {
   record.line = line_;
   std::string_view after = rest_;
   for (bool goes_on = true; goes_on;) {
-    std::optional<std::string> field = take_field(after);
+    std::optional<std::string> field = take_field(after, separator_);
     if (!field) {
       record.fault = "expected a field without quotes, or in quotes as a whole, got other quotes";
       record.fields.clear();
@@ -70,7 +73,7 @@ std::optional<CsvRecord> CsvReader::next() {
       break;
     }
     record.fields.push_back(std::move(*field));
-    goes_on = after.starts_with(',');
+    goes_on = after.starts_with(separator_);
     if (!after.empty()) after.remove_prefix(1);
   }
   record.bytes = rest_.substr(0, rest_.size() - after.size());

@@ -19,10 +19,7 @@ Outcome<Annotation> numbered(ImageLabels labels, const std::vector<std::string>&
                          escape_controls(named.class_name) + "\", in " + place};
     }
     named.box.class_id = static_cast<int>(name - class_names.begin());
-    if (!overlaps(named.box.xyxy, image)) {
-      return SampleFault{outside_text(named.box.xyxy, image) + ", in " + place};
-    }
-    annotation.boxes.push_back(named.box);
+    add_box(named.box, image, place, annotation);
   }
   return annotation;
 }
@@ -37,6 +34,15 @@ Outcome<Annotation> ReadLabels::annotation(const std::string& label_key) const {
   Outcome<ImageSize> size = image_size(label_key, labels.size);
   if (is_fault(size)) return size.fault();
   return numbered(labels, schema_.class_names, *size, label_place(label_key));
+}
+
+bool add_box(const Box& box, ImageSize image, const std::string& place, Annotation& annotation) {
+  if (overlaps(box.xyxy, image)) {
+    annotation.boxes.push_back(box);
+    return true;
+  }
+  annotation.left_out.push_back(outside_text(box.xyxy, image) + ", in " + place);
+  return false;
 }
 
 bool overlaps(const Rectangle& box, ImageSize image) {

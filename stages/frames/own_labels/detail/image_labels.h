@@ -67,6 +67,12 @@ class ReadLabels : public OwnLabels {
   std::map<std::string, Outcome<ImageLabels>> by_key_;
 };
 
+/// Adds a box of an image of that size to the image's annotation, and returns true, if it has an
+/// area and some of it lies within the image: detectors' losses cannot take another. Else the
+/// reason goes to Annotation::left_out, so that one bad box does not lose the image's others.
+/// `place` is where the box stands, for the reason.
+bool add_box(const Box& box, ImageSize image, const std::string& place, Annotation& annotation);
+
 /// Whether some of the box is within the image.
 bool overlaps(const Rectangle& box, ImageSize image);
 
