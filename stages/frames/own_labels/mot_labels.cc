@@ -237,11 +237,11 @@ class MotLabels : public ReadLabels {
  private:
   using Frames = std::map<std::int64_t, std::size_t>;  ///< by FrameRef::index
 
-  /// SEQUENCE/gt/gt.txt, SEQUENCE/gt.txt; of the only one gt/gt.txt and gt.txt too.
+  /// SEQUENCE/gt/gt.txt, SEQUENCE/gt.txt, SEQUENCE.txt; of the only one gt/gt.txt and gt.txt too.
   std::optional<std::string> find_file(const std::string& sequence) const {
     const std::string folder = sequence.empty() ? "" : sequence + "/";
-    for (const char* name : {"gt/gt.txt", "gt.txt"}) {
-      if (root_.has_file(folder + name)) return folder + name;
+    for (const std::string& name : {folder + "gt/gt.txt", folder + "gt.txt", sequence + ".txt"}) {
+      if (root_.has_file(name)) return name;
     }
     return std::nullopt;
   }
@@ -313,17 +313,34 @@ class MotLabels : public ReadLabels {
   std::map<std::string, double> rates_;
 };
 
+/// Whether a text's first row is one of a gt.txt, as far as numbers and commas tell.
+bool is_mot_table(const std::filesystem::path& file) {
+  const std::string text = beginning_of(file);
+  CsvReader reader(text);
+  const std::optional<CsvRecord> row = reader.next();
+  return row && row->fields.size() >= 7 && row->fields.size() <= 10 &&
+         std::ranges::all_of(row->fields, [](const std::string& field) {
+           return parse_number<double>(field).has_value();
+         });
+}
+
 std::optional<std::filesystem::path> find_mot(const FoundFrames& frames,
                                               std::vector<std::string>&) {
   const std::filesystem::path above = frames.root.parent_path();
-  if (!frames.stems.empty() && has_file(above / "gt/gt.txt") && frames.root.filename() == "img1") {
+  const bool has_images = !frames.stems.empty() && !frames.is_video;
+  if (has_images && has_file(above / "gt/gt.txt") && frames.root.filename() == "img1") {
     return above;
   }
+  if (has_images && has_file(frames.root / "gt/gt.txt")) return frames.root;
+  std::vector<std::string> sequences = frames.folders;
+  if (frames.is_video) sequences.assign(frames.stems.begin(), frames.stems.end());
   for (const std::filesystem::path& folder : {frames.root, above}) {
-    for (const std::string& sequence : frames.folders) {
+    for (const std::string& sequence : sequences) {
       for (const char* name : {"gt/gt.txt", "gt.txt"}) {
         if (has_file(folder / sequence / name)) return folder;
       }
+      const std::filesystem::path beside = folder / (sequence + ".txt");
+      if (has_file(beside) && is_mot_table(beside)) return folder;
     }
   }
   return std::nullopt;
