@@ -357,6 +357,11 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
   std::vector<FoundSource> sources;
   if (found.labels) sources = find_splits(found, given, files, with_frames);
   if (sources.empty()) sources.push_back(std::move(found));
+  if (!sources.front().labels) {
+    std::vector<FoundFrames> places;
+    for (const fs::path& place : with_frames) places.push_back(frames_in(place, files));
+    sources.front().unread = unread_labels(places);
+  }
   for (const auto& [place, labels] : others) {
     const bool is_of_source = std::ranges::any_of(sources, [&](const FoundSource& source) {
       return is_below(place, source.root);
