@@ -363,9 +363,8 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
     sources.front().unread = unread_labels(places);
   }
   for (const auto& [place, labels] : others) {
-    const bool is_of_source = std::ranges::any_of(sources, [&](const FoundSource& source) {
-      return is_below(place, source.root);
-    });
+    const bool is_of_source = std::ranges::any_of(
+        sources, [&](const FoundSource& source) { return is_below(place, source.root); });
     if (is_of_source) continue;
     sources.front().remarks.push_back("labels of other images left out: " + labels.string() +
                                       " of " + place.string());

@@ -214,7 +214,8 @@ FrameNames::Match FrameNames::find_exactly(const std::string& name) const {
 FrameNames::Match FrameNames::find(const std::string& name) {
   Match match = find_exactly(name);
   if (match.frame != kNone || names_.empty()) return match;
-  Match near = find_near(name);
+  const bool is_in_root = match.below_root != fs::path(name).lexically_normal().generic_string();
+  Match near = is_in_root ? find_near(match.below_root, true) : find_near(name, false);
   if (near.frame != kNone) {
     near.below_root = match.below_root;
     return near;
@@ -226,7 +227,7 @@ FrameNames::Match FrameNames::find(const std::string& name) {
   return match;
 }
 
-FrameNames::Match FrameNames::find_near(const std::string& name) {
+FrameNames::Match FrameNames::find_near(const std::string& name, bool is_in_root) {
   const std::vector<std::string> parts = parts_of(plain(name));
   if (parts.empty()) return {};
   if (is_video_) return find_near_in_video(parts);
@@ -244,6 +245,9 @@ FrameNames::Match FrameNames::find_near(const std::string& name) {
     }
     if (found == places.end()) continue;
     if (found->second == kSeveral) return {kSeveral};
+    // As above: "images/1.jpg" is no image of a folder of the root "images".
+    const bool is_in_folder = names_[found->second].find('/') != std::string_view::npos;
+    if (is_in_root && is_in_folder && dropped + 1 == parts.size()) continue;
     if (dropped > 0 && is_other_image(parts, dropped, found->second)) return {};
     return {found->second, {}, /*is_near=*/true};
   }

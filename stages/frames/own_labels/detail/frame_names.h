@@ -43,7 +43,8 @@ class FrameNames {
   using Places = std::unordered_map<std::string, std::size_t>;
 
   std::size_t look_up(const std::string& below_root) const;
-  Match find_near(const std::string& name);
+  /// `is_in_root`: the name begins with what ROOT ends in, and that has been cut off.
+  Match find_near(const std::string& name, bool is_in_root);
   Match find_near_in_video(const std::vector<std::string>& parts) const;
   bool is_other_image(const std::vector<std::string>& parts, std::size_t dropped,
                       std::size_t frame) const;
