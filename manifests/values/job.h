@@ -138,6 +138,11 @@ struct SourceSpec {
   WindowSpec window;           ///< of events: in place of `pairs`
 };
 
+/// Whether its frames have labels, as far as the manifest tells: images of one's own may have none.
+inline bool has_labels(const SourceSpec& spec) {
+  return !is_own(spec.dataset) || spec.labels.has_value();
+}
+
 enum class ImageFit { kStretch, kLetterbox, kCrop };
 
 /// Whether the image is made grey before or after it is resized.

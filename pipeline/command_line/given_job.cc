@@ -43,6 +43,17 @@ JobManifest read_kept(const fs::path& file, const FoundSource& found, const fs::
   return manifest;
 }
 
+/// A labelled set that becomes samples without a box is worse than none.
+void require_labels_read(const std::vector<FoundSource>& sources) {
+  for (const FoundSource& source : sources) {
+    if (source.unread.empty()) continue;
+    throw InputError(fmt::format(
+        "expected labels that can be read, or none, got: {} (eventgan init writes a manifest that "
+        "goes without labels)",
+        fmt::join(source.unread, "; ")));
+  }
+}
+
 }  // namespace
 
 GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& output) {
@@ -75,6 +86,7 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
         "job whose manifest is elsewhere, in " +
         job.output.string() + " (--output names another folder)");
   }
+  require_labels_read(sources);
   const fs::path folder = fs::absolute(file).parent_path();
   ManifestDraft draft = draft_manifest(sources, {folder, /*is_relative=*/false, "."});
   if (!draft.has_samples) {

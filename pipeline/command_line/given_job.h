@@ -35,7 +35,8 @@ struct GivenJob {
 /// as that of a manifest in it would. Writes nothing.
 ///
 /// Throws UsageError or InputError as read_job_manifest, find_source and draft_manifest do;
-/// InputError if nothing found makes a pair; UsageError if the output folder has the manifest of
+/// InputError if nothing found makes a pair, or labels lie there that are not read
+/// (FoundSource::unread); UsageError if the output folder has the manifest of
 /// another source, or a job that was given by a manifest elsewhere.
 GivenJob read_given_job(const std::filesystem::path& given,
                         const std::optional<std::filesystem::path>& output);

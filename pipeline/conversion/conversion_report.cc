@@ -37,6 +37,32 @@ std::string shards_text(const ConversionReport& report) {
   return how.empty() ? text : fmt::format("{} ({})", text, fmt::join(how, ", "));
 }
 
+/// "1,204".
+std::string grouped(std::int64_t count) {
+  std::string text = std::to_string(count);
+  for (auto place = std::ssize(text) - 3; place > 0; place -= 3) {
+    text.insert(static_cast<std::size_t>(place), ",");
+  }
+  return text;
+}
+
+/// What labels the pairs have: who gave some and reads of none has lost them.
+std::string labels_text(const ConversionReport& report) {
+  if (report.written == 0) return "";
+  std::vector<std::string> parts;
+  if (!report.boxes.empty()) {
+    parts.push_back("boxes: " + joined(report.boxes, ", ", [](const auto& of_class) {
+                      return grouped(of_class.second) + " " + escape_controls(of_class.first);
+                    }));
+  }
+  if (report.persons > 0) {
+    parts.push_back(grouped(report.persons) + (report.persons == 1 ? " person" : " persons") +
+                    " with joints");
+  }
+  if (parts.empty()) parts.emplace_back("NO LABELS: no boxes and no persons with joints");
+  return fmt::format("\n{}", fmt::join(parts, "; "));
+}
+
 }  // namespace
 
 void add_shard(const CommitRecord& record, std::int64_t volume_bytes, ConversionReport& report) {
@@ -44,6 +70,8 @@ void add_shard(const CommitRecord& record, std::int64_t volume_bytes, Conversion
   report.written += record.valid;
   report.stored_bytes += record.size_bytes;
   report.volume_bytes += volume_bytes;
+  for (const auto& [name, count] : record.contents.classes) report.boxes[name] += count;
+  for (const std::int32_t count : record.contents.persons) report.persons += count;
   report.quarantined.insert(report.quarantined.end(), record.quarantined.begin(),
                             record.quarantined.end());
 }
@@ -58,8 +86,10 @@ std::string to_text(const ConversionReport& report) {
       text += fmt::format(" {} {:.1f}", stage, seconds);
     }
   }
+  text += labels_text(report);
   if (report.unpaired > 0) {
-    text += "\n" + count_text(report.unpaired_frames, "labelled frame") + " without a paired frame";
+    const char* const noun = report.is_labelled ? "labelled frame" : "frame";
+    text += "\n" + count_text(report.unpaired_frames, noun, " without a paired frame");
     if (report.unpaired_frames != report.unpaired) {
       text +=
           " for at least one of their gaps, " + count_text(report.unpaired, "pair") + " in total";
@@ -93,6 +123,8 @@ std::string to_json(const ConversionReport& report) {
                                {"planned", report.planned},
                                {"written", report.written},
                                {"quarantined", quarantined},
+                               {"boxes", report.boxes},
+                               {"persons", report.persons},
                                {"unpaired", report.unpaired},
                                {"unpaired_frames", report.unpaired_frames},
                                {"notes", report.notes},

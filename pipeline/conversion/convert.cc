@@ -178,6 +178,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
     (is_own ? own : elsewhere).push_back(&frozen.plan.shards[i]);
   }
   ConversionReport report = empty_report(folder, frozen.plan, own, options.part);
+  report.is_labelled = std::ranges::any_of(manifest.sources, has_labels);
   report.notes = std::move(notes);
   say_part(report, options);
   EarlierShards earlier = look_back(job, options, own, elsewhere, report);

@@ -139,7 +139,9 @@ std::string source_text(const SourceSpec& spec, const SourceSummary& summary,
   if (has_events(spec.dataset)) {
     text += fmt::format("  windows          {}\n", pairs_of(summary));
   } else {
-    text += fmt::format("  labelled frames  {}\n", summary.labelled_frames);
+    text +=
+        fmt::format("  {:<15}  {}\n", has_labels(spec) ? "labelled frames" : "frames, NO LABELS",
+                    summary.labelled_frames);
     text += fmt::format("  pairs            {}{}\n", pairs_of(summary),
                         by_gap_text(summary.pairs_by_gap));
     if (spec.pairs.stills) {

@@ -242,7 +242,7 @@ void consider_stills(const Dataset& dataset, const fs::path& folder, SourceDraft
     compare_neighbours(dataset, folder, draft);
   }
   if (!draft.is_stills && draft.has_samples) return;
-  if (!draft.is_stills) draft.findings.emplace_back("no labelled frame has a paired frame");
+  if (!draft.is_stills) draft.findings.emplace_back("no frame has a paired frame");
   draft.is_stills = true;
   draft.findings.emplace_back(
       "no sequences: each image makes a pair with itself under a small motion (\"from\": "
@@ -256,15 +256,21 @@ std::vector<std::string> findings_of(const SourceDraft& draft, const Survey& sur
   const FoundSource& found = draft.found;
   const bool is_events = has_events(found.dataset);
   std::vector<std::string> lines;
+  const bool is_labelled = !is_own(found.dataset) || found.labels;
   lines.push_back(std::string(found.title) + ": " +
-                  count_text(survey.labelled_frames, is_events ? "sample" : "labelled frame"));
+                  count_text(survey.labelled_frames, is_events     ? "sample"
+                                                     : is_labelled ? "labelled frame"
+                                                                   : "frame"));
   if (survey.sequences > 0) {
     lines.back() += " of " + count_text(survey.sequences, is_events ? "recording" : "sequence");
   }
-  lines.back() += ", " + count_text(survey.annotation_files, "annotation file");
+  lines.back() += is_labelled || survey.annotation_files > 0
+                      ? ", " + count_text(survey.annotation_files, "annotation file",
+                                          is_labelled ? "" : " passed through unread")
+                      : ", NO LABELS";
   if (!is_events && !draft.is_stills) {
-    lines.push_back(fmt::format("labelled frames with a pair of frames {}, by gap: {}",
-                                where_text(draft.habits.side),
+    lines.push_back(fmt::format("{}frames with a pair of frames {}, by gap: {}",
+                                is_labelled ? "labelled " : "", where_text(draft.habits.side),
                                 counts_text(survey.pairs_by_gap, "gap ")));
     if (survey.missing > 0) {
       lines.push_back(fmt::format("pairs with a missing or invalid frame: {}", survey.missing));
@@ -275,6 +281,7 @@ std::vector<std::string> findings_of(const SourceDraft& draft, const Survey& sur
                                 row_of(kLabelFormats, found.labels->format).title,
                                 found.labels->path.string()));
   }
+  for (const std::string& unread : found.unread) lines.push_back("warning: " + unread);
   lines.insert(lines.end(), found.remarks.begin(), found.remarks.end());
   lines.insert(lines.end(), draft.findings.begin(), draft.findings.end());
   return lines;

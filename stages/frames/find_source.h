@@ -30,6 +30,9 @@ struct FoundSource {
   EventFields columns;                ///< recording: a table's, by what its columns are called
   /// What is not there and what that costs, or is left out; a line each.
   std::vector<std::string> remarks;
+  /// Of frames without labels: files that look like their labels and are not read, why, and what to
+  /// do; a line each.
+  std::vector<std::string> unread;
 };
 
 /// Finds out which dataset lies at `path` or, if it is none, in a folder of it; `dataset`, if it is

@@ -3,6 +3,7 @@
 #include <utf8.h>
 
 #include <algorithm>
+#include <cctype>
 #include <system_error>
 
 #include "manifests/documents/detail/json_text.h"
@@ -60,6 +61,20 @@ FolderListing look_into(const std::filesystem::path& folder) {
   } catch (const InputError&) {
     return {};
   }
+}
+
+std::string in_small_letters(std::string text) {
+  std::ranges::transform(text, text.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+std::filesystem::path folder_named(const std::filesystem::path& above, std::string_view name) {
+  if (has_folder(above / name)) return above / name;
+  for (const std::string& folder : look_into(above).folders) {
+    if (in_small_letters(folder) == in_small_letters(std::string(name))) return above / folder;
+  }
+  return {};
 }
 
 SourceRoot::SourceRoot(std::string_view written, const std::filesystem::path& base)

@@ -35,6 +35,13 @@ bool has_file(const std::filesystem::path& path);
 /// As list_folder; nothing of what is no folder or cannot be listed, since it is somebody else's.
 FolderListing look_into(const std::filesystem::path& folder);
 
+/// ASCII letters made small.
+std::string in_small_letters(std::string text);
+
+/// The folder of that name in another, in small or capital letters, as it is written if there is
+/// one; empty if there is none.
+std::filesystem::path folder_named(const std::filesystem::path& above, std::string_view name);
+
 /// Whether a folder in it, of what look_into finds, has a name that fits.
 template <class Fits>
 bool any_folder(const std::filesystem::path& folder, Fits fits) {

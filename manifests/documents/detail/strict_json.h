@@ -58,6 +58,7 @@ class StrictValue {
   /// true or false; false after a fault.
   bool boolean() const;
   bool is_boolean() const { return node_ != nullptr && node_->is_boolean(); }
+  bool is_null() const { return node_ != nullptr && node_->is_null(); }
   bool is_text() const { return node_ != nullptr && node_->is_string(); }
   bool is_array() const { return node_ != nullptr && node_->is_array(); }
 

@@ -3,6 +3,7 @@
 #include <utf8.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "manifests/values/text.h"
@@ -10,10 +11,12 @@
 namespace eventgan {
 namespace {
 
-/// Takes the field at the start of `text`, and what ends it: a comma, a line end, or nothing, into
-/// the record. If its quotes do not match, nothing is taken, and it gives false.
-bool take_field(std::string_view& text, CsvRecord& record) {
-  const std::size_t begin = std::min(text.find_first_not_of(" \t"), text.size());
+/// Takes the field at the start of `text`, and what ends it: a separator, a line end, or nothing,
+/// into the record. If its quotes do not match, nothing is taken, and it gives false.
+bool take_field(std::string_view& text, char separator, CsvRecord& record) {
+  const std::array ends{separator, '\n', '\0'};
+  const char* const blanks = separator == '\t' ? " " : " \t";
+  const std::size_t begin = std::min(text.find_first_not_of(blanks), text.size());
   std::string_view field;
   std::size_t end = begin;
   if (begin < text.size() && text[begin] == '"') {
@@ -32,11 +35,11 @@ bool take_field(std::string_view& text, CsvRecord& record) {
       record.unquoted.push_back(std::make_unique<const std::string>(std::move(unquoted)));
       field = *record.unquoted.back();
     }
-    const std::size_t stop = std::min(text.find_first_of(",\n", end), text.size());
+    const std::size_t stop = std::min(text.find_first_of(ends.data(), end), text.size());
     if (!trimmed(text.substr(end, stop - end)).empty()) return false;
     end = stop;
   } else {
-    end = std::min(text.find_first_of(",\n", begin), text.size());
+    end = std::min(text.find_first_of(ends.data(), begin), text.size());
     field = trimmed(text.substr(begin, end - begin));
     if (field.find('"') != std::string_view::npos) return false;
   }
@@ -52,7 +55,7 @@ std::size_t line_length(std::string_view text) {
 
 }  // namespace
 
-CsvReader::CsvReader(std::string_view text) : rest_(text) {
+CsvReader::CsvReader(std::string_view text, char separator) : rest_(text), separator_(separator) {
   constexpr std::string_view kMark = "\xEF\xBB\xBF";
   if (rest_.starts_with(kMark)) rest_.remove_prefix(kMark.size());
 }
@@ -68,13 +71,13 @@ std::optional<CsvRecord> CsvReader::next() {
   record.line = line_;
   std::string_view after = rest_;
   for (bool goes_on = true; goes_on;) {
-    if (!take_field(after, record)) {
+    if (!take_field(after, separator_, record)) {
       record.fault = "expected a field without quotes, or in quotes as a whole, got other quotes";
       record.fields.clear();
       after = rest_.substr(line_length(rest_));
       break;
     }
-    goes_on = after.starts_with(',');
+    goes_on = after.starts_with(separator_);
     if (!after.empty()) after.remove_prefix(1);
   }
   record.bytes = rest_.substr(0, rest_.size() - after.size());

@@ -24,13 +24,15 @@ struct CsvRecord {
 /// but within its quotes. A byte order mark and blank lines are passed over. Not thread safe.
 class CsvReader {
  public:
-  explicit CsvReader(std::string_view text);  ///< a view of it is kept
+  /// A view of `text` is kept. `separator` stands between fields.
+  explicit CsvReader(std::string_view text, char separator = ',');
 
   /// None at the end. A record that cannot be read goes to the end of its line.
   std::optional<CsvRecord> next();
 
  private:
   std::string_view rest_;
+  char separator_;
   int line_ = 1;
 };
 

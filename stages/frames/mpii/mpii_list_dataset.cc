@@ -311,6 +311,18 @@ std::unique_ptr<Dataset> open_mpii_list_dataset(const SourceSpec& spec, const fs
   return std::make_unique<MpiiListDataset>(spec, base);
 }
 
+namespace {
+
+/// Whether it is a list of people: captions, CreateML's boxes and results are lists of images, too.
+bool has_people(const MpiiList& list) {
+  return std::ranges::any_of(list.rows, [&](const Json& row) {
+    return row.contains("center") || row.contains("part") ||
+           (row.contains("joints") && row["joints"].is_array());
+  });
+}
+
+}  // namespace
+
 std::vector<fs::path> find_mpii_lists(const fs::path& root) {
   // Somebody's folder of labels, shards or recordings is not to be read for a look at it.
   constexpr std::size_t kMostFiles = 20;
@@ -326,7 +338,7 @@ std::vector<fs::path> find_mpii_lists(const fs::path& root) {
     if (files.size() > kMostFiles) continue;
     for (const std::string& name : files) {
       try {
-        if (!read_mpii_list(folder / name).rows.empty()) lists.push_back(folder / name);
+        if (has_people(read_mpii_list(folder / name))) lists.push_back(folder / name);
       } catch (const InputError&) {  // another file
       }
     }

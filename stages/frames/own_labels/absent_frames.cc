@@ -34,6 +34,7 @@ void add_absent_frames(const OwnLabels& labels, std::vector<LabelledFrame>& fram
     frame.frame.path = labels.source().root.written(absent.name);
     frame.frame.index = kAbsentFrame;
     frame.label_key = absent.key;
+    frame.fault = absent.fault;
     frames.push_back(std::move(frame));
   }
 }

@@ -1,6 +1,7 @@
 #include "stages/frames/own_labels/detail/coco_entry.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -16,6 +17,25 @@
 namespace eventgan {
 namespace {
 
+/// Takes 2.0 for 2: tools that compute with floating point write all numbers so.
+void make_whole(nlohmann::json& value) {
+  constexpr double kMost = 9007199254740992;  // 2^53
+  if (value.is_structured()) {
+    for (nlohmann::json& element : value) make_whole(element);
+  } else if (value.is_number_float()) {
+    const double number = value.get<double>();
+    if (std::abs(number) <= kMost && std::floor(number) == number) {
+      value = static_cast<std::int64_t>(number);
+    }
+  }
+}
+
+/// A member that may be missing, or null.
+std::optional<StrictValue> find_given(StrictObject& object, std::string_view key) {
+  auto found = object.find(key);
+  return found && found->is_null() ? std::nullopt : found;
+}
+
 /// An entry as a document whose faults are collected, and thrown all together.
 class CocoEntry {
  public:
@@ -25,6 +45,7 @@ class CocoEntry {
     auto document = parse_json_text(text, faults_);
     check();
     document_ = *std::move(document);
+    make_whole(document_);
     const auto id = document_.find("id");
     if (id == document_.end()) return;
     place_ = place + " (" + what + " " + dump_json(*id, JsonLayout::kAsciiLine) + ")";
@@ -61,17 +82,18 @@ bool read_flag(const StrictValue& value) {
 }
 
 /// Whether a joint of the annotation is annotated.
-bool read_keypoints(StrictObject& object, std::size_t joints, Person& person) {
-  const auto keypoints = object.find("keypoints");
+bool read_keypoints(StrictObject& object, std::size_t joints, bool has_names, Person& person) {
+  const auto keypoints = find_given(object, "keypoints");
   if (!keypoints) return false;
   const std::vector<StrictValue> numbers = keypoints->elements();
   if (numbers.empty()) return false;  // of classes without joints
   if (numbers.size() != 3 * joints) {
+    if (!has_names) return false;
     keypoints->fault("x, y, v of each of " + std::to_string(joints) + " joints");
     return false;
   }
   constexpr double kHalf = 0.5;  // edges to pixels' centres
-  std::int64_t annotated = 0;
+  bool any = false;
   for (std::size_t i = 0; i < joints; ++i) {
     Joint joint{kMissingPoint, 0};
     const Point at{numbers[3 * i].number(-kFarthest_px, kFarthest_px) - kHalf,
@@ -79,12 +101,11 @@ bool read_keypoints(StrictObject& object, std::size_t joints, Person& person) {
     const int visible = numbers[3 * i + 2].integer(0, 2);
     if (visible > 0) {
       joint = {at, visible == 2 ? 1 : 0};
-      ++annotated;
+      any = true;
     }
     person.joints.push_back(joint);
   }
-  if (const auto count = object.find("num_keypoints")) count->integer(annotated, annotated);
-  return annotated > 0;
+  return any;  // num_keypoints counts otherwise in some datasets
 }
 
 }  // namespace
@@ -121,6 +142,7 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
   object.at("image_id").integer(image_id, image_id);
   using Limits = std::numeric_limits<std::int64_t>;
   Box box;
+  bool has_names = false;  // of its joints
   const StrictValue category = object.at("category_id");
   if (const auto id = category.sound_integer(Limits::min(), Limits::max())) {
     const auto known =
@@ -129,22 +151,20 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
       category.fault("the id of a category");
     } else {
       box.class_id = static_cast<int>(known - index.categories.begin());
+      has_names = !known->keypoints.empty();
     }
   }
   box.xyxy = read_bbox(object.at("bbox"));
-  if (const auto crowd = object.find("iscrowd")) box.ignore = read_flag(*crowd);
-  if (const auto area = object.find("area")) area->number(0, kFarthest_px * kFarthest_px);
+  if (const auto crowd = find_given(object, "iscrowd")) box.ignore = read_flag(*crowd);
+  if (const auto area = find_given(object, "area")) area->number(0, kFarthest_px * kFarthest_px);
   Person person;
-  const bool is_person = read_keypoints(object, schema.joint_names.size(), person);
+  const bool is_person = read_keypoints(object, schema.joint_names.size(), has_names, person);
   entry.check();
-  if (!overlaps(box.xyxy, image)) {
-    throw BadLabel(outside_text(box.xyxy, image) + ", in " + entry.place());
-  }
+  if (!add_box(box, image, entry.place(), annotation)) return;
   if (is_person) {
     person.box = box.xyxy;
     annotation.persons.push_back(std::move(person));
   }
-  annotation.boxes.push_back(box);
 }
 
 }  // namespace eventgan

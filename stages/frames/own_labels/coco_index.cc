@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <iterator>
+#include <cmath>
+#include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -15,71 +16,18 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "stages/frames/label_name.h"
+#include "stages/frames/own_labels/detail/counted_bytes.h"
 #include "stages/frames/source_folders.h"
 
 namespace eventgan {
 namespace {
 
-/// A file read byte for byte, which knows how many the parser has taken.
-class CountedBytes {
- public:
-  explicit CountedBytes(const InputFile& file) : file_(file) { fill(); }
-
-  bool at_end() const { return next_ == end_; }
-  char current() const { return block_[next_]; }
-  void advance() {
-    ++taken_;
-    if (++next_ == end_) fill();
-  }
-  /// Bytes taken so far: right after a brace, the offset of what follows it.
-  std::uint64_t taken() const { return taken_; }
-
- private:
-  void fill() {
-    next_ = 0;
-    end_ = file_.read_some(taken_, block_);
-  }
-
-  const InputFile& file_;
-  std::array<char, 1 << 16> block_;
-  std::size_t next_ = 0, end_ = 0;
-  std::uint64_t taken_ = 0;
-};
-
-/// The same as the parser takes it. All copies share the bytes; one without is the end.
-class CountedIterator {
- public:
-  using iterator_category = std::input_iterator_tag;
-  using value_type = char;
-  using difference_type = std::ptrdiff_t;
-  using pointer = const char*;
-  using reference = char;
-
-  CountedIterator() = default;
-  explicit CountedIterator(CountedBytes& bytes) : bytes_(&bytes) {}
-  char operator*() const { return bytes_->current(); }
-  CountedIterator& operator++() {
-    bytes_->advance();
-    return *this;
-  }
-  CountedIterator operator++(int) {
-    CountedIterator before = *this;
-    bytes_->advance();
-    return before;
-  }
-  bool is_end() const { return bytes_ == nullptr || bytes_->at_end(); }
-  friend bool operator==(const CountedIterator& a, const CountedIterator& b) {
-    return a.is_end() == b.is_end();
-  }
-  friend bool operator!=(const CountedIterator& a, const CountedIterator& b) { return !(a == b); }
-
- private:
-  CountedBytes* bytes_ = nullptr;
-};
-
 /// What joins entries, of one entry.
 struct EntryFields {
   std::optional<std::int64_t> id, image_id;
+  std::array<double, 2> size{};  // width, height
+  std::array<double, 4> box{};
+  std::size_t box_sides = 0;
   std::optional<std::string> file_name, name;
   std::vector<std::string> keypoints;
 };
@@ -94,8 +42,14 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
     std::int64_t image_id;
     ByteRange entry;
   };
+  struct Box {
+    std::int64_t image_id;
+    double right, bottom;
+  };
   CocoIndex index;
   std::vector<Annotation> annotations;
+  std::vector<Box> boxes;          // of the first annotations
+  std::set<std::int64_t> classes;  // the categories of annotations
 
   bool null() override { return take_value("null"); }
   bool boolean(bool) override { return take_value("true or false"); }
@@ -105,7 +59,13 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
     return value <= kMost ? take_integer(static_cast<std::int64_t>(value))
                           : take_value("a huge number");
   }
-  bool number_float(double, const std::string&) override { return take_value("a fraction"); }
+  bool number_float(double value, const std::string&) override {
+    constexpr double kMost = 9007199254740992;  // 2^53
+    const bool is_whole = std::abs(value) <= kMost && std::floor(value) == value;
+    if (is_whole && depth_ == kInEntry) return take_integer(static_cast<std::int64_t>(value));
+    take_number(value);
+    return take_value("a fraction");
+  }
   bool binary(nlohmann::json::binary_t&) override { return false; }  // not in JSON text
 
   bool string(std::string& value) override {
@@ -156,6 +116,7 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
   bool start_array(std::size_t) override {
     if (depth_ == 0) refuse("an object", "a list");
     if (depth_ == 2 && in_section()) refuse_value("a list");
+    in_box_ = depth_ == kInEntry && is_annotation() && key_ == "bbox";
     in_keypoints_ = depth_ == kInEntry && is_category() && key_ == "keypoints";
     if (in_keypoints_ && !fields_.keypoints.empty()) refuse("the key \"keypoints\" once", "twice");
     check_not_wanted("a list");
@@ -165,7 +126,7 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
 
   bool end_array() override {
     --depth_;
-    if (depth_ == kInEntry) in_keypoints_ = false;
+    if (depth_ == kInEntry) in_keypoints_ = in_box_ = false;
     return true;
   }
 
@@ -225,7 +186,21 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
     return true;
   }
 
+  /// Of a box's sides and an image's.
+  void take_number(double value) {
+    if (in_box_ && depth_ == kInEntry + 1 && fields_.box_sides < fields_.box.size()) {
+      fields_.box[fields_.box_sides++] = value;
+    } else if (depth_ == kInEntry && is_image() && (key_ == "width" || key_ == "height")) {
+      fields_.size[key_ == "width" ? 0 : 1] = value;
+    }
+  }
+
   bool take_integer(std::int64_t value) {
+    take_number(static_cast<double>(value));
+    if (depth_ == kInEntry && is_annotation() && key_ == "category_id") {
+      if (classes.empty() || value != last_class_) classes.insert(last_class_ = value);
+      return true;
+    }
     if (depth_ == kInEntry && (is_image() || is_category()) && key_ == "id") {
       return set(fields_.id, value);
     }
@@ -256,12 +231,22 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
     if (is_annotation()) {
       need(fields_.image_id, "image_id");
       annotations.push_back({*fields_.image_id, range});
+      constexpr std::size_t kMostBoxes = 1000;
+      const auto& [left, top, width, height] = fields_.box;
+      if (fields_.box_sides == fields_.box.size() && boxes.size() < kMostBoxes) {
+        boxes.push_back({*fields_.image_id, left + width, top + height});
+      }
       return;
     }
     need(fields_.id, "id");
     if (is_image()) {
       need(fields_.file_name, "file_name");
-      index.images.push_back({*fields_.id, range, *std::move(fields_.file_name)});
+      constexpr double kLargest = 1e6;
+      const auto side = [&](double given) {
+        return given >= 1 && given <= kLargest ? static_cast<int>(given) : 0;
+      };
+      index.images.push_back({*fields_.id, range, *std::move(fields_.file_name),
+                              ImageSize{side(fields_.size[1]), side(fields_.size[0])}});
     } else {
       need(fields_.name, "name");
       index.categories.push_back(
@@ -275,7 +260,8 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
   std::size_t section_ = kSections.size();
   std::array<bool, kSections.size()> has_section_{};
   std::string key_;  // the entry's last
-  bool in_keypoints_ = false;
+  bool in_keypoints_ = false, in_box_ = false;
+  std::int64_t last_class_ = 0;
   std::uint64_t begin_ = 0;
   EntryFields fields_;
 };
@@ -287,9 +273,20 @@ void refuse_any(const std::vector<std::string>& names, const std::string& expect
                    ": " + some_of(names, 20) + ", in " + written);
 }
 
-void check_categories(CocoIndex& index, const std::string& written) {
+/// `used`: the ids that annotations have. Some tools write a root of all categories, or a copy of
+/// each, that no annotation has and that has another's name.
+void check_categories(CocoIndex& index, const std::set<std::int64_t>& used,
+                      const std::string& written) {
   auto& categories = index.categories;
   std::ranges::stable_sort(categories, {}, &CocoIndex::Category::id);
+  std::set<std::string, std::less<>> used_names;
+  for (const CocoIndex::Category& category : categories) {
+    if (used.contains(category.id)) used_names.insert(category.name);
+  }
+  const auto is_copy = [&](const CocoIndex::Category& category) {
+    return !used.contains(category.id) && used_names.contains(category.name);
+  };
+  std::erase_if(categories, is_copy);
   std::vector<std::string> ids, names;
   std::set<std::string> known;
   for (std::size_t i = 0; i < categories.size(); ++i) {
@@ -313,9 +310,9 @@ void check_categories(CocoIndex& index, const std::string& written) {
   }
 }
 
-/// Sorts the annotations by image, in linear time.
-void join(const std::vector<CocoReader::Annotation>& annotations, CocoIndex& index,
-          const std::string& written) {
+/// Sorts the annotations by image, in linear time, and compares some boxes with their images.
+void join(const std::vector<CocoReader::Annotation>& annotations,
+          const std::vector<CocoReader::Box>& boxes, CocoIndex& index, const std::string& written) {
   std::unordered_map<std::int64_t, std::size_t> image_of_id;
   image_of_id.reserve(index.images.size());
   std::vector<std::string> twice;
@@ -325,6 +322,17 @@ void join(const std::vector<CocoReader::Annotation>& annotations, CocoIndex& ind
     }
   }
   refuse_any(twice, "each image's id once", "more often", written);
+
+  constexpr double kRounding_px = 1;
+  for (const CocoReader::Box& box : boxes) {
+    const auto image = image_of_id.find(box.image_id);
+    const ImageSize size =
+        image == image_of_id.end() ? ImageSize{} : index.images[image->second].size;
+    if (size.width == 0 || size.height == 0) continue;
+    ++index.compared_boxes;
+    index.boxes_beyond +=
+        box.right > size.width + kRounding_px || box.bottom > size.height + kRounding_px;
+  }
 
   index.images.emplace_back();
   std::vector<std::uint32_t> images;
@@ -362,8 +370,8 @@ CocoIndex index_coco(const InputFile& file, const std::string& written) {
   if (!bytes.at_end()) throw InputError("expected JSON, got a NUL, in " + written);
   reader.check_whole();
   CocoIndex index = std::move(reader.index);
-  check_categories(index, written);
-  join(reader.annotations, index, written);
+  check_categories(index, reader.classes, written);
+  join(reader.annotations, reader.boxes, index, written);
   return index;
 }
 

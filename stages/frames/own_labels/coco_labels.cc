@@ -1,3 +1,5 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <charconv>
 #include <filesystem>
@@ -8,7 +10,6 @@
 
 #include "stages/frames/own_labels/detail/coco_entry.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
-#include "stages/frames/own_labels/detail/frame_names.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
 #include "stages/frames/own_labels/own_labels.h"
 
@@ -24,15 +25,13 @@ class CocoLabels : public OwnLabels {
         index_(index_coco(file_, written_)) {
     annotation_files_.push_back(written_);
     schema_ = coco_schema(index_, written_);
-    find_images(FrameNames(source()));
+    find_images();
     note_without_label(written_);
+    warn_of_corners();
   }
 
   Outcome<Annotation> annotation(const std::string& label_key) const override try {
     const CocoIndex::Image& image = find(label_key);
-    const auto read = [&](const ByteRange& range) {
-      return file_.read(range.offset, range.length);
-    };
     std::string text = read(image.entry);
     Outcome<ImageSize> size = image_size(label_key, read_coco_image(text, image.id, written_));
     if (is_fault(size)) return size.fault();
@@ -55,24 +54,28 @@ class CocoLabels : public OwnLabels {
   }
 
  private:
-  void find_images(const FrameNames& names) {
-    std::vector<std::string> of_several;
+  void find_images() {
+    std::vector<NamedLabel> named;
+    named.reserve(index_.image_count());
     for (std::size_t i = 0; i < index_.image_count(); ++i) {
       CocoIndex::Image& image = index_.images[i];
-      const std::string key = std::to_string(image.id);
       place_of_id_.emplace(image.id, i);
-      const FrameNames::Match match = names.find(image.file_name);
-      if (match.frame == FrameNames::kSeveral) {
-        of_several.push_back(image.file_name);
-      } else if (match.frame == FrameNames::kNone) {
-        give_absent(match.below_root, key);
-      } else {
-        give(match.frame, key);
-      }
-      std::string().swap(image.file_name);
+      named.push_back({std::exchange(image.file_name, {}), std::to_string(image.id)});
     }
-    refuse_bare_names(of_several, written_);
+    give_named(named, written_);
   }
+
+  /// Some tools write corners where COCO has a width and a height.
+  void warn_of_corners() {
+    constexpr std::size_t kFewest = 3;
+    if (index_.compared_boxes < kFewest || 2 * index_.boxes_beyond <= index_.compared_boxes) return;
+    warnings_.push_back(fmt::format(
+        "{} of {} compared boxes reach beyond their image: \"bbox\" may have the right and bottom "
+        "edges in place of width and height, in {}",
+        index_.boxes_beyond, index_.compared_boxes, written_));
+  }
+
+  std::string read(const ByteRange& range) const { return file_.read(range.offset, range.length); }
 
   const CocoIndex::Image& find(const std::string& label_key) const {
     std::int64_t id = 0;
@@ -92,36 +95,34 @@ class CocoLabels : public OwnLabels {
   std::unordered_map<std::int64_t, std::size_t> place_of_id_;
 };
 
-/// Whether the beginning of a JSON file is of COCO's labels of these frames, as far as it shows.
+/// The split that the end of a file's name states: "val" of instances_val2017.json.
+std::string_view split_of_file(const std::filesystem::path& file) {
+  const std::string stem = file.stem().string();
+  return split_of(stem.substr(stem.find_last_of("_-. ") + 1));
+}
+
 bool is_coco_of(const FoundFrames& frames, const std::filesystem::path& file) {
-  const std::string text = beginning_of(file);
-  if (!text.starts_with('{') || file.stem().string().starts_with("captions")) return false;
-  const bool has_lists = text.find("\"images\"") != std::string::npos ||
-                         text.find("\"annotations\"") != std::string::npos;
-  if (!has_lists) return false;
+  const std::string stem = file.stem().string();
+  if (stem.starts_with("captions") || frames.stems.contains(stem)) return false;
   // instances_train2017.json is of the folder train2017 alone.
+  const std::string_view split = split_of_file(file);
+  const std::string_view own = split_of(frames.root.filename().string());
+  if (!split.empty() && !own.empty() && split != own) return false;
   for (const std::string& folder : frames.folders) {
-    if (file.stem().string().ends_with(folder)) return false;
+    if (stem.ends_with(folder) || (!split.empty() && split_of(folder) == split)) return false;
   }
-  constexpr std::string_view kKey = "\"file_name\"";
-  bool any = false;
-  for (std::size_t at = text.find(kKey); at != std::string::npos; at = text.find(kKey, at + 1)) {
-    const std::size_t begin = text.find('"', at + kKey.size());
-    const std::size_t end = begin == std::string::npos ? begin : text.find('"', begin + 1);
-    if (end == std::string::npos) break;
-    if (is_among(frames, text.substr(begin + 1, end - begin - 1))) return true;
-    any = true;
+  const JsonGlimpse& seen = frames.files->json(file);
+  if (seen.file_names.empty()) {  // of no image, and so told by its name
+    return seen.has_keys({"images", "annotations"}) &&
+           stem.ends_with(frames.root.filename().string());
   }
-  // A file that begins with other things than images has to be told by its name.
-  return !any && file.stem().string().ends_with(frames.root.filename().string());
+  return seen.is_coco() && count_among(frames, seen.file_names) > 0;
 }
 
 std::optional<std::filesystem::path> find_coco(const FoundFrames& frames,
                                                std::vector<std::string>& remarks) {
   std::vector<std::filesystem::path> files;
-  for (const std::filesystem::path& folder :
-       {frames.root, frames.root.parent_path(), frames.root / "annotations",
-        frames.root.parent_path() / "annotations"}) {
+  for (const std::filesystem::path& folder : folders_around(frames)) {
     for (const std::filesystem::path& file : frames.files->in(folder, ".json")) {
       if (is_coco_of(frames, file)) files.push_back(file);
     }
@@ -133,8 +134,12 @@ std::optional<std::filesystem::path> find_coco(const FoundFrames& frames,
     return std::pair(!stem.ends_with(name), !stem.starts_with("instances"));
   };
   std::ranges::stable_sort(files, {}, rank);
+  const std::string_view split = split_of_file(files.front());
   for (std::size_t i = 1; i < files.size(); ++i) {
-    remarks.push_back("other COCO labels left out: " + files[i].string());
+    const bool is_of_others = split_of_file(files[i]) != split;
+    remarks.push_back(
+        (is_of_others ? "warning: other COCO labels left out: " : "other COCO labels left out: ") +
+        files[i].string());
   }
   return files.front();
 }

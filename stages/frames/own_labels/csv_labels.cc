@@ -11,22 +11,121 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/documents/detail/json_text.h"
 #include "stages/frames/csv_columns.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
-#include "stages/frames/own_labels/detail/frame_names.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
 
 namespace eventgan {
 namespace {
 
-enum { kImage, kClass, kLeft, kTop, kRight, kBottom, kTrack };
-constexpr std::array<std::string_view, 7> kColumns = {"image", "class",  "left", "top",
-                                                      "right", "bottom", "track"};
-using Row = std::array<std::string_view, kColumns.size()>;
+enum { kImage, kClass, kLeft, kTop, kRight, kBottom, kWidth, kHeight, kTrack, kColumnCount };
 
-NamedBox box_of(const Row& row) {
+/// A column by the names that tools give it, in small letters and without what stands between
+/// words.
+struct CsvColumn {
+  std::string_view title;  ///< in messages
+  std::array<std::string_view, 8> names;
+};
+constexpr std::array<CsvColumn, kColumnCount> kColumns = {{
+    {"image", {"image", "filename", "file", "imagename", "imagepath", "path", "imageid", "frame"}},
+    {"class", {"class", "label", "classname", "category", "name", "labelname", "object", "type"}},
+    {"left", {"left", "x1", "xmin", "x", "bboxleft", "bbleft", "boxleft", "bboxx"}},
+    {"top", {"top", "y1", "ymin", "y", "bboxtop", "bbtop", "boxtop", "bboxy"}},
+    {"right", {"right", "x2", "xmax", "bboxright", "boxright"}},
+    {"bottom", {"bottom", "y2", "ymax", "bboxbottom", "boxbottom"}},
+    {"width", {"width", "w", "bboxwidth", "bbwidth", "boxwidth", "bboxw"}},
+    {"height", {"height", "h", "bboxheight", "bbheight", "boxheight", "bboxh"}},
+    {"track", {"track", "trackid", "objectid", "tracknumber", "instanceid"}},
+}};
+/// Of a detector's results, which are no labels.
+constexpr std::array<std::string_view, 5> kScores = {"score", "confidence", "conf", "probability",
+                                                     "prob"};
+using Row = std::array<std::string_view, kColumnCount>;
+
+std::string plain_name(std::string_view header) {
+  std::string name = in_small_letters(std::string(header));
+  std::erase_if(name, [](char c) { return c == '_' || c == '-' || c == ' ' || c == '.'; });
+  return name;
+}
+
+/// The place of a header's field among the names of a column; their number if it is none of them.
+std::size_t rank_in(std::size_t column, std::string_view header) {
+  const auto& names = kColumns[column].names;
+  const std::string name = plain_name(header);
+  if (name.empty()) return names.size();
+  return static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
+}
+
+bool is_column(std::size_t column, std::string_view header) {
+  return rank_in(column, header) < kColumns[column].names.size();
+}
+
+/// Where a table's columns are.
+struct CsvColumns {
+  std::array<std::optional<std::size_t>, kColumnCount> places;
+  std::vector<std::string> unused;
+  bool has_sides = false;  ///< width and height are a box's; else, if at all, the image's
+
+  bool has(std::size_t column) const { return places[column].has_value(); }
+};
+
+/// The columns that a header names; a fault "expected X, got Y" where it is not one of boxes.
+Outcome<CsvColumns> columns_of(const CsvRecord& header) {
+  CsvColumns columns;
+  std::string unknown;
+  const auto refuse = [&](const std::string& got) {
+    return SampleFault{
+        "expected columns image, class, left, top, right, bottom (or width, height) "
+        "and perhaps track, each once, got \"" +
+        escape_controls(got) + "\""};
+  };
+  for (std::size_t i = 0; i < header.fields.size(); ++i) {
+    const std::string name(header.fields[i]);
+    const bool is_score = std::ranges::find(kScores, plain_name(name)) != kScores.end();
+    if (is_score) return refuse(name);
+    std::size_t column = 0;
+    while (column < kColumnCount && !is_column(column, name)) ++column;
+    if (column == kColumnCount) {
+      columns.unused.push_back(name);
+      continue;
+    }
+    std::optional<std::size_t>& place = columns.places[column];
+    const std::size_t rank = rank_in(column, name);
+    const std::size_t other = place ? rank_in(column, header.fields[*place]) : rank + 1;
+    if (rank == other) return refuse(name);
+    if (rank < other) place = i;  // "image" counts before "frame"
+  }
+  columns.has_sides =
+      !columns.has(kRight) && !columns.has(kBottom) && columns.has(kWidth) && columns.has(kHeight);
+  for (std::size_t i = 0; i <= kBottom; ++i) {
+    if (columns.has(i) || (i >= kRight && columns.has_sides)) continue;
+    if (!columns.unused.empty()) return refuse(columns.unused.front());
+    return SampleFault{"expected a column " + std::string(kColumns[i].title) + ", got none"};
+  }
+  return columns;
+}
+
+/// A comma; or a semicolon or a tab, if the first line has these and no comma.
+char separator_of(std::string_view text) {
+  const std::string_view line = text.substr(0, text.find('\n'));
+  if (line.find(',') != std::string_view::npos) return ',';
+  if (line.find(';') != std::string_view::npos) return ';';
+  return line.find('\t') != std::string_view::npos ? '\t' : ',';
+}
+
+/// Programs of some countries write 1,5 between semicolons.
+std::optional<double> edge_of(std::string_view field) {
+  const std::size_t comma = field.find(',');
+  if (comma == std::string_view::npos) return parse_number<double>(field);
+  std::string number(field);
+  number[comma] = '.';
+  return parse_number<double>(number);
+}
+
+NamedBox box_of(const Row& row, bool has_sides) {
   NamedBox read;
   if (!is_label_name(row[kClass])) {
     throw BadLabel("a class without control characters", in_quotes(row[kClass]));
@@ -35,19 +134,30 @@ NamedBox box_of(const Row& row) {
   Rectangle& xyxy = read.box.xyxy;
   const std::array edges{&xyxy.left, &xyxy.top, &xyxy.right, &xyxy.bottom};
   for (std::size_t i = 0; i < edges.size(); ++i) {
-    const auto edge = parse_number<double>(row[kLeft + i]);
+    const std::size_t column = kLeft + i + (has_sides && i >= 2 ? kWidth - kRight : 0);
+    const auto edge = edge_of(row[column]);
     if (!edge || std::abs(*edge) > kFarthest_px) {
-      throw BadLabel(fmt::format("{} within {:g} pixels", kColumns[kLeft + i], kFarthest_px),
-                     in_quotes(row[kLeft + i]));
+      throw BadLabel(fmt::format("{} within {:g} pixels", kColumns[column].title, kFarthest_px),
+                     in_quotes(row[column]));
     }
     *edges[i] = *edge;
   }
-  if (xyxy.right <= xyxy.left || xyxy.bottom <= xyxy.top) {
-    throw BadLabel("left < right and top < bottom",
-                   fmt::format("{}, {}, {}, {}", row[kLeft], row[kTop], row[kRight], row[kBottom]));
+  if (has_sides) {
+    xyxy.right += xyxy.left;
+    xyxy.bottom += xyxy.top;
+  }
+  if (xyxy.right < xyxy.left || xyxy.bottom < xyxy.top) {
+    throw BadLabel(
+        has_sides ? "a width and height above 0" : "left < right and top < bottom",
+        fmt::format("{:g}, {:g}, {:g}, {:g}", xyxy.left, xyxy.top, xyxy.right, xyxy.bottom));
   }
   if (!row[kTrack].empty()) {
-    const auto track = parse_number<std::int64_t>(row[kTrack]);
+    std::string_view number = row[kTrack];
+    if (const std::size_t dot = number.find('.'); dot != std::string_view::npos) {  // pandas' 7.0
+      const std::string_view fraction = number.substr(dot + 1);
+      if (fraction.find_first_not_of('0') == std::string_view::npos) number = number.substr(0, dot);
+    }
+    const auto track = parse_number<std::int64_t>(number);
     if (!track || *track < 0)
       throw BadLabel("a whole number from 0 as track", in_quotes(row[kTrack]));
     read.box.track_id = *track;
@@ -59,15 +169,17 @@ NamedBox box_of(const Row& row) {
 class ImageRows {
  public:
   /// Beside the rows before it. Throws BadLabel.
-  void add(const Row& row) {
-    const bool is_alone = std::ranges::all_of(row.begin() + 1, row.end(),
-                                              [](std::string_view field) { return field.empty(); });
+  void add(const Row& row, bool has_sides) {
+    const auto is_empty = [](std::string_view field) { return field.empty(); };
+    const bool is_alone = std::all_of(row.begin() + kClass, row.begin() + kWidth, is_empty) &&
+                          row[kTrack].empty() &&
+                          (!has_sides || (row[kWidth].empty() && row[kHeight].empty()));
     if (is_without_boxes_ || (is_alone && !labels_.boxes.empty())) {
       throw BadLabel("one row alone of an image without boxes", "another of it");
     }
     is_without_boxes_ = is_alone;
     if (is_alone) return;
-    NamedBox box = box_of(row);
+    NamedBox box = box_of(row, has_sides);
     const std::int64_t track = box.box.track_id;
     if (track >= 0 && !tracks_.insert(track).second) {
       throw BadLabel("each track once in an image", std::to_string(track) + " twice");
@@ -87,7 +199,7 @@ class ImageRows {
 
 std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view text,
                                                              const std::string& path) {
-  CsvReader reader(text);
+  CsvReader reader(text, separator_of(text));
   const auto next = [&] {
     std::optional<CsvRecord> record = reader.next();
     if (!record || record->fault.empty()) return record;
@@ -98,11 +210,14 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
     throw InputError("expected a header line image,class,left,top,right,bottom, got none, in " +
                      path);
   }
-  const auto columns = csv_columns(*header, kColumns, kTrack);
+  const Outcome<CsvColumns> columns = columns_of(*header);
   if (is_fault(columns)) {
     throw InputError(columns.fault().reason + ", in " + place_in_file(path, header->line));
   }
-  const auto& places = *columns;
+  const auto& places = columns->places;
+  const bool has_sides = columns->has_sides;
+  double largest = 0;
+  std::size_t boxes = 0;
   std::map<std::string, Outcome<ImageRows>> images;
   while (const std::optional<CsvRecord> record = next()) {
     const std::string place = place_in_file(path, record->line);
@@ -123,10 +238,18 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
     auto& rows = *image;
     rows.labels().original.append(record->bytes);
     try {
-      rows.add(row);
+      rows.add(row, has_sides);
+      if (rows.labels().boxes.empty()) continue;
+      const Rectangle& box = rows.labels().boxes.back().box.xyxy;
+      largest = std::max({largest, box.right, box.bottom});
+      ++boxes;
     } catch (const BadLabel& bad) {
       image = bad.in(place);
     }
+  }
+  constexpr std::size_t kFewest = 3;
+  if (boxes >= kFewest && largest <= 1) {
+    throw InputError("expected edges in pixels, got shares of the image, 0..1, in " + path);
   }
   std::map<std::string, Outcome<ImageLabels>> labels;
   for (auto& [name, rows] : images) {
@@ -148,20 +271,12 @@ class CsvLabels : public ReadLabels {
     by_key_ = parse_csv_labels(SourceRoot("", base).read_or_throw(path_), path_);
     annotation_files_.push_back(path_);
     ClassList classes;
-    const FrameNames names(source());
-    std::vector<std::string> of_several;
+    std::vector<NamedLabel> named;
     for (const auto& [image, labels] : by_key_) {
       classes.add(labels);
-      const FrameNames::Match match = names.find(image);
-      if (match.frame == FrameNames::kSeveral) {
-        of_several.push_back(image);
-      } else if (match.frame == FrameNames::kNone) {
-        give_absent(match.below_root, image);
-      } else {
-        give(match.frame, image);
-      }
+      named.push_back({image, image});
     }
-    refuse_bare_names(of_several, path_);
+    give_named(named, path_);
     schema_.class_names = classes.names();
     note_without_label(path_);
   }
@@ -174,38 +289,35 @@ class CsvLabels : public ReadLabels {
   std::string path_;
 };
 
-/// Whether a table's first record has the columns that parse_csv_labels requires, and no others.
-bool is_label_header(const CsvRecord& header) {
-  return header.fault.empty() && !is_fault(csv_columns(header, kColumns, kTrack));
-}
-
 std::optional<std::filesystem::path> find_csv(const FoundFrames& frames,
                                               std::vector<std::string>& remarks) {
   std::optional<std::filesystem::path> found;
-  for (const std::filesystem::path& folder : {frames.root, frames.root.parent_path()}) {
+  for (const std::filesystem::path& folder : folders_around(frames)) {
     for (const std::filesystem::path& file : frames.files->in(folder, ".csv")) {
+      if (found && *found == file) continue;
       const std::string text = beginning_of(file);
-      CsvReader reader(text);
+      CsvReader reader(text, separator_of(text));
       const std::optional<CsvRecord> header = reader.next();
-      if (!header) continue;
-      const auto place = [&](std::string_view name) {
-        return static_cast<std::size_t>(std::ranges::find(header->fields, name) -
-                                        header->fields.begin());
+      if (!header || !header->fault.empty()) continue;
+      const auto place_of = [&](std::size_t column) {
+        return std::ranges::find_if(
+            header->fields, [&](std::string_view field) { return is_column(column, field); });
       };
-      const auto is_absent = [&](std::string_view name) {
-        return place(name) == header->fields.size();
-      };
-      if (std::ranges::any_of(std::array{"image", "class", "left", "top", "right", "bottom"},
-                              is_absent)) {
+      const auto none = header->fields.end();
+      if (place_of(kImage) == none || place_of(kClass) == none || place_of(kLeft) == none ||
+          place_of(kTop) == none) {
         continue;
       }
-      bool any_of_frames = false;
-      const std::size_t image = place("image");
-      while (const std::optional<CsvRecord> row = any_of_frames ? std::nullopt : reader.next()) {
-        any_of_frames = row->fields.size() > image && is_among(frames, row->fields[image]);
+      const Outcome<CsvColumns> columns = columns_of(*header);
+      const std::size_t place =
+          is_fault(columns) ? static_cast<std::size_t>(place_of(kImage) - header->fields.begin())
+                            : *columns->places[kImage];
+      std::vector<std::string> images;
+      while (const std::optional<CsvRecord> row = reader.next()) {
+        if (row->fields.size() > place) images.emplace_back(row->fields[place]);
       }
-      if (!any_of_frames) continue;
-      if (!is_label_header(*header)) {
+      if (count_among(frames, images) == 0) continue;
+      if (is_fault(columns)) {
         remarks.push_back("a table with other columns left out: " + file.string());
       } else if (found) {
         remarks.push_back("another table of labels left out: " + file.string());

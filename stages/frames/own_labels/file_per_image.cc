@@ -18,19 +18,34 @@ std::string joined(const std::string& folder, const std::string& name) {
 
 fs::path normal(const fs::path& path) { return fs::absolute(path).lexically_normal(); }
 
+/// A folder of labels, "labels" or "annotations/xmls", in another one, in whatever letters.
+template <class Find>
+fs::path label_folder_in(const fs::path& above, std::string_view name, Find find) {
+  fs::path folder = above;
+  for (const fs::path& part : fs::path(name)) {
+    folder = find(folder, part.string());
+    if (folder.empty()) return {};
+  }
+  return folder;
+}
+
 }  // namespace
 
 fs::path label_folder_of(const fs::path& images, const LabelFiles& names) {
   std::vector<fs::path> parts(images.begin(), images.end());
   std::erase(parts, "");  // "images/"
   const auto last = std::find_if(parts.rbegin(), parts.rend(), [&](const fs::path& part) {
-    return std::ranges::find(names.image_folders, part.string()) != names.image_folders.end();
+    const std::string name = in_small_letters(part.string());
+    return std::ranges::find(names.image_folders, name) != names.image_folders.end();
   });
   if (last == parts.rend()) return {};
+  fs::path above, below;
+  for (auto part = parts.begin(); part != last.base() - 1; ++part) above /= *part;
+  for (auto part = last.base(); part != parts.end(); ++part) below /= *part;
   for (const std::string_view label_folder : names.label_folders) {
-    *last = label_folder;
-    fs::path path;
-    for (const fs::path& part : parts) path /= part;
+    const fs::path folder = label_folder_in(above, label_folder, folder_named);
+    if (folder.empty()) continue;
+    fs::path path = below.empty() ? folder : folder / below;
     if (has_folder(path)) return path;
   }
   return {};
@@ -39,21 +54,32 @@ fs::path label_folder_of(const fs::path& images, const LabelFiles& names) {
 fs::path find_label_files(const FoundFrames& frames, const LabelFiles& names) {
   const auto files_in = [&](const fs::path& folder) {
     std::vector<fs::path> files = names_with(look_into(folder), names.extension);
-    std::erase(files, names.other_file);
+    std::erase_if(files, [&](const fs::path& file) { return names.is_other(file.string()); });
     return files;
   };
-  for (const fs::path& folder : {label_folder_of(frames.root, names), frames.root}) {
-    const auto is_of_frame = [&](const fs::path& name) {
-      return frames.stems.contains(name.stem().string());
-    };
-    const auto has_files = [&](const std::string& name) {
-      return !files_in(folder / name).empty();
-    };
-    if (folder.empty()) continue;
-    if (frames.stems.empty() ? std::ranges::any_of(frames.folders, has_files)
-                             : std::ranges::any_of(files_in(folder), is_of_frame)) {
-      return folder;
+  const auto is_of_frame = [&](const fs::path& name) {
+    const std::string stem = name.stem().string();
+    if (!frames.is_video) return frames.stems.contains(stem);
+    return frames.stems.contains(stem.substr(0, stem.rfind('_')));
+  };
+  const auto has_files = [&](const fs::path& folder) { return !files_in(folder).empty(); };
+  std::vector<fs::path> folders = {label_folder_of(frames.root, names), frames.root};
+  for (const fs::path& above : {frames.root, frames.root.parent_path()}) {
+    for (const std::string_view name : names.label_folders) {
+      folders.push_back(label_folder_in(above, name, [&](const fs::path& in, std::string_view of) {
+        return frames.files->folder(in, of);
+      }));
     }
+  }
+  for (const fs::path& folder : folders) {
+    if (folder.empty()) continue;
+    const auto has_folder_of = [&](const std::string& name) { return has_files(folder / name); };
+    const bool are_there =
+        frames.stems.empty()
+            ? std::ranges::any_of(frames.folders, has_folder_of)
+            : std::ranges::any_of(files_in(folder), is_of_frame) ||
+                  (frames.is_video && std::ranges::any_of(frames.stems, has_folder_of));
+    if (are_there) return folder;
   }
   return {};
 }
@@ -75,7 +101,7 @@ FilePerImage::FilePerImage(const LabelSpec& spec, const fs::path& base, Labelled
 std::vector<std::string> FilePerImage::files_in(const std::string& folder) const {
   std::vector<std::string> names = root_.files_in(folder);
   std::erase_if(names, [&](const std::string& name) {
-    return lower_extension(name) != names_.extension || name == names_.other_file ||
+    return lower_extension(name) != names_.extension || names_.is_other(name) ||
            name.starts_with('.');
   });
   return names;
@@ -96,9 +122,12 @@ std::string FilePerImage::folder_of(const std::string& images) const {
 
 /// A folder of images below the first of the folders of labels that has it; as it is if none has.
 std::string FilePerImage::in_label_folder(const std::string& images) const {
+  const fs::path root = root_.on_disk("");
   for (const std::string_view name : names_.label_folders) {
-    std::string folder = joined(std::string(name), images);
-    if (has_folder(root_.on_disk(folder))) return folder;
+    const fs::path folder = label_folder_in(root, name, folder_named);
+    if (folder.empty()) continue;
+    std::string below = joined(folder.lexically_relative(root).generic_string(), images);
+    if (has_folder(root / below)) return below;
   }
   return images;
 }
@@ -143,7 +172,7 @@ void FilePerImage::note_unused(const std::string& folder, const std::set<std::st
 }
 
 void FilePerImage::find_of_videos() {
-  const FrameNames names(source());
+  FrameNames names(source());
   const std::string folder = in_label_folder("");
   const auto take = [&](const std::string& key, const std::string& frame_name) {
     annotation_files_.push_back(root_.written(key));

@@ -23,6 +23,17 @@
 namespace eventgan {
 namespace fs = std::filesystem;
 
+namespace {
+
+/// What folders of images are called where their labels lie beside them, in small letters.
+constexpr std::array<std::string_view, 4> kImageFolders = {"images", "jpegimages", "img1", "imgs"};
+
+bool is_image_folder(const std::string& name) {
+  return std::ranges::find(kImageFolders, in_small_letters(name)) != kImageFolders.end();
+}
+
+}  // namespace
+
 std::vector<fs::path> names_with(const FolderListing& listing, std::string_view extension) {
   std::vector<fs::path> names;
   for (const fs::path name : listing.files) {
@@ -43,31 +54,120 @@ const std::vector<fs::path>& WholeFiles::in(const fs::path& folder, std::string_
   return entry->second[extension];
 }
 
+const JsonGlimpse& WholeFiles::json(const fs::path& file) {
+  const auto [entry, is_new] = json_.try_emplace(file);
+  if (is_new) entry->second = look_at_json(file);
+  return entry->second;
+}
+
+fs::path WholeFiles::folder(const fs::path& above, std::string_view name) {
+  const auto [entry, is_new] = folders_.try_emplace(above);
+  if (is_new) {
+    for (const std::string& folder : look_into(above).folders) {
+      entry->second.emplace(in_small_letters(folder), folder);
+      entry->second[folder] = folder;
+    }
+  }
+  const auto exact = entry->second.find(std::string(name));
+  const auto found = exact != entry->second.end()
+                         ? exact
+                         : entry->second.find(in_small_letters(std::string(name)));
+  return found == entry->second.end() ? fs::path() : above / found->second;
+}
+
 std::string beginning_of(const fs::path& file) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
   std::string text(1 << 16, '\0');
   std::string reason;
   const auto opened = InputFile::open(file, reason);
   text.resize(opened ? opened->read_some(0, text) : 0);
+  if (text.starts_with(kMark)) text.erase(0, kMark.size());
   return text;
 }
 
-bool is_among(const FoundFrames& frames, const fs::path& name) {
-  if (name.is_relative() && has_file(frames.root / name)) return true;
-  const fs::path folder = name.parent_path().filename();
-  if (frames.stems.contains(folder.string())) return true;  // a video's frame
-  const bool may_be_bare = folder.empty() || folder == frames.root.filename();
-  if (may_be_bare && has_file(frames.root / name.filename())) return true;
-  return folder.empty() && std::ranges::any_of(frames.folders, [&](const std::string& of_it) {
-           return has_file(frames.root / of_it / name);
-         });
+namespace {
+
+FrameNames& names_of(const FoundFrames& frames) {
+  if (frames.names) return *frames.names;
+  frames.image_names = std::make_shared<std::vector<std::string>>();
+  const auto add = [&](const fs::path& below) {
+    const ImageFolder listed = list_image_folder(frames.root / below);
+    for (const auto& [number, name] : listed.frames.frames()) {
+      frames.image_names->push_back((below / name).generic_string());
+    }
+  };
+  if (frames.folders.empty()) add("");
+  for (const fs::path folder : frames.folders) {
+    add(folder);
+    if (has_folder(frames.root / folder / "img1")) add(folder / "img1");
+  }
+  const std::vector<std::string_view> views(frames.image_names->begin(), frames.image_names->end());
+  frames.names = std::make_shared<FrameNames>(views, frames.root, /*is_video=*/false);
+  return *frames.names;
+}
+
+/// Of a video the names of its frames tell which one it is.
+bool is_of_video(const FoundFrames& frames, const std::string& name) {
+  const fs::path path(video_frame_name(name));
+  if (frames.stems.contains(path.parent_path().filename().string())) return true;
+  const std::string stem = fs::path(name).stem().string();
+  const std::size_t mark = stem.find_last_not_of("0123456789");
+  if (mark == std::string::npos) return frames.stems.size() == 1 && !stem.empty();
+  return mark + 1 < stem.size() && (frames.stems.contains(stem.substr(0, mark)) ||
+                                    (stem.starts_with("frame") && frames.stems.size() == 1));
+}
+
+}  // namespace
+
+std::size_t count_among(const FoundFrames& frames, const std::vector<std::string>& names) {
+  if (frames.is_video) {
+    return static_cast<std::size_t>(std::ranges::count_if(
+        names, [&](const std::string& name) { return is_of_video(frames, name); }));
+  }
+  FrameNames& known = names_of(frames);
+  std::size_t count = 0;
+  for (const std::string& name : names)
+    count += known.find_exactly(name).frame != FrameNames::kNone;
+  constexpr std::size_t kMost = 1000;
+  const std::size_t step = std::max<std::size_t>(1, names.size() / kMost);
+  for (std::size_t i = 0; count == 0 && i < names.size(); i += step) {
+    count += known.find(names[i]).frame != FrameNames::kNone;
+  }
+  return count;
+}
+
+std::vector<fs::path> folders_around(const FoundFrames& frames) {
+  const fs::path above = frames.root.parent_path();
+  std::vector<fs::path> folders = {frames.root, above};
+  for (const fs::path& folder : {frames.root, above}) {
+    if (fs::path found = frames.files->folder(folder, "annotations"); !found.empty()) {
+      folders.push_back(std::move(found));
+    }
+  }
+  if (is_image_folder(above.filename().string())) {  // images/train2017
+    folders.push_back(above.parent_path());
+    if (fs::path found = frames.files->folder(above.parent_path(), "annotations"); !found.empty()) {
+      folders.push_back(std::move(found));
+    }
+  }
+  return folders;
+}
+
+/// A year may follow.
+std::string_view split_of(std::string name) {
+  name.erase(name.find_last_not_of("0123456789") + 1);
+  if (name == "train") return "train";
+  if (name == "val" || name == "valid" || name == "validation") return "val";
+  return name == "test" ? "test" : "";
 }
 
 namespace {
 
 FoundFrames frames_in(const fs::path& root, WholeFiles& files) {
-  FoundFrames frames{root, {}, {}, &files};
+  FoundFrames frames{.root = root, .files = &files};
   if (has_file(root)) {
     frames.stems.insert(root.stem().string());
+    frames.is_video = true;
     frames.root = root.parent_path();
     return frames;
   }
@@ -76,10 +176,12 @@ FoundFrames frames_in(const fs::path& root, WholeFiles& files) {
   for (const auto& [number, name] : listed.frames.frames()) {
     frames.stems.insert(fs::path(name).stem().string());
   }
+  if (!frames.stems.empty()) return frames;
   for (const fs::path name : listed.left_out) {
     if (is_video_name(name)) frames.stems.insert(name.stem().string());
   }
-  if (!frames.stems.empty()) return frames;
+  frames.is_video = !frames.stems.empty();
+  if (frames.is_video) return frames;
   for (const std::string& name : listed.folders) {
     const auto has_frames = [](const fs::path& folder) {
       return !look_into(folder).files.empty() && !list_image_folder(folder).frames.empty();
@@ -112,14 +214,27 @@ std::vector<fs::path> places_in(const fs::path& root) {
   const auto add = [&](const fs::path& place) {
     if (has_folder(place)) places.push_back(place);
   };
-  constexpr std::array<std::string_view, 3> kOfImages = {"images", "JPEGImages", "img1"};
-  for (const std::string_view name : kOfImages) add(root / name);
-  places.push_back(root);
+  const auto folders_of = [](const fs::path& folder, bool train) {
+    std::vector<std::string> names = look_into(folder).folders;
+    std::erase_if(names, [&](const std::string& name) {
+      const bool is_train = name.starts_with("train") || split_of(name) == "train";
+      return name.starts_with('.') || is_train != train;
+    });
+    return names;
+  };
+  std::vector<fs::path> of_images;
+  for (const std::string_view name : kImageFolders) {
+    if (fs::path folder = folder_named(root, name); !folder.empty()) of_images.push_back(folder);
+  }
+  for (const fs::path& folder : of_images) add(folder);
+  add(root);
   for (const bool train : {true, false}) {
-    for (const std::string& name : look_into(root).folders) {
-      if (name.starts_with('.') || name.starts_with("train") != train) continue;
-      if (std::ranges::find(kOfImages, name) == kOfImages.end()) add(root / name);
-      add(root / name / "images");
+    for (const fs::path& folder : of_images) {  // images/train2017, with labels apart
+      for (const std::string& name : folders_of(folder, train)) add(folder / name);
+    }
+    for (const std::string& name : folders_of(root, train)) {
+      if (!is_image_folder(name)) add(root / name);
+      add(folder_named(root / name, "images"));
     }
   }
   return places;
@@ -130,32 +245,29 @@ bool is_below(const fs::path& path, const fs::path& folder) {
   return !relative.empty() && *relative.begin() != "..";
 }
 
-/// The split that a folder's name states: "val" of "valid" and of "val2017"; empty if none.
-std::string_view split_of(std::string name) {
-  name.erase(name.find_last_not_of("0123456789") + 1);
-  if (name == "train") return "train";
-  if (name == "val" || name == "valid" || name == "validation") return "val";
-  return name == "test" ? "test" : "";
-}
-
 /// A source for each split that has a folder of images with labels of its own, train first; none
-/// unless there are train and another. `found`: all of them in one folder, or train.
-std::vector<FoundSource> find_splits(const FoundSource& found, const fs::path& given,
-                                     WholeFiles& files, std::vector<fs::path>& with_frames) {
+/// unless there are two. `found`: all of them in one folder, or one of them, whose own split is set
+/// where its folder below `given` states it.
+std::vector<FoundSource> find_splits(FoundSource& found, const fs::path& given, WholeFiles& files,
+                                     std::vector<fs::path>& with_frames) {
   const std::vector<std::string> folders = frames_in(found.root, files).folders;
   const bool has_all =
       !folders.empty() &&
       std::ranges::none_of(folders, [](const std::string& name) { return split_of(name).empty(); });
-  const fs::path way = found.root.lexically_relative(given);  // "train/images"
-  if (!has_all && split_of(way.begin()->string()) != "train") return {};
-  const fs::path above = has_all ? found.root : given;
+  const fs::path way = found.root.lexically_relative(given);  // "train/images", "images/train2017"
+  const auto of_split = std::find_if(way.begin(), way.end(), [](const fs::path& part) {
+    return !split_of(part.string()).empty();
+  });
+  if (!has_all && of_split == way.end()) return {};
+  fs::path above = has_all ? found.root : given;
+  for (auto part = way.begin(); !has_all && part != of_split; ++part) above /= *part;
   std::map<std::ptrdiff_t, FoundSource> splits;  // by their place in kOrder
   constexpr std::array<std::string_view, 3> kOrder = {"train", "val", "test"};
   for (const std::string& name : look_into(above).folders) {
     const auto place = std::ranges::find(kOrder, split_of(name));
     if (place == kOrder.end()) continue;
     fs::path root = above / name;
-    for (auto part = has_all ? way.end() : std::next(way.begin()); part != way.end(); ++part) {
+    for (auto part = has_all ? way.end() : std::next(of_split); part != way.end(); ++part) {
       root /= *part;
     }
     if (!has_folder(root)) continue;
@@ -168,17 +280,18 @@ std::vector<FoundSource> find_splits(const FoundSource& found, const fs::path& g
     source.split = place == kOrder.begin() ? "" : *place;
     if (source.labels) splits.emplace(place - kOrder.begin(), std::move(source));
   }
-  if (splits.size() < 2 || !splits.contains(0)) return {};
   std::vector<FoundSource> sources;
   for (auto& [place, source] : splits) sources.push_back(std::move(source));
-  std::set<fs::path>
-      files_of_all;  // where one file has labels of several splits, these are one source
+  std::set<fs::path> files_of_all;  // one file with labels of several splits makes one source
   for (const FoundSource& source : sources) {
     const bool is_file = has_file(source.labels->path);
     if (is_file && !files_of_all.insert(source.labels->path).second) return {};
   }
-  const bool has_found = has_all || sources.front().root == found.root;
-  return has_found ? sources : std::vector<FoundSource>();
+  const bool has_found =
+      has_all || std::ranges::find(sources, found.root, &FoundSource::root) != sources.end();
+  if (!has_found) return {};
+  if (sources.size() == 1 && !has_all) found.split = sources.front().split;
+  return sources.size() < 2 ? std::vector<FoundSource>() : sources;
 }
 
 /// Tells of images that are no part of the sources that were chosen, or that are in one split with
@@ -203,7 +316,8 @@ void note_other_images(const std::vector<fs::path>& with_frames, const fs::path&
   const std::vector<std::string> folders = frames_in(found.root, files).folders;
   if (std::ranges::find(folders, "train") == folders.end()) return;
   for (const std::string& name : folders) {
-    if (name != "val" && name != "valid" && name != "test") continue;
+    const std::string_view split = split_of(name);
+    if (split != "val" && split != "test") continue;
     found.remarks.push_back("warning: images of " + name +
                             " are in split train, too: give each its own source with \"split\"");
   }
@@ -243,8 +357,15 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
   std::vector<FoundSource> sources;
   if (found.labels) sources = find_splits(found, given, files, with_frames);
   if (sources.empty()) sources.push_back(std::move(found));
+  if (!sources.front().labels) {
+    std::vector<FoundFrames> places;
+    for (const fs::path& place : with_frames) places.push_back(frames_in(place, files));
+    sources.front().unread = unread_labels(places);
+  }
   for (const auto& [place, labels] : others) {
-    if (std::ranges::find(sources, place, &FoundSource::root) != sources.end()) continue;
+    const bool is_of_source = std::ranges::any_of(
+        sources, [&](const FoundSource& source) { return is_below(place, source.root); });
+    if (is_of_source) continue;
     sources.front().remarks.push_back("labels of other images left out: " + labels.string() +
                                       " of " + place.string());
   }

@@ -406,17 +406,34 @@ class MotLabels : public ReadLabels {
   std::vector<std::string> with_names_, of_visdrone_, copies_;
 };
 
+/// Whether a text's first row is one of a gt.txt, as far as numbers and commas tell.
+bool is_mot_table(const std::filesystem::path& file) {
+  const std::string text = beginning_of(file);
+  CsvReader reader(text);
+  const std::optional<CsvRecord> row = reader.next();
+  return row && row->fields.size() >= 7 && row->fields.size() <= 10 &&
+         std::ranges::all_of(row->fields, [](std::string_view field) {
+           return parse_number<double>(field).has_value();
+         });
+}
+
 std::optional<std::filesystem::path> find_mot(const FoundFrames& frames,
                                               std::vector<std::string>&) {
   const std::filesystem::path above = frames.root.parent_path();
-  if (!frames.stems.empty() && has_file(above / "gt/gt.txt") && frames.root.filename() == "img1") {
+  const bool has_images = !frames.stems.empty() && !frames.is_video;
+  if (has_images && has_file(above / "gt/gt.txt") && frames.root.filename() == "img1") {
     return above;
   }
+  if (has_images && has_file(frames.root / "gt/gt.txt")) return frames.root;
+  std::vector<std::string> sequences = frames.folders;
+  if (frames.is_video) sequences.assign(frames.stems.begin(), frames.stems.end());
   for (const std::filesystem::path& folder : {frames.root, above}) {
-    for (const std::string& sequence : frames.folders) {
+    for (const std::string& sequence : sequences) {
       for (const char* name : {"gt/gt.txt", "gt.txt"}) {
         if (has_file(folder / sequence / name)) return folder;
       }
+      const std::filesystem::path beside = folder / (sequence + ".txt");
+      if (has_file(beside) && is_mot_table(beside)) return folder;
     }
   }
   return std::nullopt;

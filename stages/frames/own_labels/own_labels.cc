@@ -6,6 +6,7 @@
 
 #include "manifests/values/text.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/own_labels/detail/frame_names.h"
 
 namespace eventgan {
 
@@ -31,12 +32,63 @@ void OwnLabels::give_absent(const std::string& name, const std::string& key) {
   absent_.push_back({name, key});
 }
 
-void OwnLabels::refuse_bare_names(const std::vector<std::string>& names,
-                                  const std::string& labels_path) const {
-  if (names.empty()) return;
-  throw InputError("expected images' paths below " + source_.root.written("") + ", got " +
-                   counted(names, "bare name", " that several of its folders have") + ", in " +
-                   labels_path);
+void OwnLabels::give_named(const std::vector<NamedLabel>& named, const std::string& labels_path) {
+  FrameNames names(source_);
+  std::vector<std::string> of_several;
+  std::vector<AbsentFrame> absent, elsewhere;
+  std::vector<std::pair<std::size_t, const NamedLabel*>> near;
+  for (const NamedLabel& label : named) {
+    const FrameNames::Match match = names.find(label.image);
+    if (match.frame == FrameNames::kSeveral) {
+      of_several.push_back(label.image);
+    } else if (match.is_near) {
+      near.emplace_back(match.frame, &label);
+    } else if (match.frame != FrameNames::kNone) {
+      give(match.frame, label.key);
+    } else if (match.is_elsewhere) {
+      elsewhere.push_back({label.image, label.key,
+                           "expected an image below " + source_.root.written("") + ", got " +
+                               label.image +
+                               ", which lies elsewhere (\"root\" may be a folder "
+                               "above), in " +
+                               label_place(label.key)});
+    } else {
+      absent.push_back({match.below_root, label.key});
+    }
+  }
+  if (!of_several.empty()) {
+    throw InputError("expected images' paths below " + source_.root.written("") + ", got " +
+                     counted(of_several, "bare name", " that several of its folders have") +
+                     ", in " + labels_path);
+  }
+  std::vector<bool> is_named(labels_.size());
+  for (std::size_t i = 0; i < labels_.size(); ++i) is_named[i] = !labels_[i].key.empty();
+  std::vector<std::string> others;
+  for (const auto& [frame, label] : near) {
+    if (is_named[frame]) {  // by its own name: this is another's
+      absent.push_back({label->image, label->key});
+      continue;
+    }
+    give(frame, label->key);
+    others.push_back(label->image + " for " + source_.frames[frame].name);
+  }
+  if (!others.empty()) {
+    notes_.push_back(count_text(std::ssize(others), "image", " named otherwise in " + labels_path) +
+                     ": " + some_of(others, 3));
+  }
+  constexpr std::size_t kFew = 2;
+  if (absent.size() > kFew && 4 * absent.size() > named.size()) {
+    std::vector<std::string> left_out;
+    for (const AbsentFrame& frame : absent) left_out.push_back(frame.name);
+    notes_.push_back(std::to_string(absent.size()) + " of " +
+                     count_text(std::ssize(named), "image") + " in " + labels_path +
+                     " are not in " + source_.root.written("") +
+                     ", and left out: " + some_of(left_out, 3));
+    absent.clear();
+  }
+  for (auto* const frames : {&absent, &elsewhere}) {
+    for (AbsentFrame& frame : *frames) absent_.push_back(std::move(frame));
+  }
 }
 
 void OwnLabels::note_without_label(const std::string& labels_path) {

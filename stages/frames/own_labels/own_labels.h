@@ -49,6 +49,13 @@ struct FrameLabel {
 struct AbsentFrame {
   std::string name;  ///< as SourceFrame::name; of a video perhaps with zeros
   std::string key;
+  std::string fault = {};  ///< LabelledFrame::fault
+};
+
+/// A label of a file that names its images, and which name that is.
+struct NamedLabel {
+  std::string image;
+  std::string key;
 };
 
 /// Labels of one's own for the frames of a source. What `label_key`s are, and where each format's
@@ -74,6 +81,7 @@ class OwnLabels {
   /// As those of Dataset.
   const std::vector<std::string>& annotation_files() const { return annotation_files_; }
   const std::vector<std::string>& notes() const { return notes_; }
+  const std::vector<std::string>& warnings() const { return warnings_; }
   virtual Outcome<Annotation> annotation(const std::string& label_key) const = 0;
   virtual std::string label_place(const std::string& label_key) const = 0;
 
@@ -91,9 +99,11 @@ class OwnLabels {
   /// Adds a frame that the source does not have.
   void give_absent(const std::string& name, const std::string& key);
 
-  /// Throws InputError if there are any: names of images that several folders of ROOT have.
-  void refuse_bare_names(const std::vector<std::string>& names,
-                         const std::string& labels_path) const;
+  /// Gives frames the labels of a file by the names that it has for them (FrameNames). What it
+  /// names and the source does not have is absent; but where that is more than two and a quarter of
+  /// all, the file is of a larger set, and a note tells how many. Throws InputError for names that
+  /// several folders of ROOT have.
+  void give_named(const std::vector<NamedLabel>& named, const std::string& labels_path);
 
   /// Tells how many frames have no label; called once all are given.
   void note_without_label(const std::string& labels_path);
@@ -105,7 +115,7 @@ class OwnLabels {
 
   LabelSchema schema_;
   std::vector<std::string> annotation_files_;
-  std::vector<std::string> notes_;
+  std::vector<std::string> notes_, warnings_;
 
  private:
   LabelledSource source_;
@@ -131,11 +141,12 @@ struct LabelReader {
 };
 
 /// MOT's gt.txt (parse_mot_labels): `path` is the file of the only sequence, or a folder that has
-/// SEQUENCE/gt/gt.txt, SEQUENCE/gt.txt or SEQUENCE.txt; of images right in ROOT gt/gt.txt or
-/// gt.txt. labels.txt beside it names the classes, and then edges count from 0; the columns tell
-/// VisDrone's tables. Notes tell which these are, and which sequences have the same labels. Frame 1
-/// is the image numbered 1, or the first where images are numbered from 0 (which a note tells), or
-/// a video's frame 0. Images without numbers are counted in their order, and must be all of the
+/// SEQUENCE/gt/gt.txt, SEQUENCE/gt.txt or SEQUENCE.txt, where SEQUENCE is a folder of images or a
+/// video without its extension; of images right in ROOT gt/gt.txt or gt.txt. labels.txt beside it
+/// names the classes, and then edges count from 0; the columns tell VisDrone's tables. Notes tell
+/// which these are, and which sequences have the same labels. Frame 1 is the image numbered 1, or
+/// the first where images are numbered from 0 (which a note tells), or a video's frame 0. Images
+/// without numbers are counted in their order, and must be all of the
 /// sequence (seqLength, or the last frame with labels), else InputError. seqinfo.ini beside it, or
 /// above its folder gt, gives the sequence's rate and the images' size. The label_key is
 /// "GT_FILE#FRAME", GT_FILE below `path`.
@@ -143,9 +154,9 @@ extern const LabelReader kMotReader;
 
 /// COCO's instances and person keypoints: `path` is the JSON file. `file_name` is the image's path
 /// below ROOT; or begins with the folders that ROOT ends in ("val2017/1.jpg" of ROOT/1.jpg in
-/// .../val2017); or is a bare name that is in one folder of ROOT alone. Of a video's frame it is
-/// "STEM/NUMBER", perhaps with an extension, counted from 0. The label_key is the image's id, its
-/// place is "FILE#images/ID".
+/// .../val2017); or is a bare name that is in one folder of ROOT alone; or another way to write one
+/// of these (FrameNames), which a note tells. Of a video's frame it is "STEM/NUMBER", perhaps with
+/// an extension, counted from 0. The label_key is the image's id, its place is "FILE#images/ID".
 ///
 /// Classes are numbered by ascending category id. `iscrowd` becomes Box::ignore. An annotation with
 /// keypoints is a Box, and a Person with it if a joint is annotated; `bbox` and `keypoints` are
@@ -160,7 +171,9 @@ extern const LabelReader kMotReader;
 extern const LabelReader kCocoReader;
 
 /// YOLO's text files: `path` is their folder, or one above it, and it or the folder above it has
-/// data.yaml (`names`, a list or a map from number; `kpt_shape`) or classes.txt (a name a line). An
+/// data.yaml or the only YAML file with `names` (a list or a map from number; `kpt_shape`), or
+/// classes.txt, obj.names or _darknet.labels (a name a line); without one the classes' names are
+/// their numbers, which a note tells. An
 /// image's text is at the image's own path with the last folder "images" replaced by "labels" if
 /// that is below `path`, else at the image's path below ROOT, below `path`/labels or `path`. Of
 /// frame 12 of clip.mp4 it is clip_000012.txt or clip/000012.txt, with any number of zeros, counted
@@ -174,7 +187,8 @@ extern const LabelReader kCocoReader;
 extern const LabelReader kYoloReader;
 
 /// Pascal VOC's XML files (parse_voc_labels): found as YOLO's texts are, with the last folder
-/// "JPEGImages" or "images" replaced by "Annotations". All are read at opening, since classes are
+/// "JPEGImages" or "images" replaced by "Annotations", or in annotations/xmls, labels, xml. All are
+/// read at opening, since classes are
 /// numbered by their names' order, as with MOT's and tables' labels; an image without boxes has a
 /// file without <object>. Edges count from LabelSpec::edges_from; else from 0 where a box of the
 /// source begins there, as none of VOC's own can, and from 1 where none does. A note tells.

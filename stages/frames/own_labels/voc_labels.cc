@@ -146,7 +146,8 @@ Outcome<ImageLabels> parse_voc_labels(std::string xml, int edges_from, const std
 
 namespace {
 
-const LabelFiles kVocFiles{".xml", {"JPEGImages", "images"}, {"Annotations", "annotations"}, ""};
+const LabelFiles kVocFiles{
+    ".xml", {"jpegimages", "images"}, {"annotations", "annotations/xmls", "labels", "xml", "xmls"}};
 
 class VocLabels : public FilePerImage {
  public:

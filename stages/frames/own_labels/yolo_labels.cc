@@ -1,18 +1,69 @@
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
+#include "manifests/values/text.h"
+#include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/own_labels/detail/file_per_image.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/own_labels/detail/yolo_text.h"
+#include "stages/frames/sequences/image_folder.h"
 
 namespace eventgan {
 namespace {
 
-constexpr std::string_view kNamesFile = "data.yaml", kClassesFile = "classes.txt";
-const LabelFiles kYoloFiles{".txt", {"images"}, {"labels"}, kClassesFile};
+/// Texts that tools put beside the labels: lists of images, names of classes.
+bool is_other_text(std::string_view file) {
+  constexpr std::array<std::string_view, 10> kOthers = {
+      "classes.txt", "predefined_classes.txt", "labels.txt", "train.txt", "val.txt", "valid.txt",
+      "test.txt",    "autosplit.txt",          "obj.txt",    "readme.txt"};
+  const std::string name = in_small_letters(std::string(file));
+  return name.starts_with("readme.") || std::ranges::find(kOthers, name) != kOthers.end();
+}
+
+const LabelFiles kYoloFiles{".txt", {"images"}, {"labels"}, is_other_text};
+
+/// Whether a text is of YOLO's boxes, by its first line that says anything: a class, and shares of
+/// the image. None if no line does.
+std::optional<bool> is_yolo_text(std::string_view text) {
+  for (const TextLine& line : split_lines(text)) {
+    const std::vector<std::string_view> columns = split_columns(line.bytes);
+    if (columns.empty()) continue;
+    if (columns.size() < 5) return false;
+    for (std::size_t i = 1; i < columns.size(); ++i) {
+      constexpr double kMost = 1.1, kVisible = 2;  // joints have their visibility among the shares
+      const auto share = parse_number<double>(columns[i]);
+      if (!share || *share < 1 - kMost || *share > (i < 5 ? kMost : kVisible)) return false;
+    }
+    const auto number = parse_number<double>(columns[0]);
+    return number && *number >= 0 && *number == std::floor(*number);
+  }
+  return std::nullopt;
+}
+
+/// data.yaml, classes.txt, obj.names of CVAT, _darknet.labels of Roboflow, or the only other YAML
+/// file; empty if there is none.
+std::string names_file_in(const std::filesystem::path& folder) {
+  for (const char* name :
+       {"data.yaml", "data.yml", "classes.txt", "obj.names", "_darknet.labels"}) {
+    if (has_file(folder / name)) return name;
+  }
+  std::vector<std::filesystem::path> others;
+  for (const char* extension : {".yaml", ".yml"}) {
+    for (const auto& name : names_with(look_into(folder), extension)) {
+      if (("\n" + beginning_of(folder / name)).find("\nnames:") != std::string::npos) {
+        others.push_back(name);
+      }
+    }
+  }
+  return others.size() == 1 ? others.front().string() : "";
+}
 
 class YoloLabels : public FilePerImage {
  public:
@@ -33,23 +84,69 @@ class YoloLabels : public FilePerImage {
  private:
   void read_classes() {
     for (const SourceRoot& place : {root(), root().above()}) {
-      for (const std::string_view name : {kNamesFile, kClassesFile}) {
-        if (!place.has_file(name)) continue;
-        const std::string text = place.read_or_throw(name);
-        const std::string path = place.written(name);
-        classes_ =
-            name == kClassesFile ? parse_yolo_classes(text, path) : parse_yolo_yaml(text, path);
-        schema_ = classes_.names;
-        annotation_files_.push_back(path);
-        return;
+      const std::string name = names_file_in(place.on_disk(""));
+      if (name.empty()) continue;
+      const std::string text = place.read_or_throw(name);
+      const std::string path = place.written(name);
+      const std::string extension = lower_extension(name);
+      classes_ = extension == ".yaml" || extension == ".yml" ? parse_yolo_yaml(text, path)
+                                                             : parse_yolo_classes(text, path);
+      schema_ = classes_.names;
+      annotation_files_.push_back(path);
+      return;
+    }
+    number_classes();
+  }
+
+  /// Without names these are the numbers, up to the highest that a text has.
+  void number_classes() {
+    constexpr int kMost = 100'000;
+    int highest = -1;
+    for (const FrameLabel& label : labels()) {
+      const Outcome<std::string> text =
+          label.key.empty() ? Outcome<std::string>(std::string()) : root().read(label.key);
+      if (is_fault(text)) continue;  // a fault of its sample
+      for (const TextLine& line : split_lines(*text)) {
+        const std::vector<std::string_view> columns = split_columns(line.bytes);
+        const auto number = columns.empty() ? std::nullopt : parse_number<double>(columns[0]);
+        if (number && *number <= kMost) highest = std::max(highest, static_cast<int>(*number));
       }
     }
-    throw InputError("expected data.yaml or classes.txt with the classes' names, got neither, in " +
-                     root().written("") + " and the folder above it");
+    if (highest < 0) {
+      throw InputError(
+          "expected data.yaml or classes.txt with the classes' names, or boxes, got "
+          "neither, in " +
+          root().written("") + " and the folder above it");
+    }
+    for (int i = 0; i <= highest; ++i) schema_.class_names.push_back(std::to_string(i));
+    classes_.names = schema_;
+    notes_.push_back("classes are named by their numbers, 0.." + std::to_string(highest) +
+                     ", since no data.yaml or classes.txt with names is in " + root().written("") +
+                     " or the folder above it");
   }
 
   YoloSchema classes_;
 };
+
+/// Whether some of the texts in a folder, or in folders of it, are YOLO's.
+bool has_yolo_texts(const std::filesystem::path& labels) {
+  constexpr std::size_t kMost = 20;  // texts of images without objects say nothing
+  std::vector<std::filesystem::path> texts;
+  const auto add = [&](const std::filesystem::path& folder) {
+    for (const auto& name : names_with(look_into(folder), ".txt")) {
+      if (texts.size() == kMost) return;
+      if (!is_other_text(name.string())) texts.push_back(folder / name);
+    }
+  };
+  add(labels);
+  for (const std::string& folder : look_into(labels).folders) {
+    if (texts.size() == kMost) break;
+    add(labels / folder);
+  }
+  return std::ranges::any_of(texts, [](const std::filesystem::path& text) {
+    return is_yolo_text(beginning_of(text)).value_or(false);
+  });
+}
 
 std::optional<std::filesystem::path> find_yolo(const FoundFrames& frames,
                                                std::vector<std::string>& remarks) {
@@ -58,9 +155,12 @@ std::optional<std::filesystem::path> find_yolo(const FoundFrames& frames,
   const bool is_beside = labels == frames.root;  // of texts there, folders above have none
   std::filesystem::path folder = labels;
   for (int level = 0; level < (is_beside ? 2 : 3); ++level, folder = folder.parent_path()) {
-    for (const std::string_view name : {kNamesFile, kClassesFile}) {
-      if (has_file(folder / name)) return is_beside ? labels : folder;
-    }
+    if (!names_file_in(folder).empty()) return is_beside ? labels : folder;
+  }
+  if (has_yolo_texts(labels)) {
+    remarks.push_back("no data.yaml or classes.txt with the classes' names, which are numbers: " +
+                      labels.string());
+    return labels;
   }
   if (!is_beside) {
     remarks.push_back("no data.yaml or classes.txt, so that YOLO's labels are left out: " +

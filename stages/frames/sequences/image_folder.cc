@@ -1,7 +1,6 @@
 #include "stages/frames/sequences/image_folder.h"
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cstddef>
 #include <map>
@@ -15,10 +14,7 @@
 namespace eventgan {
 
 std::string lower_extension(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
+  return in_small_letters(file.extension().string());
 }
 
 namespace {

@@ -76,6 +76,9 @@ class ImagesDataset final : public Dataset {
   const std::vector<LabelledFrame>& labelled_frames() const override { return labelled_; }
   std::vector<std::string> annotation_files() const override { return annotation_files_; }
   std::vector<std::string> notes() const override { return notes_; }
+  std::vector<std::string> warnings() const override {
+    return labels_ ? labels_->warnings() : std::vector<std::string>();
+  }
 
   PairedFrame paired_frame(const LabelledFrame& labelled, int steps) const override {
     if (labelled.frame.index == kAbsentFrame) return {PairedFrame::State::kMissing, labelled.frame};

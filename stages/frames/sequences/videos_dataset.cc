@@ -119,6 +119,9 @@ class VideosDataset final : public Dataset {
   const LabelSchema& label_schema() const override { return labels_ ? labels_->schema() : schema_; }
   const std::vector<LabelledFrame>& labelled_frames() const override { return labelled_; }
   std::vector<std::string> notes() const override { return notes_; }
+  std::vector<std::string> warnings() const override {
+    return labels_ ? labels_->warnings() : std::vector<std::string>();
+  }
   std::vector<std::string> annotation_files() const override { return annotation_files_; }
 
   PairedFrame paired_frame(const LabelledFrame& labelled, int steps) const override {

@@ -10,8 +10,9 @@
 namespace eventgan {
 
 // Entries of a COCO file that was indexed, read strictly; keys that are not needed are passed over.
-// All throw BadLabel, "PATH (annotation 17): $.bbox[2]: expected X, got Y", a line a
-// fault; an id that is another than expected is a fault too, since the file has changed then.
+// 2.0 is taken for 2, and null for a key that may be missing. All throw BadLabel, "PATH (annotation
+// 17): $.bbox[2]: expected X, got Y", a line a fault; an id that is another than expected is a
+// fault too, since the file has changed then.
 
 /// What an entry of `images` says of the image's size.
 ImageSize read_coco_image(const std::string& text, std::int64_t id, const std::string& path);
@@ -20,7 +21,9 @@ ImageSize read_coco_image(const std::string& text, std::int64_t id, const std::s
 /// them has. Throws InputError if two have different ones.
 LabelSchema coco_schema(const CocoIndex& index, const std::string& path);
 
-/// Adds an entry of `annotations`, a box and perhaps a person, to those of the image.
+/// Adds an entry of `annotations`, a box and perhaps a person, to those of the image; or counts a
+/// box that is left out. Not looked at is what no label comes of: num_keypoints, keypoints of a
+/// category without names of them.
 void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSize image,
                          const CocoIndex& index, const LabelSchema& schema, const std::string& path,
                          Annotation& annotation);

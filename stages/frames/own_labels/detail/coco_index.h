@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "manifests/values/frames.h"
 #include "stages/base/files/input_file.h"
 
 namespace eventgan {
@@ -21,6 +22,7 @@ struct CocoIndex {
     std::int64_t id = 0;
     ByteRange entry;  ///< from '{' to '}'
     std::string file_name;
+    ImageSize size;                    ///< 0 where the entry has no sound one
     std::size_t first_annotation = 0;  ///< in `annotations`; its last is before the next image's
   };
   struct Category {
@@ -30,7 +32,10 @@ struct CocoIndex {
   };
   std::vector<Image> images;           ///< in the file's order, and one without id behind them
   std::vector<ByteRange> annotations;  ///< by image, of each in the file's order
-  std::vector<Category> categories;    ///< ascending by id, distinct ids and names
+  /// Ascending by id, distinct ids and names; without those whose name an annotated one has.
+  std::vector<Category> categories;
+  std::size_t compared_boxes = 0;  ///< some of the file's first boxes
+  std::size_t boxes_beyond = 0;  ///< of them those that reach beyond their image's right or bottom
 
   std::size_t image_count() const { return images.size() - 1; }
 };
@@ -39,8 +44,8 @@ struct CocoIndex {
 /// alone. Throws InputError naming the file (`written`) if it cannot be read, is not JSON, or has
 /// no lists `images`, `annotations` and `categories` of entries that each have what joins them
 /// (images[].id and file_name, annotations[].image_id, categories[].id and name); if an image, a
-/// category or a category's name is there twice, or an annotation is of no image: these all
-/// counted, and the first twenty named.
+/// category or the name of a category with annotations is there twice, or an annotation is of no
+/// image: these all counted, and the first twenty named. 2.0 is taken for 2.
 CocoIndex index_coco(const InputFile& file, const std::string& written);
 
 }  // namespace eventgan

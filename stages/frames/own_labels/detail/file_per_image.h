@@ -12,12 +12,13 @@
 
 namespace eventgan {
 
-/// How the files of a format are called, and their folders.
+/// How the files of a format are called, and their folders: all in small letters, on disk in any.
 struct LabelFiles {
   std::string_view extension;                   ///< ".txt", in small letters
   std::vector<std::string_view> image_folders;  ///< in an image's path the last of these ...
   std::vector<std::string_view> label_folders;  ///< ... is one of these in its label's
-  std::string_view other_file;                  ///< no label, though it has the extension
+  /// No label, though it has the extension.
+  bool (*is_other)(std::string_view file) = [](std::string_view) { return false; };
 };
 
 /// The folder of labels that stands for a folder of images, at its own path; empty if there is
@@ -25,7 +26,7 @@ struct LabelFiles {
 std::filesystem::path label_folder_of(const std::filesystem::path& images, const LabelFiles& names);
 
 /// Where labels of these frames lie that have a file each: in the folder that stands for the root,
-/// or beside the images; empty if there are none.
+/// or beside the images, or in a folder of labels beside or above them; empty if there are none.
 std::filesystem::path find_label_files(const FoundFrames& frames, const LabelFiles& names);
 
 /// Labels of which each image has a file, NAME.EXTENSION of NAME.png. It is at the image's own path

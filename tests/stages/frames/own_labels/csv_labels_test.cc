@@ -60,6 +60,31 @@ TEST(CsvLabels, ColumnsComeInAnyOrderAndTrackMayBeAbsent) {
   EXPECT_THAT(read_csv(""), IsEmpty());
 }
 
+TEST(CsvLabels, ColumnsAreCalledAsToolsCallThem) {
+  const Rectangle expected{1, 2, 4, 6};
+  for (const char* table :
+       {"filename,width,height,class,xmin,ymin,xmax,ymax\na.png,64,48,car,1,2,4,6\n",
+        "image,class,x1,y1,x2,y2,track,note\na.png,car,1,2,4,6,,area=3\n",
+        "frame;label;left;top;width;height\na.png;car;1;2;3;4\n",
+        "image;label;x;y;w;h\na.png;car;1,0;2;3;4,0\n",
+        "image_name\tclass_name\tx_min\ty_min\tx_max\ty_max\na.png\tcar\t1\t2\t4\t6\n",
+        ",\"image\",\"xmin\",\"ymin\",\"xmax\",\"ymax\",\"label\"\n0,\"a.png\",1,2,4,6,\"car\"\n",
+        "frame,image,label,x1,y1,x2,y2\n12,a.png,car,1,2,4,6\n"}) {
+    const auto images = parse_csv_labels(table, "labels.csv");
+    ASSERT_THAT(images, SizeIs(1)) << table;
+    ASSERT_FALSE(is_fault(images.at("a.png"))) << images.at("a.png").fault().reason;
+    EXPECT_EQ(images.at("a.png")->boxes.at(0).box.xyxy, expected) << table;
+    EXPECT_EQ(images.at("a.png")->boxes.at(0).class_name, "car") << table;
+  }
+  EXPECT_THAT(
+      parse_csv_labels("filename,width,height,class,xmin,ymin,xmax,ymax\na.png,64,48,,,,,\n",
+                       "labels.csv")
+          .at("a.png")
+          ->boxes,
+      IsEmpty());
+  EXPECT_EQ(read_csv("a.png,car,1,2,3,4,7.0\n").at("a.png")->boxes.at(0).box.track_id, 7);
+}
+
 TEST(CsvLabels, ABadRowSpoilsItsImageAlone) {
   const std::string place = ", in labels.csv:2";
   EXPECT_EQ(csv_fault("a.png,,1,2,3,4,\n"),
@@ -73,8 +98,9 @@ TEST(CsvLabels, ABadRowSpoilsItsImageAlone) {
             "expected right within 1e+06 pixels, got '1e999'" + place);
   EXPECT_EQ(csv_fault("a.png,car,1,-1000001,3,4,\n"),
             "expected top within 1e+06 pixels, got '-1000001'" + place);
-  EXPECT_EQ(csv_fault("a.png,car,3,2,3,4,\n"),
-            "expected left < right and top < bottom, got 3, 2, 3, 4" + place);
+  EXPECT_EQ(csv_fault("a.png,car,3,2,3,4,\n"), "no fault") << "it is left out";
+  EXPECT_EQ(csv_fault("a.png,car,3.5,2,3,4,\n"),
+            "expected left < right and top < bottom, got 3.5, 2, 3, 4" + place);
   EXPECT_EQ(csv_fault("a.png,car,1,5,3,4,\n"),
             "expected left < right and top < bottom, got 1, 5, 3, 4" + place);
   for (const char* track : {"-1", "1.5", "x", "9223372036854775808"}) {
@@ -105,6 +131,9 @@ TEST(CsvLabels, ARowThatDoesNotTellItsImageIsRefused) {
   refuses("image,class,left,top,right\n", "expected a column bottom, got none, in labels.csv:1");
   refuses("image,class,left,top,right,bottom,score\n", "got \"score\", in labels.csv:1");
   refuses("a.png,car,1,2,3,4\n", "got \"a.png\", in labels.csv:1");
+  refuses("image,class,left,left,top,right,bottom\n", "got \"left\", in labels.csv:1");
+  refuses(header + "a.png,car,0.1,0.2,0.3,0.4,\nb.png,car,0,0,1,1,\nc.png,car,0,0,0.5,0.5,\n",
+          "expected edges in pixels, got shares of the image, 0..1, in labels.csv");
   refuses(header + "a.png,car,1,2,3,4\n", "expected 7 fields, got 6, in labels.csv:2");
   refuses(header + "a.png,car,1,2,3,4,,\n", "expected 7 fields, got 8, in labels.csv:2");
   refuses(header + ",car,1,2,3,4,\n", "expected an image without control characters, got ''");
