@@ -258,7 +258,7 @@ std::vector<std::string> findings_of(const SourceDraft& draft, const Survey& sur
   std::vector<std::string> lines;
   lines.push_back(std::string(found.title) + ": " +
                   count_text(survey.labelled_frames, is_events ? "sample" : "labelled frame"));
-  if (survey.sequences > 0) {
+  if (survey.sequences > 0 && !draft.is_stills) {
     lines.back() += " of " + count_text(survey.sequences, is_events ? "recording" : "sequence");
   }
   lines.back() += ", " + count_text(survey.annotation_files, "annotation file");
