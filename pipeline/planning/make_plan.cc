@@ -20,6 +20,7 @@
 #include "manifests/values/text.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/trace.h"
+#include "stages/frames/class_numbers.h"
 #include "stages/frames/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/frame_selection.h"
@@ -435,6 +436,7 @@ void open_datasets(const JobManifest& manifest, const PlanningOptions& options,
     datasets.push_back(open_dataset(source, manifest.directory));
     phase.advance();
   }
+  number_classes(manifest.sources, datasets);
 }
 
 }  // namespace
