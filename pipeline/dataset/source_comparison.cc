@@ -204,7 +204,8 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   }
   expected.source_size = placement.source;
   expected.source_to_volume = map;
-  const PairKey key{manifest_.seed, to_string(kind), planned.sample_id};
+  const std::string of_source = source_key(manifest_.sources, source);
+  const PairKey key{manifest_.seed, to_string(kind), planned.sample_id, of_source};
   if (const auto threshold = pair_threshold(manifest_.generator, key)) {
     expected.threshold = threshold->mean;
   }
