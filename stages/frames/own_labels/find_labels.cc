@@ -80,11 +80,22 @@ FoundFrames frames_in(const fs::path& root, WholeFiles& files) {
     if (is_video_name(name)) frames.stems.insert(name.stem().string());
   }
   if (!frames.stems.empty()) return frames;
+  const auto has_frames = [](const fs::path& folder) {
+    return !look_into(folder).files.empty() && !list_image_folder(folder).frames.empty();
+  };
+  const auto is_of_images = [](const std::string& name) {
+    return name == "images" || name == "JPEGImages" || name == "img1";
+  };
   for (const std::string& name : listed.folders) {
-    const auto has_frames = [](const fs::path& folder) {
-      return !look_into(folder).files.empty() && !list_image_folder(folder).frames.empty();
-    };
-    if (has_frames(root / name) || has_frames(root / name / "img1")) frames.folders.push_back(name);
+    if (has_frames(root / name) || has_frames(root / name / "img1")) {
+      frames.folders.push_back(name);
+      continue;
+    }
+    if (is_of_images(name)) continue;
+    for (const std::string& below : look_into(root / name).folders) {  // two deep
+      if (is_of_images(below) || !has_frames(root / name / below)) continue;
+      frames.folders.push_back(name + "/" + below);
+    }
   }
   return frames;
 }
@@ -105,6 +116,21 @@ std::optional<FoundLabels> find_any(const FoundFrames& frames, std::vector<std::
   return found;
 }
 
+/// The split that a folder's name states, in letters of any case: "val" of "valid" and of
+/// "VAL2017"; empty if none.
+std::string_view split_of(std::string name) {
+  static const std::map<std::string_view, std::string_view> kSplits = {
+      {"train", "train"}, {"training", "train"}, {"val", "val"},
+      {"valid", "val"},   {"validation", "val"}, {"eval", "val"},
+      {"dev", "val"},     {"test", "test"},      {"testing", "test"}};
+  name.erase(name.find_last_not_of("0123456789") + 1);
+  std::ranges::transform(name, name.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  const auto split = kSplits.find(name);
+  return split == kSplits.end() ? "" : split->second;
+}
+
 /// The folders of images that labels may be of, those that are most likely first.
 std::vector<fs::path> places_in(const fs::path& root) {
   if (has_file(root)) return {root};
@@ -115,9 +141,12 @@ std::vector<fs::path> places_in(const fs::path& root) {
   constexpr std::array<std::string_view, 3> kOfImages = {"images", "JPEGImages", "img1"};
   for (const std::string_view name : kOfImages) add(root / name);
   places.push_back(root);
+  const auto is_train = [](const std::string& name) {
+    return name.starts_with("train") || split_of(name) == "train";
+  };
   for (const bool train : {true, false}) {
     for (const std::string& name : look_into(root).folders) {
-      if (name.starts_with('.') || name.starts_with("train") != train) continue;
+      if (name.starts_with('.') || is_train(name) != train) continue;
       if (std::ranges::find(kOfImages, name) == kOfImages.end()) add(root / name);
       add(root / name / "images");
     }
@@ -128,14 +157,6 @@ std::vector<fs::path> places_in(const fs::path& root) {
 bool is_below(const fs::path& path, const fs::path& folder) {
   const fs::path relative = path.lexically_relative(folder);
   return !relative.empty() && *relative.begin() != "..";
-}
-
-/// The split that a folder's name states: "val" of "valid" and of "val2017"; empty if none.
-std::string_view split_of(std::string name) {
-  name.erase(name.find_last_not_of("0123456789") + 1);
-  if (name == "train") return "train";
-  if (name == "val" || name == "valid" || name == "validation") return "val";
-  return name == "test" ? "test" : "";
 }
 
 /// A source for each split that has a folder of images with labels of its own, train first; none
@@ -201,11 +222,28 @@ void note_other_images(const std::vector<fs::path>& with_frames, const fs::path&
     found.remarks.push_back("warning: " + counted(left_out, "folder", " of images left out"));
   }
   const std::vector<std::string> folders = frames_in(found.root, files).folders;
-  if (std::ranges::find(folders, "train") == folders.end()) return;
+  const auto is_train = [](const std::string& name) { return split_of(name) == "train"; };
+  if (std::ranges::none_of(folders, is_train)) return;
   for (const std::string& name : folders) {
-    if (name != "val" && name != "valid" && name != "test") continue;
+    if (split_of(name).empty() || is_train(name)) continue;
     found.remarks.push_back("warning: images of " + name +
                             " are in split train, too: give each its own source with \"split\"");
+  }
+}
+
+/// Tells of lists that divide the images of the only source.
+void note_lists(const fs::path& given, const FoundFrames& frames, FoundSource& source) {
+  for (const fs::path& folder : {given, given / "ImageSets/Main"}) {
+    std::vector<std::string> lists;
+    for (const fs::path& name : names_with(look_into(folder), ".txt")) {
+      const std::string stem = name.stem().string();
+      const bool is_list = !split_of(stem).empty() && !frames.stems.contains(stem);
+      if (is_list) lists.push_back(name.string());
+    }
+    if (lists.empty()) continue;
+    source.remarks.push_back(
+        "warning: " + counted(lists, "list", " of a split not used in " + folder.string()) +
+        "; give each split its own source with \"ids\", a sample id a line");
   }
 }
 
@@ -249,6 +287,7 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
                                       " of " + place.string());
   }
   note_other_images(with_frames, given, files, sources);
+  if (sources.size() == 1) note_lists(given, whole, sources.front());
   return sources;
 }
 

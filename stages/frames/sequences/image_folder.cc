@@ -304,7 +304,8 @@ NamedSequences name_sequences(const NumberedSequence& images) {
     if (alike.size() == 1) continue;
     sequence.is_only = false;
     sequence.name = trimmed_end(sequence.before);
-    if (sequence.name.empty() || !taken.insert(sequence.name).second) {
+    const bool is_plain = sequence.after.empty() || !sequence.name.empty();
+    if (!is_plain || !taken.insert(sequence.name).second) {
       sequence.name = sequence.before + "*" + sequence.after;
     }
   }

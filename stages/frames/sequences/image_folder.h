@@ -38,7 +38,8 @@ ImageFolder list_image_folder(const std::filesystem::path& folder);
 
 /// Frames that follow each other, as the names of a folder's images tell.
 struct NamedSequence {
-  /// What the names say before the number, such as "aachen_000000"; empty of the only sequence.
+  /// What the names say before the number, such as "aachen_000000"; empty of the only sequence, and
+  /// of names that are numbers alone.
   std::string name;
   NumberedSequence frames;
   /// By the frames' numbers, in seconds since the first, strictly ascending, where names are times;

@@ -140,6 +140,11 @@ TEST(NameSequences, AreWhatNamesSayBeforeTheNumber) {
                     {"cover", {{0, "cover.png"}}}});
 }
 
+TEST(NameSequences, NumbersAloneAreTheFoldersOwn) {
+  expect_sequences({"1.png", "2.png", "thumb.png"},
+                   {{"", {{1, "1.png"}, {2, "2.png"}}}, {"thumb", {{0, "thumb.png"}}}});
+}
+
 TEST(NameSequences, TheSmallestStepOfASequenceIsOneFrame) {
   // Of two frames alone it is the folder's.
   expect_sequences({"a_0.png", "a_10.png", "a_30.png", "b_4.png", "b_9.png", "c_7.png"},
