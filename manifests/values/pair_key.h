@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "manifests/values/counter_random.h"
 #include "manifests/values/job.h"
@@ -17,13 +20,30 @@ struct PairKey {
   std::uint64_t seed = 0;
   std::string_view dataset;
   std::string_view sample_id;
+  std::string_view source = {};  ///< source_key of the sample's source
 
   /// The pair's own; keyed on by a word for each thing that is drawn.
-  CounterRandom pair() const { return CounterRandom(seed).keyed(dataset).keyed(sample_id); }
+  CounterRandom pair() const {
+    const CounterRandom of_kind = CounterRandom(seed).keyed(dataset);
+    return (source.empty() ? of_kind : of_kind.keyed(source)).keyed(sample_id);
+  }
 
   /// Those of the camera, which all pairs of a kind of dataset share.
   CounterRandom camera() const { return CounterRandom(seed).keyed("camera").keyed(dataset); }
 };
+
+/// What tells a source's draws from those of the others of its kind, whose samples may have the
+/// same ids: the split, unless that is train; and of sources of one split their roots, but for the
+/// first root in the order of bytes. So the only source of a job has none, and one that is added
+/// moves no pair of another split, and in its own at most those of the root that was first.
+inline std::string source_key(const std::vector<SourceSpec>& sources, std::size_t source) {
+  const SourceSpec& own = sources.at(source);
+  const bool is_first = std::ranges::none_of(sources, [&](const SourceSpec& other) {
+    return other.dataset == own.dataset && other.split == own.split && other.root < own.root;
+  });
+  const std::string split = own.split == "train" ? "" : own.split;
+  return is_first ? split : split + "\n" + own.root;
+}
 
 /// The contrast threshold of a pair's sensor, its mean drawn log-uniformly from the range that the
 /// manifest tells; none if it tells none. Pure.

@@ -14,12 +14,14 @@
 #include "manifests/values/text.h"
 #include "pipeline/conversion/earlier_shards.h"
 #include "pipeline/conversion/shard_sink.h"
+#include "pipeline/folder/amendments.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_backup.h"
 #include "pipeline/folder/shard_scan.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/runtime/trace.h"
+#include "stages/frames/class_numbers.h"
 
 namespace eventgan {
 namespace {
@@ -167,6 +169,11 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
   FrozenPlan frozen = prepare_folder(folder, manifest, std::move(planned.plan), options);
   if (frozen.plan.fingerprint != fingerprint) {  // inputs were mended since
     complete_plan(manifest, planned.datasets, frozen.plan);
+  }
+  if (!read_amendments(folder, frozen.hash).empty()) {  // a retry may have added classes
+    number_classes(manifest.sources, planned.datasets,
+                   stored_classes(folder, outline_of(frozen.plan).shards, frozen.hash,
+                                  manifest.sources.size()));
   }
   const ConversionJob job{manifest, planned.datasets, generator, weights_hash,
                           folder,   frozen,           options};

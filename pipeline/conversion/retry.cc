@@ -26,6 +26,7 @@
 #include "pipeline/runtime/threads.h"
 #include "pipeline/runtime/trace.h"
 #include "stages/base/files/file_lock.h"
+#include "stages/frames/class_numbers.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {
@@ -140,21 +141,62 @@ std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenP
   return std::move(earlier.done);
 }
 
+/// Gives all sources the class numbers that their committed shards have, and tells which sources
+/// have classes that these shards do not name yet.
+std::vector<bool> number_as_stored(const fs::path& folder, const FrozenOutline& frozen,
+                                   const JobManifest& manifest,
+                                   std::vector<std::unique_ptr<Dataset>>& datasets) {
+  const auto stored =
+      stored_classes(folder, frozen.plan.shards, frozen.hash, manifest.sources.size());
+  number_classes(manifest.sources, datasets, stored);
+  std::vector<bool> have_new;
+  for (std::size_t i = 0; i < datasets.size(); ++i) {
+    have_new.push_back(stored[i] && datasets[i]->label_schema().class_names != *stored[i]);
+  }
+  return have_new;
+}
+
+/// Names a source's new classes in all its committed shards, the first of them last: where that has
+/// been done (stored_classes), it has been for all.
+void add_classes(const fs::path& folder, const FrozenPlan& frozen,
+                 const std::vector<std::unique_ptr<Dataset>>& datasets,
+                 const std::vector<bool>& have_new, const RunOptions& options,
+                 RetryReport& report) {
+  std::vector<const PlannedShard*> shards;
+  for (auto shard = frozen.plan.shards.rbegin(); shard != frozen.plan.shards.rend(); ++shard) {
+    if (have_new[static_cast<std::size_t>(shard->source)]) shards.push_back(&*shard);
+  }
+  if (shards.empty()) return;
+  const EarlierShards earlier =
+      check_earlier_shards(folder, frozen, shards,
+                           {thread_count(options.threads), [&] { return options.stop_requested(); },
+                            options.trace, options.show_phase});
+  for (const CommittedShard& committed : earlier.done) {
+    if (options.stop_requested()) return;
+    const auto source = static_cast<std::size_t>(committed.shard->source);
+    ShardRewrite rewrite(folder, committed.record, std::nullopt,
+                         datasets[source]->label_schema().class_names);
+    report.shards_renamed += rewrite.commit();
+  }
+}
+
 /// Puts redone samples into their committed shards; for each shard once it is through, `report`
 /// gets tried, mended, failed, shards_rewritten and what is quarantined still.
 class RetrySink final : public SampleSink {
  public:
   /// Takes what plan_retry made of `shards`. All must outlive the sink.
-  RetrySink(const fs::path& folder, const std::vector<CommittedShard>& shards, RetryReport& report,
+  RetrySink(const fs::path& folder, const std::vector<CommittedShard>& shards,
+            const std::vector<std::unique_ptr<Dataset>>& datasets, RetryReport& report,
             TraceRecorder* trace)
-      : folder_(folder), shards_(shards), report_(report), trace_(trace) {}
+      : folder_(folder), shards_(shards), datasets_(datasets), report_(report), trace_(trace) {}
 
   void open(const PlannedShard& shard) override {
     const auto committed = std::ranges::find_if(
         shards_, [&](const CommittedShard& one) { return one.record.shard == shard.name; });
     record_ = &committed->record;
     rewrite_ = std::make_unique<ShardRewrite>(
-        folder_, *record_, shard.size_unknown ? std::optional(shard.volume_size) : std::nullopt);
+        folder_, *record_, shard.size_unknown ? std::optional(shard.volume_size) : std::nullopt,
+        datasets_[static_cast<std::size_t>(shard.source)]->label_schema().class_names);
   }
 
   void add(const SampleMessage& message) override {
@@ -190,9 +232,10 @@ class RetrySink final : public SampleSink {
  private:
   const fs::path& folder_;
   const std::vector<CommittedShard>& shards_;
-  const CommitRecord* record_ = nullptr;   // of the shard under way
-  std::unique_ptr<ShardRewrite> rewrite_;  // of the shard under way
-  std::vector<QuarantinedSlot> failed_;    // of the shard under way
+  const std::vector<std::unique_ptr<Dataset>>& datasets_;  // one for each source
+  const CommitRecord* record_ = nullptr;                   // of the shard under way
+  std::unique_ptr<ShardRewrite> rewrite_;                  // of the shard under way
+  std::vector<QuarantinedSlot> failed_;                    // of the shard under way
   RetryReport& report_;
   TraceRecorder* trace_;
 };
@@ -207,7 +250,10 @@ std::optional<RetryReport> nothing_to_retry(const fs::path& folder, const Frozen
   if (found.count > 0) return std::nullopt;
   RetryReport report = new_report(folder, found, frozen.plan.sample_count());
   const Fingerprint& before = frozen.plan.fingerprint;
-  Fingerprint now = plan_again(manifest, "", "", before, options).plan.fingerprint;
+  PlannedJob job = plan_again(manifest, "", "", before, options);
+  const auto have_new = number_as_stored(folder, frozen, manifest, job.datasets);
+  if (std::ranges::find(have_new, true) != have_new.end()) return std::nullopt;
+  Fingerprint& now = job.plan.fingerprint;
   for (auto& [field, value] : now) {
     const auto known = before.find(field);
     if (known == before.end() || is_amendable(field) || field.starts_with("manifest ")) continue;
@@ -235,10 +281,13 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
 
   PlannedJob job =
       plan_again(manifest, weights_hash, generator.description(), frozen.plan.fingerprint, options);
+  const auto have_new = number_as_stored(folder, outline, manifest, job.datasets);
   accept_inputs(folder, frozen.hash, frozen.plan.fingerprint, job.plan.fingerprint, manifest,
                 found.ids, report);
   job.plan = {};  // the frozen one counts, and it can be huge
   complete_plan(manifest, job.datasets, frozen.plan);
+  const bool finalized = fs::exists(folder / "dataset.json");
+  add_classes(folder, frozen, job.datasets, have_new, options, report);
 
   const std::vector<CommittedShard> shards = trusted_shards(folder, frozen, found, options, report);
   std::vector<PlannedShard> retried = plan_retry(shards);
@@ -250,8 +299,7 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
     retried[i].volume_size = ShardReader(folder / retried[i].name).header().volume.size;
   }
   const std::int64_t to_do = report.quarantined;
-  const bool finalized = fs::exists(folder / "dataset.json");
-  RetrySink sink(folder, shards, report, options.trace);
+  RetrySink sink(folder, shards, job.datasets, report, options.trace);
   run_conversion("redo samples",
                  {manifest, job.datasets, generator, weights_hash, folder, frozen, options},
                  to_redo, sink);
@@ -282,6 +330,9 @@ std::string to_text(const RetryReport& report) {
         "inputs changed since the plan was frozen ({}): recorded, eventgan convert will accept "
         "them\n",
         fmt::join(report.changed_inputs, ", "));
+  }
+  if (report.shards_renamed > 0) {
+    text += "classes were added: named in " + count_text(report.shards_renamed, "shard") + "\n";
   }
   if (report.tried == 0 && report.quarantined == 0) {
     text += "nothing to retry: no sample of a committed shard is quarantined\n";
@@ -324,6 +375,7 @@ std::string to_json(const RetryReport& report) {
                                {"failed", failed},
                                {"quarantined", report.quarantined},
                                {"shards_rewritten", report.shards_rewritten},
+                               {"shards_renamed", report.shards_renamed},
                                {"damaged_shards", report.damaged_shards},
                                {"shards_missing", report.shards_missing},
                                {"changed_inputs", report.changed_inputs},

@@ -42,6 +42,7 @@ struct RetryReport {
   std::vector<QuarantinedSlot> failed;  ///< the others: tried again and failed again
   std::int64_t quarantined = 0;         ///< samples that are quarantined now, tried or not
   int shards_rewritten = 0;
+  int shards_renamed = 0;  ///< that have classes more, which their source's labels have gained
   std::vector<std::string> damaged_shards;  ///< "PATH: expected X, got Y": left to `convert`
   int shards_missing = 0;                   ///< not made yet: left to `convert`
   /// Fields of the fingerprint in which the inputs have changed since the plan was frozen, or since
@@ -59,7 +60,8 @@ std::string to_text(const RetryReport& report);
 /// One line of JSON.
 std::string to_json(const RetryReport& report);
 
-/// The report where no committed shard of the folder has a quarantined sample; none if one has.
+/// The report where no committed shard of the folder has a quarantined sample; none if one has, or
+/// if labels have gained classes.
 /// First cleans up what a retry that was killed has left (see restore_shards). Inputs that have
 /// changed are recorded all the same (see retry): without that `convert` would not go on. No
 /// generator is needed, nor the machine that converts: weights, engine, processor and libraries are
@@ -69,7 +71,9 @@ std::optional<RetryReport> nothing_to_retry(const std::filesystem::path& folder,
                                             const JobManifest& manifest, const RunOptions& options);
 
 /// Redoes the quarantined samples of an output folder's committed shards, after its inputs were
-/// mended; every other byte of the shards stays, and plan.json does. A shard is written again only
+/// mended; every other byte of the shards stays, and plan.json does. Classes keep their numbers;
+/// where a source's labels have gained some, all its committed shards get their names first, behind
+/// those they have (number_classes). A shard is written again only
 /// if a sample of it is mended now or fails for another reason. Shards that are damaged, or not
 /// made yet, are left to `convert`. A shard whose size was unknown at planning gets that of its
 /// mended images with its first good sample (see complete_plan).

@@ -70,7 +70,11 @@ SampleStages::SampleStages(const JobManifest& manifest,
       generator_(generator),
       in_flight_(static_cast<std::size_t>(in_flight)),
       reader_(manifest.directory, manifest.image, in_flight),
-      codec_(manifest.output.dtype, manifest.output.deflate_level) {}
+      codec_(manifest.output.dtype, manifest.output.deflate_level) {
+  for (std::size_t i = 0; i < manifest.sources.size(); ++i) {
+    source_keys_.push_back(source_key(manifest.sources, i));
+  }
+}
 
 void SampleStages::read(SampleMessage& message) const try {
   const Stopwatch stopwatch(message, Stage::kRead);
@@ -193,7 +197,8 @@ std::vector<float> SampleStages::take_volume(std::size_t value_count) const {
 
 PairKey SampleStages::key_of(const SampleMessage& message) const {
   const auto source = static_cast<std::size_t>(message.shard->source);
-  return {manifest_.seed, to_string(manifest_.sources[source].dataset), message.sample.sample_id};
+  return {manifest_.seed, to_string(manifest_.sources[source].dataset), message.sample.sample_id,
+          source_keys_[source]};
 }
 
 void SampleStages::generate(SampleMessage& message) const try {

@@ -89,6 +89,7 @@ class SampleStages {
   const JobManifest& manifest_;
   const std::vector<std::unique_ptr<Dataset>>& datasets_;
   const Generator& generator_;
+  std::vector<std::string> source_keys_;  ///< source_key of each source
   std::size_t in_flight_;
   PairReader reader_;
   VolumeCodec codec_;

@@ -1,11 +1,14 @@
 #include "pipeline/conversion/shard_rewrite.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "manifests/documents/commit_record.h"
+#include "manifests/values/faults.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_backup.h"
 #include "stages/base/files/atomic_file.h"
@@ -24,18 +27,34 @@ std::string reason_of(const CommitRecord& record, int slot) {
 }  // namespace
 
 ShardRewrite::ShardRewrite(std::filesystem::path folder, CommitRecord record,
-                           std::optional<ImageSize> volume_size)
+                           std::optional<ImageSize> volume_size,
+                           const std::optional<std::vector<std::string>>& class_names)
     : folder_(std::move(folder)),
       before_(std::move(record)),
       reader_(folder_ / before_.shard),
       header_(reader_.header()) {
   if (volume_size) header_.volume.size = *volume_size;
+  if (class_names) name_classes(*class_names);
   record_.shard = before_.shard;
   record_.plan_hash = before_.plan_hash;
   // What the shard has cost so far; the work of a retry comes on top.
   record_.stage_seconds = before_.stage_seconds;
   record_.wall_seconds = before_.wall_seconds;
   record_.peak_bytes = before_.peak_bytes;
+}
+
+void ShardRewrite::name_classes(const std::vector<std::string>& class_names) {
+  std::vector<std::string>& names = header_.label_schema.class_names;
+  if (names == class_names) return;
+  if (names.size() > class_names.size() ||
+      !std::equal(names.begin(), names.end(), class_names.begin())) {
+    throw InputError(fmt::format(
+        "expected classes that begin with those of the shard, {}, got {}, in {}: make all shards "
+        "again (eventgan convert --overwrite)",
+        fmt::join(names, ", "), fmt::join(class_names, ", "), (folder_ / before_.shard).string()));
+  }
+  names = class_names;
+  writer_ = std::make_unique<ShardWriter>(folder_, header_);
 }
 
 void ShardRewrite::redo(int slot, const SampleMessage& message) {

@@ -5,6 +5,8 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "manifests/values/shard.h"
 #include "pipeline/conversion/sample_stages.h"
@@ -22,9 +24,12 @@ class ShardRewrite {
  public:
   /// `record` is that of the shard in `folder`, whose bytes are known to be the commit record's.
   /// `volume_size`: what its volumes get instead of their size; only of a shard without a good
-  /// sample, and so without volumes. Throws as ShardReader does.
+  /// sample, and so without volumes. `class_names`: what its classes get; of others than it has the
+  /// shard is written in any case. Throws InputError if they do not begin with those it has, whose
+  /// numbers stay, and as ShardReader does.
   ShardRewrite(std::filesystem::path folder, CommitRecord record,
-               std::optional<ImageSize> volume_size = std::nullopt);
+               std::optional<ImageSize> volume_size = std::nullopt,
+               const std::optional<std::vector<std::string>>& class_names = std::nullopt);
 
   /// A sample redone, good or failed again; slots ascend. Throws std::runtime_error if the disk
   /// fails.
@@ -38,6 +43,7 @@ class ShardRewrite {
   bool commit();
 
  private:
+  void name_classes(const std::vector<std::string>& class_names);
   bool is_news(int slot, const ShardSample& sample) const;
   void copy_before(int slot);
   void append(const ShardSample& sample, std::span<const std::byte> chunk);

@@ -87,7 +87,9 @@ Outcome<Annotation> read_annotation(const Dataset& dataset, const std::string& l
 
 }  // namespace
 
-SourceComparison::SourceComparison(JobManifest manifest) : manifest_(std::move(manifest)) {
+SourceComparison::SourceComparison(JobManifest manifest,
+                                   const std::vector<std::optional<ClassNames>>& stored)
+    : manifest_(std::move(manifest)) {
   for (const SourceSpec& source : manifest_.sources) {
     try {
       datasets_.push_back(open_dataset(source, manifest_.directory));
@@ -95,6 +97,11 @@ SourceComparison::SourceComparison(JobManifest manifest) : manifest_(std::move(m
       datasets_.push_back(nullptr);
       notes_.push_back("labels of source " + source.root + " not compared: " + error_line(error));
     }
+  }
+  try {
+    number_classes(manifest_.sources, datasets_, stored);
+  } catch (const InputError& error) {
+    numbers_fault_ = error.what();
   }
 }
 
@@ -106,6 +113,7 @@ std::vector<std::string> SourceComparison::faults(const PlannedShard& planned,
                                                   const ShardReader& reader) {
   const auto& dataset = datasets_.at(static_cast<std::size_t>(planned.source));
   if (!dataset) return {};
+  if (!numbers_fault_.empty()) return {numbers_fault_};
   std::vector<std::string> faults =
       schema_faults(reader.header().label_schema, dataset->label_schema());
   if (!faults.empty()) return faults;  // numbers of other names are others
@@ -196,7 +204,8 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   }
   expected.source_size = placement.source;
   expected.source_to_volume = map;
-  const PairKey key{manifest_.seed, to_string(kind), planned.sample_id};
+  const std::string of_source = source_key(manifest_.sources, source);
+  const PairKey key{manifest_.seed, to_string(kind), planned.sample_id, of_source};
   if (const auto threshold = pair_threshold(manifest_.generator, key)) {
     expected.threshold = threshold->mean;
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "manifests/values/job.h"
 #include "manifests/values/labels.h"
 #include "manifests/values/shard.h"
+#include "stages/frames/class_numbers.h"
 #include "stages/frames/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/shards/shard_reader.h"
@@ -21,8 +23,9 @@ namespace eventgan {
 class SourceComparison {
  public:
   /// Opens the sources of `manifest`, which is the frozen one. A source that is not there is left
-  /// out, with a note.
-  explicit SourceComparison(JobManifest manifest);
+  /// out, with a note. `stored`: as number_classes takes it.
+  explicit SourceComparison(JobManifest manifest,
+                            const std::vector<std::optional<ClassNames>>& stored = {});
 
   /// Gives the samples of the frozen plan the keys that their labels have today (see make_plan.h).
   void renew_samples(Plan& plan) const;
@@ -48,7 +51,8 @@ class SourceComparison {
   JobManifest manifest_;
   std::vector<std::unique_ptr<Dataset>> datasets_;  // null where the source is not there
   std::vector<std::string> notes_;
-  ImageSizes sizes_;  ///< of the datasets that keep none; a video serves many samples
+  std::string numbers_fault_;  ///< why stored numbers of classes mean others; empty: they do not
+  ImageSizes sizes_;           ///< of the datasets that keep none; a video serves many samples
   long long compared_ = 0;
 };
 

@@ -157,7 +157,7 @@ class Verification {
 
   FolderCheck run() {
     const FrozenOutline frozen = read_frozen_outline(folder_);
-    if (options_.deep) open_sources(frozen.plan);
+    if (options_.deep) open_sources(frozen.plan, frozen.hash);
     std::vector<ShardState> shards =
         scan_shards(folder_, frozen.plan.shards, frozen.hash, ScanDepth::kContents,
                     {.show_phase = options_.show_phase});
@@ -184,12 +184,15 @@ class Verification {
     check_.faults.insert(check_.faults.end(), faults.begin(), faults.end());
   }
 
-  void open_sources(const PlanOutline& outline) {
+  void open_sources(const PlanOutline& outline, const std::string& plan_hash) {
     try {
       // The frozen settings, wherever the inputs are today.
       const JobManifest recorded = recorded_manifest(folder_, outline, options_.manifest);
-      sources_ = std::make_unique<SourceComparison>(parse_job_manifest(
-          outline.manifest_text, recorded.directory, (folder_ / "plan.json").string()));
+      JobManifest manifest = parse_job_manifest(outline.manifest_text, recorded.directory,
+                                                (folder_ / "plan.json").string());
+      const auto stored =
+          stored_classes(folder_, outline.shards, plan_hash, manifest.sources.size());
+      sources_ = std::make_unique<SourceComparison>(std::move(manifest), stored);
       append_notes(sources_->notes());
     } catch (const std::exception& error) {
       append_notes({"labels not compared: " + error_line(error)});

@@ -11,6 +11,7 @@
 #include "stages/base/files/input_file.h"
 #include "stages/base/files/sha256.h"
 #include "stages/shards/shard_check.h"
+#include "stages/shards/shard_reader.h"
 
 namespace eventgan {
 namespace {
@@ -220,6 +221,18 @@ void scan_again(const fs::path& folder, const std::string& plan_hash, bool done,
                 std::vector<ShardState>& states, ScanDepth depth, const ScanOptions& options) {
   look_at(folder, plan_hash, depth, options, states,
           [&](const ShardState& state) { return state.done() == done; });
+}
+
+std::vector<std::optional<std::vector<std::string>>> stored_classes(
+    const std::filesystem::path& folder, const std::vector<ShardOutline>& shards,
+    const std::string& plan_hash, std::size_t sources) {
+  std::vector<std::optional<std::vector<std::string>>> names(sources);
+  for (const ShardOutline& shard : shards) {
+    auto& of_source = names.at(static_cast<std::size_t>(shard.source));
+    if (of_source || !shard_state(folder, shard, plan_hash, ScanDepth::kBytes).done()) continue;
+    of_source = ShardReader(folder / shard.name).header().label_schema.class_names;
+  }
+  return names;
 }
 
 }  // namespace eventgan

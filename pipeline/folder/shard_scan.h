@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -87,5 +88,11 @@ std::vector<ShardState> scan_shards(const std::filesystem::path& folder,
 void scan_again(const std::filesystem::path& folder, const std::string& plan_hash, bool done,
                 std::vector<ShardState>& states, ScanDepth depth = ScanDepth::kRecord,
                 const ScanOptions& options = {});
+
+/// The names of classes that each of the manifest's `sources` sources has in its shards: of the
+/// first that is whole; none where none is.
+std::vector<std::optional<std::vector<std::string>>> stored_classes(
+    const std::filesystem::path& folder, const std::vector<ShardOutline>& shards,
+    const std::string& plan_hash, std::size_t sources);
 
 }  // namespace eventgan

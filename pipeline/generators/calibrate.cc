@@ -130,8 +130,9 @@ std::vector<ToldPair> collect(const JobManifest& manifest, const SampleStages& s
       continue;
     }
     const auto source = static_cast<std::size_t>(sample.shard->source);
+    const std::string of_source = source_key(manifest.sources, source);
     const PairKey key{manifest.seed, to_string(manifest.sources[source].dataset),
-                      message.sample.sample_id};
+                      message.sample.sample_id, of_source};
     ToldPair pair{std::move(message.prepared), pair_threshold(manifest.generator, key)};
     if (sample.held_out) {
       held_out.push_back(std::move(pair));

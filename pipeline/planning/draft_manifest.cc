@@ -261,7 +261,7 @@ std::vector<std::string> findings_of(const SourceDraft& draft, const Survey& sur
                   count_text(survey.labelled_frames, is_events     ? "sample"
                                                      : is_labelled ? "labelled frame"
                                                                    : "frame"));
-  if (survey.sequences > 0) {
+  if (survey.sequences > 0 && !draft.is_stills) {
     lines.back() += " of " + count_text(survey.sequences, is_events ? "recording" : "sequence");
   }
   lines.back() += is_labelled || survey.annotation_files > 0

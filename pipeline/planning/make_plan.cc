@@ -20,6 +20,7 @@
 #include "manifests/values/text.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/trace.h"
+#include "stages/frames/class_numbers.h"
 #include "stages/frames/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/frame_selection.h"
@@ -82,6 +83,7 @@ Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const Pa
     result.sample.pair.label_position = place_between(result.sample.pair, frame.frame.time_s);
   }
   if (too_far_apart(result.sample.pair, spec.max_gap_s)) return result;
+  if (previous.state == State::kBeyond || next.state == State::kBeyond) return result;
   for (const PairedFrame* paired_frame : {&previous, &next}) {
     if (paired_frame->state == State::kMissing && result.sample.fault.empty()) {
       result.sample.fault = "expected a frame, got no file, in " + paired_frame->frame.path + " (" +
@@ -90,7 +92,7 @@ Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const Pa
   }
   if (!result.sample.fault.empty()) {
     result.state = State::kMissing;
-  } else if (previous.state == State::kPresent && next.state == State::kPresent) {
+  } else {
     result.state = frame.fault.empty() ? State::kPresent : State::kMissing;
     result.sample.fault = frame.fault;
   }
@@ -116,7 +118,7 @@ void forget_moved_time(FramePair& pair) {
 }
 
 PairChoiceResult choose_one(const Dataset& dataset, const LabelledFrame& frame,
-                            const SourceSpec& source, std::uint64_t seed) {
+                            const SourceSpec& source, std::uint64_t seed, std::string_view key) {
   PairChoiceResult result;
   std::vector<PlannedSample> present;
   std::vector<PlannedSample> damaged;
@@ -128,7 +130,8 @@ PairChoiceResult choose_one(const Dataset& dataset, const LabelledFrame& frame,
   }
   auto& choices = present.empty() ? damaged : present;
   if (choices.empty()) return result;
-  const CounterRandom random = PairKey{seed, to_string(source.dataset), frame.sample_id}.pair();
+  const CounterRandom random =
+      PairKey{seed, to_string(source.dataset), frame.sample_id, key}.pair();
   result.samples.push_back(std::move(choices[random.below(0, choices.size())]));
   if (source.pairs.stills) {
     FramePair& pair = result.samples.back().pair;
@@ -167,9 +170,9 @@ PlannedSample window_of(const Dataset& dataset, const LabelledFrame& frame,
 }  // namespace
 
 PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame,
-                              const SourceSpec& source, std::uint64_t seed) {
+                              const SourceSpec& source, std::uint64_t seed, std::string_view key) {
   if (has_events(source.dataset)) return {{window_of(dataset, frame, source.window)}, {}};
-  return source.pairs.choose == PairChoice::kOne ? choose_one(dataset, frame, source, seed)
+  return source.pairs.choose == PairChoice::kOne ? choose_one(dataset, frame, source, seed, key)
                                                  : choose_all(dataset, frame, source);
 }
 
@@ -300,6 +303,7 @@ PlannedSource plan_source(const JobManifest& manifest, int index, const Dataset&
                           std::int64_t most, SizeProbe& probe, ShardLayout& layout,
                           const std::function<void()>& before_frame, const ShowPhase& show_phase) {
   const SourceSpec& spec = manifest.sources[index];
+  const std::string key = source_key(manifest.sources, static_cast<std::size_t>(index));
   PlannedSource planned;
   SourceSummary& summary = planned.summary;
   layout.begin_source(index, spec.split);
@@ -311,7 +315,7 @@ PlannedSource plan_source(const JobManifest& manifest, int index, const Dataset&
     before_frame();
     ++summary.labelled_frames;
     phase.advance();
-    PairChoiceResult chosen = choose_pairs(dataset, frame, spec, manifest.seed);
+    PairChoiceResult chosen = choose_pairs(dataset, frame, spec, manifest.seed, key);
     for (const int gap : chosen.unpaired) ++planned.unpaired_by_gap[gap];
     const std::int64_t lost = spec.pairs.choose == PairChoice::kOne
                                   ? std::int64_t{chosen.samples.empty()}
@@ -398,10 +402,10 @@ const LabelledFrame* frame_of(const Dataset& dataset, const SourceSpec& spec,
 }
 
 void fill_missing(const Dataset& dataset, const SourceSpec& spec, std::uint64_t seed,
-                  PlannedSample& missing) {
+                  std::string_view key, PlannedSample& missing) {
   const LabelledFrame* frame = frame_of(dataset, spec, missing);
   if (frame == nullptr) return;
-  for (PlannedSample& sample : choose_pairs(dataset, *frame, spec, seed).samples) {
+  for (PlannedSample& sample : choose_pairs(dataset, *frame, spec, seed, key).samples) {
     if (sample.sample_id != missing.sample_id) continue;
     missing = std::move(sample);
     return;
@@ -435,6 +439,7 @@ void open_datasets(const JobManifest& manifest, const PlanningOptions& options,
     datasets.push_back(open_dataset(source, manifest.directory));
     phase.advance();
   }
+  number_classes(manifest.sources, datasets);
 }
 
 }  // namespace
@@ -516,9 +521,10 @@ void complete_plan(const JobManifest& manifest,
                    const std::vector<std::unique_ptr<Dataset>>& datasets, Plan& plan) {
   for (PlannedShard& shard : plan.shards) {
     const auto source = static_cast<std::size_t>(shard.source);
+    const std::string key = source_key(manifest.sources, source);
     for (PlannedSample& sample : shard.samples) {
       if (sample.fault.empty()) continue;
-      fill_missing(*datasets[source], manifest.sources[source], manifest.seed, sample);
+      fill_missing(*datasets[source], manifest.sources[source], manifest.seed, key, sample);
     }
   }
   renew_samples(manifest, datasets, plan);

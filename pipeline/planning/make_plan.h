@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -28,19 +29,24 @@ struct PairChoiceResult {
 
 /// Chooses the frame pairs of a labelled frame.
 ///
-/// choose = one: one of the gaps whose frames exist, drawn by (seed, dataset, sample id), so that
-/// no other source, sample or order of files changes the draw. choose = all: each gap; the gap and
+/// choose = one: one of the gaps whose frames exist, drawn by (seed, dataset, source, sample id),
+/// so that no other sample or order of files changes the draw; `key` is the source's (source_key).
+/// choose = all: each gap; the gap and
 /// side are added to the sample id as "ID@before2". A gap that meets a missing frame in the
 /// sequence becomes a sample with a fault that names the missing file (choose = one: only if no gap
 /// can be had). All pairs of a frame that is itself at fault (LabelledFrame::fault) have that
 /// fault.
 ///
-/// Of stills: the labelled frame twice, with a motion that (seed, dataset, sample id) draws; the
-/// time of the moved frame is not known.
+/// A gap of which one frame is missing and the other beyond the sequence's ends is none: it could
+/// not be mended.
+///
+/// Of stills: the labelled frame twice, with a motion drawn likewise; the time of the moved frame
+/// is not known.
 ///
 /// Of a dataset of events: its one window, of gap 0.
 PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame,
-                              const SourceSpec& source, std::uint64_t seed);
+                              const SourceSpec& source, std::uint64_t seed,
+                              std::string_view key = {});
 
 /// Gives a sample that was planned earlier what its labelled frame says today: the label's key, the
 /// frames' times, and the fault of the frame, if it has one. Its frames stay.

@@ -85,15 +85,23 @@ FrameSelection select_frames(const std::vector<LabelledFrame>& frames, const Sou
     result.notes.push_back(count_text(alone, "labelled frame",
                                       " without a sequence, each drawn by itself (fraction)"));
   }
+  std::set<std::string> groups;
   std::erase_if(selected, [&, first = first, last = last](const LabelledFrame& frame) {
-    const double place = random.keyed(group_of(spec.dataset, frame)).uniform(0);
+    const std::string group = group_of(spec.dataset, frame);
+    if (groups.size() < 2) groups.insert(group);
+    const double place = random.keyed(group).uniform(0);
     return place < first || place >= last;
   });
+  if (groups.size() == 1 && (first > 0 || last < 1)) {
+    result.notes.push_back("one sequence, " + *groups.begin() +
+                           ", which fraction takes whole or not at all");
+  }
   if (selected.empty() && !frames.empty()) {
     throw InputError(
         "expected labelled frames that ids, subjects, cameras, actions and fraction "
         "leave, got none of " +
-        std::to_string(frames.size()) + ", in " + spec.root);
+        std::to_string(frames.size()) + ", in " + spec.root +
+        (result.notes.empty() ? "" : " (" + result.notes.back() + ")"));
   }
   return result;
 }

@@ -58,6 +58,11 @@ NumberedSequence::NumberedSequence(std::vector<Frame> frames, Stride stride)
   }
 }
 
+NumberedSequence::NumberedSequence(std::vector<Frame> frames, std::int64_t stride)
+    : NumberedSequence(std::move(frames)) {
+  stride_ = stride;
+}
+
 NumberedSequence NumberedSequence::list(const std::filesystem::path& folder,
                                         std::string_view prefix,
                                         const std::vector<std::string_view>& extensions,

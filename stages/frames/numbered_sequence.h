@@ -43,6 +43,8 @@ class NumberedSequence {
 
   /// Takes frames in any order; numbers must be >= 0, distinct and below 10^18.
   explicit NumberedSequence(std::vector<Frame> frames, Stride stride = Stride::kOne);
+  /// The difference of numbers that is one step is known, >= 1.
+  NumberedSequence(std::vector<Frame> frames, std::int64_t stride);
 
   /// Lists the files of `folder` named `prefix` (not ending in a digit), digits (18 at most), one
   /// of `extensions` (lower case, with the dot; the file's may be in capitals); others are left

@@ -301,6 +301,108 @@ class UnknownSizes(program.InFolder):
         self.assertEqual((sizes["000001"], sizes["000002"], sizes["000003"]), ((48, 64), (60, 80), (48, 64)))
 
 
+class RetryOfClasses(program.InFolder):
+    """Labels that are mended may have classes that no shard names yet: those that are stored keep their numbers."""
+
+    def setUp(self):
+        super().setUp()
+        self.out = self.folder / "out"
+        for number in range(1, 8):
+            save_image(self.folder / f"images/{number:06}.png", np.random.default_rng(number))
+
+    def convert(self, labels):
+        source = {"dataset": "frames", "root": "images", "labels": labels, "pairs": program.pairs([1])}
+        path = self.write_manifest(program.manifest(
+            [source], generator={"kind": "difference"}, image={"preset": "mpii"},
+            errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1},
+            output={"directory": "out", "samples_per_shard": 2}))
+        return run("convert", path, "--output", self.out, "--progress", "none")
+
+    def table(self, **classes):
+        rows = [f"{number:06}.png,{classes.get(f'of_{number}', 'car')},1,1,9,9" for number in range(1, 8)]
+        (self.folder / "boxes.csv").write_text("\n".join(["image,class,left,top,right,bottom", *rows]) + "\n")
+
+    def spoil_row(self):
+        path = self.folder / "boxes.csv"
+        path.write_text(path.read_text().replace("bike,1,", "bike,one,"))
+
+    def check(self, names, expected):
+        """All shards have these names; the class of each sample's only box is as expected, or else a car."""
+        found = {}
+        for path in sorted(self.out.glob("*-of-*.h5")):
+            with h5py.File(path) as file:
+                ids = file["labels/boxes/class_id"]
+                self.assertEqual(list(ids.attrs["class_names"]), names, path.name)
+                for i, sample in enumerate(file["pairs/sample_id"].asstr()):
+                    row, = ids[file["labels/boxes/offsets"][i]:file["labels/boxes/offsets"][i + 1]]
+                    found[sample] = names[row]
+        self.assertEqual(found, {f"{i:06}": expected.get(i, "car") for i in range(2, 8)})
+        run("verify", "--deep", self.out)
+        run("finalize", self.out)
+        shutil.rmtree(self.folder / "yolo", ignore_errors=True)
+        run("export", "--to", "yolo", self.out, "--out", self.folder / "yolo")
+
+    def test_a_new_class_follows_those_that_are_stored(self):
+        self.table(of_5="bike")
+        self.spoil_row()
+        self.convert({"format": "csv", "path": "boxes.csv"})
+        self.table(of_5="bike")
+        out, _ = run("retry", self.out)
+        self.assertIn("classes were added: named in 3 shards", out)
+        self.assertIn("1 of 1 quarantined sample fixed", out)
+        self.check(["car", "bike"], {5: "bike"})
+        out, _ = run("retry", self.out)
+        self.assertIn("nothing to retry", out)
+        self.assertNotIn("classes were added", out)
+
+    def test_so_it_does_in_shards_that_are_made_later(self):
+        self.table()
+        self.convert({"format": "csv", "path": "boxes.csv"})
+        for path in self.out.glob("*-00001-of-*"):
+            path.unlink()
+        self.table(of_4="ant", of_5="bike")
+        run("retry", self.out)  # nothing is quarantined; the labels are others
+        run("convert", self.folder / "manifest.json", "--output", self.out, "--progress", "none")
+        self.check(["car", "ant", "bike"], {4: "ant", 5: "bike"})
+
+    def write_texts(self, names):
+        for number in range(1, 8):
+            path = self.folder / f"labels/{number:06}.txt"
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(f"{2 * (number == 5)} 0.5 0.5 0.5 0.5\n")
+        (self.folder / "data.yaml").write_text(f"names: [{', '.join(names)}]\n")
+
+    def test_a_name_that_data_yaml_lacked_is_added(self):
+        self.write_texts(["car", "person"])
+        self.convert({"format": "yolo", "path": "."})
+        self.write_texts(["car", "bike", "person"])  # what was 1 is 2 now
+        before = content(self.out)
+        _, told = run("retry", self.out, expect=66)
+        self.assertIn("expected new classes behind those of the shards, car, person, since labels name classes by "
+                      "number, got car, bike, person", told)
+        self.assertEqual(content(self.out), before)
+        self.write_texts(["car", "person", "bike"])
+        run("retry", self.out)
+        self.check(["car", "person", "bike"], {5: "bike"})
+
+    def test_splits_have_one_list(self):
+        """Validation has no car: its numbers are those of training."""
+        self.table(of_3="person")
+        shutil.copytree(self.folder / "images", self.folder / "val")
+        (self.folder / "val.csv").write_text("image,class,left,top,right,bottom\n000002.png,person,1,1,9,9\n")
+        sources = [{"dataset": "frames", "root": root, "split": split, "labels": {"format": "csv", "path": path},
+                    "pairs": program.pairs([1])}
+                   for root, split, path in (("images", "train", "boxes.csv"), ("val", "val", "val.csv"))]
+        path = self.write_manifest(program.manifest(sources, generator={"kind": "difference"}))
+        run("convert", path, "--output", self.out, "--progress", "none")
+        for split, numbers in (("train", [0, 1, 0, 0, 0, 0]), ("val", [1])):
+            shard, = self.out.glob(f"*-{split}-*.h5")
+            with h5py.File(shard) as file:
+                self.assertEqual(list(file["labels/boxes/class_id"].attrs["class_names"]), ["car", "person"])
+                self.assertEqual(file["labels/boxes/class_id"][:].tolist(), numbers)
+        run("verify", "--deep", self.out)
+
+
 def shard(path):
     """What a shard holds, without decoding volumes."""
     with h5py.File(path) as file:

@@ -95,6 +95,7 @@ class Shards(Sequence):
             paths = list(paths)
         self._described_as = str(paths)
         shards = _find_shards(paths, partial)
+        self._all_paths = [shard.path for shard in shards]
         if split is not None:
             splits = [self._split(shard) for shard in shards]
             if split not in splits:
@@ -115,6 +116,7 @@ class Shards(Sequence):
         if chosen:  # classes and columns are those of the sources that were asked for
             used, self._shard = np.unique(self._shard, return_inverse=True)
             self.paths = [self.paths[number] for number in used] or self.paths
+            self._all_paths = self.paths
 
     def __len__(self) -> int:
         return len(self._slot)
@@ -355,9 +357,12 @@ class Shards(Sequence):
         return self[np.flatnonzero(first)], self[np.flatnonzero(~first)]
 
     def known_classes(self) -> list[str]:
-        """The names of classes in the shards, in their order, whether or not a sample here has such a box."""
-        return list(dict.fromkeys(name for path in self.paths
-                                  for name in self._files[path].names("labels/boxes/class_id", "class_names")))
+        """The names of classes in the shards, in their order, whether or not a sample here has such a box. A split has
+        those of all splits, since in each a class must have the same number; none if its sources have no boxes."""
+        names = {path: self._files[path].names("labels/boxes/class_id", "class_names") for path in self._all_paths}
+        if not any(names[path] for path in self.paths):
+            return []
+        return list(dict.fromkeys(name for of_shard in names.values() for name in of_shard))
 
     def class_counts(self) -> dict[str, int]:
         """The number of boxes of each class that are not ignored, by name, in the order of the shards."""

@@ -13,10 +13,11 @@ void add_absent_frames(const OwnLabels& labels, std::vector<LabelledFrame>& fram
     throw InputError("expected labels of the frames in " + labels.source().root.written("") +
                      ", got of none of the " + std::to_string(labels.source().frames.size()));
   }
-  std::map<std::string, std::string> sequence_of_folder;
+  std::map<std::string, std::string> sequence_of_folder;  // where it has one alone
   for (const SourceFrame& frame : labels.source().frames) {
-    sequence_of_folder.try_emplace(fs::path(frame.name).parent_path().generic_string(),
-                                   frame.sequence);
+    const std::string folder = fs::path(frame.name).parent_path().generic_string();
+    std::string& sequence = sequence_of_folder.try_emplace(folder, frame.sequence).first->second;
+    if (sequence != frame.sequence) sequence = folder;
   }
   std::set<std::string> ids;
   for (const LabelledFrame& frame : frames) ids.insert(frame.sample_id);

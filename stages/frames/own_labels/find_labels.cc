@@ -155,10 +155,13 @@ std::vector<fs::path> folders_around(const FoundFrames& frames) {
 
 /// A year may follow.
 std::string_view split_of(std::string name) {
+  static const std::map<std::string_view, std::string_view> kSplits = {
+      {"train", "train"}, {"training", "train"}, {"val", "val"},
+      {"valid", "val"},   {"validation", "val"}, {"eval", "val"},
+      {"dev", "val"},     {"test", "test"},      {"testing", "test"}};
   name.erase(name.find_last_not_of("0123456789") + 1);
-  if (name == "train") return "train";
-  if (name == "val" || name == "valid" || name == "validation") return "val";
-  return name == "test" ? "test" : "";
+  const auto split = kSplits.find(in_small_letters(std::move(name)));
+  return split == kSplits.end() ? "" : split->second;
 }
 
 namespace {
@@ -182,11 +185,19 @@ FoundFrames frames_in(const fs::path& root, WholeFiles& files) {
   }
   frames.is_video = !frames.stems.empty();
   if (frames.is_video) return frames;
+  const auto has_frames = [](const fs::path& folder) {
+    return !look_into(folder).files.empty() && !list_image_folder(folder).frames.empty();
+  };
   for (const std::string& name : listed.folders) {
-    const auto has_frames = [](const fs::path& folder) {
-      return !look_into(folder).files.empty() && !list_image_folder(folder).frames.empty();
-    };
-    if (has_frames(root / name) || has_frames(root / name / "img1")) frames.folders.push_back(name);
+    if (has_frames(root / name) || has_frames(root / name / "img1")) {
+      frames.folders.push_back(name);
+      continue;
+    }
+    if (is_image_folder(name)) continue;
+    for (const std::string& below : look_into(root / name).folders) {  // two deep
+      if (is_image_folder(below) || !has_frames(root / name / below)) continue;
+      frames.folders.push_back(name + "/" + below);
+    }
   }
   return frames;
 }
@@ -314,12 +325,29 @@ void note_other_images(const std::vector<fs::path>& with_frames, const fs::path&
     found.remarks.push_back("warning: " + counted(left_out, "folder", " of images left out"));
   }
   const std::vector<std::string> folders = frames_in(found.root, files).folders;
-  if (std::ranges::find(folders, "train") == folders.end()) return;
+  const auto is_train = [](const std::string& name) { return split_of(name) == "train"; };
+  if (std::ranges::none_of(folders, is_train)) return;
   for (const std::string& name : folders) {
     const std::string_view split = split_of(name);
-    if (split != "val" && split != "test") continue;
+    if (split.empty() || split == "train") continue;
     found.remarks.push_back("warning: images of " + name +
                             " are in split train, too: give each its own source with \"split\"");
+  }
+}
+
+/// Tells of lists that divide the images of the only source.
+void note_lists(const fs::path& given, const FoundFrames& frames, FoundSource& source) {
+  for (const fs::path& folder : {given, given / "ImageSets/Main"}) {
+    std::vector<std::string> lists;
+    for (const fs::path& name : names_with(look_into(folder), ".txt")) {
+      const std::string stem = name.stem().string();
+      const bool is_list = !split_of(stem).empty() && !frames.stems.contains(stem);
+      if (is_list) lists.push_back(name.string());
+    }
+    if (lists.empty()) continue;
+    source.remarks.push_back(
+        "warning: " + counted(lists, "list", " of a split not used in " + folder.string()) +
+        "; give each split its own source with \"ids\", a sample id a line");
   }
 }
 
@@ -370,6 +398,7 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
                                       " of " + place.string());
   }
   note_other_images(with_frames, given, files, sources);
+  if (sources.size() == 1) note_lists(given, whole, sources.front());
   return sources;
 }
 

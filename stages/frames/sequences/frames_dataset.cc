@@ -43,6 +43,13 @@ bool is_mot_sequence(const std::filesystem::path& folder) {
   return has_file(folder / "gt/gt.txt") && has_images(folder / "img1");
 }
 
+/// A folder of sequences, of which none is a dataset's folder of images.
+bool has_sequences(const std::filesystem::path& folder) {
+  return any_folder(folder, [&](const std::string& name) {
+    return name != "images" && name != "JPEGImages" && has_images(folder / name);
+  });
+}
+
 constexpr std::array kFramesLayouts{
     DatasetLayout{.fits = is_frames_root, .complete = find_own_labels}};
 
@@ -57,7 +64,7 @@ bool is_frames_root(const std::filesystem::path& root) {
          std::ranges::any_of(top.folders,
                              [&](const std::string& name) { return has_images(root / name); }) ||
          std::ranges::any_of(top.folders, [&](const std::string& name) {
-           return is_mot_sequence(root / name) ||
+           return is_mot_sequence(root / name) || has_sequences(root / name) ||
                   (has_folder(root / name / "labels") && has_images(root / name / "images"));
          });
 }

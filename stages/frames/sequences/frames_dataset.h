@@ -13,14 +13,18 @@
 namespace eventgan {
 
 /// Images and videos of one's own. ROOT is one of
-///   a folder of images: one sequence, named ""; sample_id is the file name without extension;
-///   a folder of such folders: each a sequence; sample_id is "FOLDER/NAME"; with MOT's labels the
-///     images may lie in FOLDER/img1;
+///   a folder of images: the sequences that their names tell (name_sequences), named so; the only
+///     one is named as the folder. sample_id is the file name without extension;
+///   a folder of such folders, perhaps two deep: each a sequence, or as many as its names tell;
+///     sample_id is "FOLDER/NAME"; with MOT's labels the images may lie in FOLDER/img1;
 ///   a video (mp4, avi, mov, mkv): one sequence named as the file without extension; sample_id is
 ///     "NAME/000012", counted from 0;
 ///   a folder of videos: each a sequence. One that cannot be read is left out, with a note.
-/// How images are numbered, ImageFolder says. time_s is the frame's number through
-/// `frames_per_second`, else the video's own (VideoClip::time_s), else NaN.
+/// How images are numbered, NamedSequence says. Images that are taken as stills are sequences by
+/// their folders alone, and of none right in ROOT. time_s is the frame's count through
+/// `frames_per_second`, one step of the sequence being one frame; else its number through the rate
+/// of the labels (seqinfo.ini); else the time that its name is, or the video's own
+/// (VideoClip::time_s), since the first; else NaN.
 ///
 /// With SourceSpec::labels (stages/frames/own_labels/own_labels.h) the frames that have a label are
 /// the samples, and all others serve as paired frames. A frame that the labels name and ROOT does

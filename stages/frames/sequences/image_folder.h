@@ -37,4 +37,41 @@ struct ImageFolder {
 /// InputError if it cannot be listed.
 ImageFolder list_image_folder(const std::filesystem::path& folder);
 
+/// Frames that follow each other, as the names of a folder's images tell.
+struct NamedSequence {
+  /// What the names say before the number, such as "aachen_000000"; empty of the only sequence, and
+  /// of names that are numbers alone.
+  std::string name;
+  NumberedSequence frames;
+  /// By the frames' numbers, in seconds since the first, strictly ascending, where names are times;
+  /// such frames are counted from 0. Else empty.
+  std::vector<double> times_s;
+  std::string before, after;  ///< all that the names say around the number
+  bool is_only = true;        ///< in its folder
+
+  /// Whether an image of this name, without extension, would be of the sequence.
+  bool may_have(const std::string& stem) const;
+};
+
+struct NamedSequences {
+  std::vector<NamedSequence> sequences;  ///< by name; none in an empty folder
+  /// False: names tell of no sequences, since most have no other that differs in its number alone;
+  /// all images are one sequence, counted from 0 in natural order.
+  bool are_told = true;
+};
+
+/// Divides the images of a folder by their names. The number is the last run of digits that no
+/// letter follows ("aachen_000000_000019_leftImg8bit" is frame 19 of "aachen_000000"), after what
+/// Roboflow appends (".rf.HASH"); names that are alike but for it are of one sequence. One step is
+/// the smallest difference of two numbers in a sequence; of a sequence of two frames, in the
+/// folder.
+///
+/// A number that is a time is one of seconds with decimals ("315971930.123456") or, of so many
+/// digits, of milliseconds (13), microseconds (15, 16) or nanoseconds (18, 19) since some epoch: no
+/// frame is missing between two of them. Numbers of which a sequence has one twice, and longer ones
+/// than 11 digits that are no times, count in their order.
+///
+/// `images` are those of an ImageFolder.
+NamedSequences name_sequences(const NumberedSequence& images);
+
 }  // namespace eventgan

@@ -1,10 +1,14 @@
 #include <algorithm>
+#include <array>
 #include <cstdint>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -22,40 +26,51 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder of images that is a sequence.
-struct ListedSequence {
-  std::string path;  ///< below ROOT
+/// A folder of images.
+struct ListedFolder {
+  std::string name;  ///< below ROOT, as its samples are called; "" of ROOT itself
+  std::string path;  ///< below ROOT: the name, or NAME/img1
   ImageFolder images;
 };
+
+/// What a sequence is called that is ROOT itself: after its folder as the manifest writes it, but
+/// for names that most datasets have. The same wherever the manifest lies.
+std::string name_of_root(const fs::path& root) {
+  constexpr std::array<std::string_view, 7> kCommon = {"images",     "img1", "frames", "data",
+                                                       "JPEGImages", ".",    ".."};
+  std::string name = "frames";
+  const std::vector<std::string> folders(root.begin(), root.end());
+  for (const std::string& folder : folders) {
+    const bool is_common = std::ranges::find(kCommon, folder) != kCommon.end();
+    if (!is_common && !folder.empty() && folder != "/") name = folder;
+  }
+  return name;
+}
 
 class ImagesDataset final : public Dataset {
  public:
   ImagesDataset(const SourceSpec& spec, const fs::path& base)
       : root_(spec.root, base), frames_per_second_(spec.frames_per_second) {
-    ImageFolder top = list_image_folder(root_.on_disk(""));
     const auto note = [this](std::int64_t count, const char* noun, const std::string& rest) {
       if (count == 0) return;
       notes_.push_back(count_text(count, noun, rest + " in " + root_.written("")));
     };
-    std::map<std::string, ListedSequence> listed;
-    std::size_t without_images = 0;
-    const bool is_flat = !top.frames.empty();
-    const std::vector<std::string> folders = top.folders;
-    if (is_flat) top.folders.clear();
-    listed[""] = {"", std::move(top)};
-    if (!is_flat) {
+    std::vector<ListedFolder> listed(1);
+    listed[0].images = list_image_folder(root_.on_disk(""));
+    const bool is_flat = !listed[0].images.frames.empty();
+    const std::vector<std::string> folders = listed[0].images.folders;
+    std::int64_t without_images = 0;
+    if (is_flat) {
+      listed[0].images.folders.clear();
+    } else {
       for (const std::string& name : folders) {
-        ListedSequence sequence = list_sequence(name, spec.labels);
-        if (sequence.images.frames.empty()) ++without_images;
-        listed.emplace(name, std::move(sequence));
+        without_images += !list_below(name, spec.labels, listed);
       }
     }
-    for (const auto& [sequence, folder] : listed) {
-      sequences_.emplace(sequence, Sequence{folder.path, folder.images.frames});
+    for (const ListedFolder& folder : listed) {
+      add_sequences(folder, /*are_stills=*/spec.pairs.stills.has_value());
     }
-    const bool is_empty = std::ranges::all_of(
-        sequences_, [](const auto& sequence) { return sequence.second.frames.empty(); });
-    if (is_empty) {
+    if (sequences_.empty()) {
       throw InputError("expected images, folders of images, or videos, got none, in " +
                        root_.on_disk("").string());
     }
@@ -63,10 +78,10 @@ class ImagesDataset final : public Dataset {
       add_labelled(*spec.labels, base);
       std::ranges::sort(annotation_files_);
     } else {
-      for (const auto& [sequence, folder] : listed) add_all(sequence, folder.images);
+      add_all(listed);
     }
     note(is_flat ? std::ssize(folders) : 0, "folder", " beside the images left out");
-    for (const auto& [sequence, folder] : listed) note_unused(sequence, folder);
+    for (const ListedFolder& folder : listed) note_unused(folder);
     note(without_images, "folder", " without images");
     std::ranges::sort(labelled_, {}, &LabelledFrame::sample_id);
     std::ranges::sort(annotation_files_);
@@ -82,11 +97,12 @@ class ImagesDataset final : public Dataset {
 
   PairedFrame paired_frame(const LabelledFrame& labelled, int steps) const override {
     if (labelled.frame.index == kAbsentFrame) return {PairedFrame::State::kMissing, labelled.frame};
-    const auto sequence = sequences_.find(labelled.sequence);
-    if (sequence == sequences_.end()) return {};
-    const auto place = sequence->second.frames.at(labelled.frame.index, steps);
+    const auto found = sequences_.find(labelled.sequence);
+    if (found == sequences_.end()) return {};
+    const Sequence& sequence = found->second;
+    const auto place = sequence.images.frames.at(labelled.frame.index, steps);
     if (place.state == PairedFrame::State::kBeyond) return {};
-    return {place.state, frame(sequence->first, place.number, place.name)};
+    return {place.state, frame(sequence, place.number, place.name)};
   }
 
   Outcome<Annotation> annotation(const std::string& label_key) const override {
@@ -111,56 +127,113 @@ class ImagesDataset final : public Dataset {
 
  private:
   struct Sequence {
-    std::string path;  ///< below ROOT
-    NumberedSequence frames;
+    std::string folder;  ///< ListedFolder::name
+    std::string path;    ///< ListedFolder::path
+    std::string key;     ///< SourceFrame::sequence
+    NamedSequence images;
   };
 
   static std::string spelled(const fs::path& path) { return path.generic_string(); }
 
   /// The folder NAME, or NAME/img1 of a sequence as MOT has them (LabelReader::image_folder).
-  ListedSequence list_sequence(const std::string& name,
-                               const std::optional<LabelSpec>& labels) const {
-    ListedSequence listed{name, list_image_folder(root_.on_disk(name))};
+  ListedFolder list_folder_of(const std::string& name,
+                              const std::optional<LabelSpec>& labels) const {
+    ListedFolder listed{name, name, list_image_folder(root_.on_disk(name))};
     const std::string_view images = labels ? label_reader(labels->format).image_folder : "";
     const auto& folders = listed.images.folders;
     const bool is_below =
         listed.images.frames.empty() && std::ranges::find(folders, images) != folders.end();
     if (!is_below) return listed;
     const std::string below = name + "/" + std::string(images);
-    return {below, list_image_folder(root_.on_disk(below))};
+    return {name, below, list_image_folder(root_.on_disk(below))};
   }
 
-  FrameRef frame(const std::string& sequence, std::int64_t number, const std::string& name) const {
-    const std::string below = spelled(fs::path(sequences_.at(sequence).path) / name);
-    FrameRef frame{root_.written(below), number};
-    const auto rate =
-        frames_per_second_ || !labels_ ? frames_per_second_ : labels_->frames_per_second(sequence);
-    if (rate) frame.time_s = static_cast<double>(number) / *rate;
+  /// Adds a folder or, if it has no images, those in it that have. False if there are none.
+  bool list_below(const std::string& name, const std::optional<LabelSpec>& labels,
+                  std::vector<ListedFolder>& listed) const {
+    ListedFolder folder = list_folder_of(name, labels);
+    std::vector<ListedFolder> inner;
+    if (folder.images.frames.empty()) {
+      for (const std::string& below : folder.images.folders) {
+        ListedFolder found = list_folder_of(name + "/" + below, labels);
+        if (!found.images.frames.empty()) inner.push_back(std::move(found));
+      }
+      std::erase_if(folder.images.folders, [&](const std::string& below) {
+        return std::ranges::find(inner, name + "/" + below, &ListedFolder::name) != inner.end();
+      });
+    }
+    const bool has_images = !folder.images.frames.empty() || !inner.empty();
+    listed.push_back(std::move(folder));
+    std::ranges::move(inner, std::back_inserter(listed));
+    return has_images;
+  }
+
+  /// Stills are no sequence, whatever their names: those right in ROOT have none.
+  void add_sequences(const ListedFolder& folder, bool are_stills) {
+    NamedSequences named;
+    if (are_stills && !folder.images.frames.empty()) {
+      named.sequences.emplace_back().frames = folder.images.frames;
+    } else {
+      named = name_sequences(folder.images.frames);
+    }
+    if (!named.are_told) {
+      notes_.push_back("names of images tell no sequences: " +
+                       count_text(std::ssize(folder.images.frames.frames()), "image") +
+                       " in the order of their names in " + root_.written(folder.path));
+    }
+    for (NamedSequence& images : named.sequences) {
+      const std::string key = spelled(fs::path(folder.name) / images.name);
+      Sequence sequence{folder.name, folder.path, images.name.empty() ? folder.name : key,
+                        std::move(images)};
+      const bool has_name = !sequence.key.empty() || are_stills;
+      const std::string name = has_name ? sequence.key : name_of_root(root_.written(""));
+      sequences_.emplace(name, std::move(sequence));
+    }
+  }
+
+  FrameRef frame(const Sequence& sequence, std::int64_t number, const std::string& name) const {
+    FrameRef frame{root_.written(spelled(fs::path(sequence.path) / name)), number};
+    if (frames_per_second_) {
+      frame.time_s = static_cast<double>(number) /
+                     (static_cast<double>(sequence.images.frames.stride()) * *frames_per_second_);
+    } else if (const auto rate =
+                   labels_ ? labels_->frames_per_second(sequence.key) : std::nullopt) {
+      frame.time_s = static_cast<double>(number) / *rate;
+    } else if (!sequence.images.times_s.empty()) {
+      frame.time_s = sequence.images.times_s.at(static_cast<std::size_t>(number));
+    }
     return frame;
   }
 
   /// Without labels of a known form every frame is a sample.
-  void add_all(const std::string& sequence, const ImageFolder& folder) {
-    for (const auto& [number, name] : folder.frames.frames()) {
-      const fs::path below = fs::path(sequence) / name;
-      LabelledFrame labelled;
-      labelled.sample_id = spelled(below.parent_path() / below.stem());
-      labelled.sequence = sequence;
-      labelled.frame = frame(sequence, number, name);
-      const auto sidecar = folder.sidecars.find(below.stem().string());
-      const bool has_label = sidecar != folder.sidecars.end();
-      labelled.label_key = spelled(has_label ? fs::path(sequence) / sidecar->second : below);
-      if (has_label) annotation_files_.push_back(root_.written(labelled.label_key));
-      labelled_.push_back(std::move(labelled));
+  void add_all(const std::vector<ListedFolder>& listed) {
+    std::map<std::string_view, const ListedFolder*> folders;
+    for (const ListedFolder& folder : listed) folders[folder.name] = &folder;
+    for (const auto& [sequence_name, sequence] : sequences_) {
+      const auto& sidecars = folders.at(sequence.folder)->images.sidecars;
+      for (const auto& [number, name] : sequence.images.frames.frames()) {
+        const fs::path below = fs::path(sequence.path) / name;
+        LabelledFrame labelled;
+        labelled.sample_id = spelled(below.parent_path() / below.stem());
+        labelled.sequence = sequence_name;
+        labelled.frame = frame(sequence, number, name);
+        const auto sidecar = sidecars.find(below.stem().string());
+        const bool has_label = sidecar != sidecars.end();
+        labelled.label_key = spelled(has_label ? fs::path(sequence.path) / sidecar->second : below);
+        if (has_label) annotation_files_.push_back(root_.written(labelled.label_key));
+        labelled_.push_back(std::move(labelled));
+      }
     }
   }
 
   void add_labelled(const LabelSpec& spec, const fs::path& base) {
     LabelledSource source{root_, {}, /*is_video=*/false};
-    for (const auto& [sequence, listed] : sequences_) {
-      for (const auto& [number, name] : listed.frames.frames()) {
-        source.frames.push_back(
-            {spelled(fs::path(listed.path) / name), sequence, number, std::nullopt});
+    std::vector<decltype(sequences_)::const_iterator> sequence_of;
+    for (auto sequence = sequences_.cbegin(); sequence != sequences_.cend(); ++sequence) {
+      const auto& [path, key] = std::tie(sequence->second.path, sequence->second.key);
+      for (const auto& [number, name] : sequence->second.images.frames.frames()) {
+        source.frames.push_back({spelled(fs::path(path) / name), key, number, std::nullopt});
+        sequence_of.push_back(sequence);
       }
     }
     labels_ = open_own_labels(spec, base, std::move(source));
@@ -168,18 +241,36 @@ class ImagesDataset final : public Dataset {
     for (std::size_t i = 0; i < frames.size(); ++i) {
       const FrameLabel& label = labels_->labels()[i];
       if (label.key.empty()) continue;
+      const auto& [sequence_name, sequence] = *sequence_of[i];
       const fs::path name = fs::path(frames[i].name).filename();
-      labelled_.push_back({spelled(fs::path(frames[i].sequence) / name.stem()), frames[i].sequence,
-                           frame(frames[i].sequence, frames[i].number, name), label.key,
-                           label.fault});
+      labelled_.push_back({spelled(fs::path(sequence.folder) / name.stem()), sequence_name,
+                           frame(sequence, frames[i].number, name), label.key, label.fault});
     }
     add_absent_frames(*labels_, labelled_);
+    name_absent();
     annotation_files_ = labels_->annotation_files();
-    notes_ = labels_->notes();
+    std::ranges::copy(labels_->notes(), std::back_inserter(notes_));
+  }
+
+  /// An absent frame's sequence is the one of its folder that its name tells.
+  void name_absent() {
+    std::multimap<std::string, decltype(sequences_)::const_iterator> of_folder;
+    for (auto sequence = sequences_.cbegin(); sequence != sequences_.cend(); ++sequence) {
+      of_folder.emplace(root_.written(sequence->second.path), sequence);
+    }
+    for (LabelledFrame& labelled : labelled_) {
+      if (labelled.frame.index != kAbsentFrame) continue;
+      const fs::path path(labelled.frame.path);
+      auto [first, end] = of_folder.equal_range(path.parent_path().generic_string());
+      for (; first != end; ++first) {
+        const auto& [name, sequence] = *first->second;
+        if (sequence.images.may_have(path.stem().string())) labelled.sequence = name;
+      }
+    }
   }
 
   /// Tells of the files in a folder that become neither frame nor label.
-  void note_unused(const std::string& sequence, const ListedSequence& listed) {
+  void note_unused(const ListedFolder& listed) {
     const ImageFolder& folder = listed.images;
     const std::string place = " in " + root_.written(listed.path);
     std::set<std::string> stems;
@@ -203,7 +294,7 @@ class ImagesDataset final : public Dataset {
       std::ranges::sort(left_out);
     }
     if (!alone.empty()) notes_.push_back(counted(alone, "label", " without an image" + place));
-    if (!sequence.empty() && !folder.folders.empty()) {
+    if (!listed.name.empty() && !folder.folders.empty()) {
       notes_.push_back(counted(folder.folders, "folder", " left out" + place));
     }
     if (!left_out.empty()) notes_.push_back(counted(left_out, "file", " left out" + place));
@@ -212,8 +303,8 @@ class ImagesDataset final : public Dataset {
   SourceRoot root_;
   std::optional<double> frames_per_second_;
   LabelSchema schema_;
-  std::unique_ptr<OwnLabels> labels_;  ///< null: none of a known form
-  std::map<std::string, Sequence> sequences_;
+  std::unique_ptr<OwnLabels> labels_;          ///< null: none of a known form
+  std::map<std::string, Sequence> sequences_;  ///< by LabelledFrame::sequence
   std::vector<LabelledFrame> labelled_;
   std::vector<std::string> annotation_files_;  ///< as FrameRef::path is written
   std::vector<std::string> notes_;

@@ -221,6 +221,18 @@ def write_column(path, name, values=None):
     record.write_text(json.dumps({**json.loads(record.read_text()), "size_bytes": path.stat().st_size}))
 
 
+def test_a_class_has_one_number_in_every_split(two_shards):
+    second = two_shards / SECOND
+    with h5py.File(second, "r+") as file:
+        names = list(file["labels/boxes/class_id"].attrs["class_names"])
+        file["labels/boxes/class_id"].attrs["class_names"] = ["Bike", *names[::-1]]
+        file.attrs["split"] = "val"
+    record = second.with_suffix(".json")
+    record.write_text(json.dumps({**json.loads(record.read_text()), "size_bytes": second.stat().st_size}))
+    for split in ("train", "val", None):
+        assert Shards(two_shards, split=split).known_classes() == [*names, "Bike"]
+
+
 def test_a_frame_s_id_stands_for_all_its_samples(folder):
     write_column(folder / NAME, "sample_id", ["000001@before1", "000001@before2", "000002", "a@b", "000001@b@after1"])
     assert ids_of(Shards(folder, ids=["000001"])) == ["000001@before1", "000001@before2"]

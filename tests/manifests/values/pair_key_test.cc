@@ -48,6 +48,29 @@ TEST(PairThreshold, FollowsFromSeedDatasetAndSample) {
   EXPECT_NE(threshold({0.1, 0.9}, {2, "mpii", "a"}), drawn);
   EXPECT_NE(threshold({0.1, 0.9}, {1, "frames", "a"}), drawn);
   EXPECT_NE(threshold({0.1, 0.9}, {1, "mpii", "b"}), drawn);
+  EXPECT_NE(threshold({0.1, 0.9}, {1, "mpii", "a", "val"}), drawn);
+}
+
+TEST(SourceKey, TellsSourcesOfOneKindApart) {
+  const auto source = [](const char* root, const char* split, DatasetKind kind) {
+    SourceSpec spec;
+    spec.root = root;
+    spec.split = split;
+    spec.dataset = kind;
+    return spec;
+  };
+  const SourceSpec train = source("b", "train", DatasetKind::kFrames);
+  const SourceSpec more = source("c", "train", DatasetKind::kFrames);
+  const SourceSpec val = source("a", "val", DatasetKind::kFrames);
+  const SourceSpec cars = source("a", "train", DatasetKind::kKittiObject);
+  // The only one has none, whatever sources of other splits and kinds there are, and wherever.
+  EXPECT_EQ(source_key({train}, 0), "");
+  EXPECT_EQ(source_key({val, cars, more, train}, 3), "");
+  EXPECT_EQ(source_key({val, cars, more, train}, 1), "");
+  EXPECT_EQ(source_key({val, cars, more, train}, 0), "val");
+  EXPECT_EQ(source_key({val, cars, more, train}, 2), "\nc");
+  // A source that is taken twice has the same frames.
+  EXPECT_EQ(source_key({train, train}, 1), "");
 }
 
 TEST(ThresholdSpec, IsOfItsPolaritiesAndSpreadAsTheDefaultsAre) {

@@ -79,9 +79,10 @@ TEST_F(DraftManifest, OfASequenceTakesPairsOfNeighboursAsTheyAre) {
       HasSubstr(R"(// "generator": { "weights": "shipped:sensor", "sensor": "davis346" },)"));
   EXPECT_FALSE(job.image.size);
   EXPECT_TRUE(made.has_samples);
-  EXPECT_THAT(made.findings, ElementsAre("what was found: 3 labelled frames, 0 annotation files",
-                                         HasSubstr("by gap: gap 1: 2, gap 2: 1, gap 3: 0"),
-                                         HasSubstr("set \"frames_per_second\"")));
+  EXPECT_THAT(made.findings,
+              ElementsAre("what was found: 3 labelled frames of 1 sequence, 0 annotation files",
+                          HasSubstr("by gap: gap 1: 2, gap 2: 1, gap 3: 0"),
+                          HasSubstr("set \"frames_per_second\"")));
 }
 
 TEST_F(DraftManifest, OfOneImageProposesStillsWithTheirDefaultsWrittenOut) {

@@ -6,6 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string>
+#include <vector>
 
 #include "manifests/values/faults.h"
 #include "tests/testing/image_file.h"
@@ -365,6 +368,32 @@ TEST_F(MakePlan, AddingASourceDoesNotMoveThePairsOfAnother) {
     for (const auto& sample : shard.samples) after.push_back(sample.pair.gap_frames);
   }
   EXPECT_EQ(before, after);
+}
+
+TEST_F(MakePlan, SourcesWithTheSameIdsDrawForThemselves) {
+  // 300 frames a source: of three gaps they draw the same for about a third.
+  for (int i = 0; i < 300; ++i) {
+    for (const char* folder : {"one", "two"}) {
+      testing::write_file(folder_ / folder / ("f_" + std::to_string(1000 + i) + ".png"), "");
+    }
+  }
+  manifest_.image.size = ImageSize{24, 32};
+  SourceSpec& one = manifest_.sources[0];
+  one.root = "one";
+  one.pairs.gaps = {1, 2, 3};
+  SourceSpec two = one;
+  two.root = "two";
+  manifest_.sources.push_back(two);
+  const Plan plan = make_plan(manifest_, "w", "e").plan;
+  std::map<std::string, std::vector<int>> gaps;
+  for (const auto& shard : plan.shards) {
+    for (const auto& sample : shard.samples) {
+      gaps[sample.sample_id].push_back(sample.pair.gap_frames);
+    }
+  }
+  int same = 0;
+  for (const auto& [id, of_sources] : gaps) same += of_sources.front() == of_sources.back();
+  EXPECT_NEAR(same, 100, 35);  // four standard deviations
 }
 
 /// The motions of a source's stills, in the plan's order.

@@ -177,6 +177,18 @@ TEST(ChoosePairs, AMissingFrameBecomesASampleThatNamesItsFile) {
       ::testing::HasSubstr("root/0010.png"));
 }
 
+TEST(ChoosePairs, AMissingFrameWhoseCounterpartIsBeyondTheEndIsNoSample) {
+  FakeDataset dataset("root", 20);
+  dataset.make_missing(17);
+  // Around frame 18: 17 is missing, 19 there; 16 there, 20 beyond; around 19 are 17 and 21.
+  for (const PairChoice choice : {PairChoice::kOne, PairChoice::kAll}) {
+    const SourceSpec spec = source({2, 4}, PairSide::kAround, choice);
+    EXPECT_THAT(choose(dataset, 18, spec).samples.at(0).fault, ::testing::HasSubstr("0017.png"));
+    EXPECT_THAT(choose(dataset, 19, spec).samples, ::testing::IsEmpty());
+    EXPECT_THAT(choose(dataset, 19, spec).unpaired, ::testing::ElementsAre(2, 4));
+  }
+}
+
 TEST(ChoosePairs, AFrameAtFaultGivesThatFaultAndNoOtherDraw) {
   const FakeDataset dataset("root", 20);
   for (const PairChoice choice : {PairChoice::kOne, PairChoice::kAll}) {

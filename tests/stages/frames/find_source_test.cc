@@ -307,6 +307,31 @@ TEST_F(FindSource, ImagesThatAreLeftOutAreWarnings) {
               ::testing::ElementsAre(HasSubstr("warning: images of val are in split train, too")));
 }
 
+TEST_F(FindSource, ListsOfSplitsAreNamed) {
+  write("voc/JPEGImages/1.jpg");
+  write("voc/Annotations/1.xml");
+  write("voc/ImageSets/Main/train.txt", "1\n");
+  write("voc/ImageSets/Main/car_train.txt", "1 1\n");
+  EXPECT_THAT(find("voc").remarks,
+              ::testing::ElementsAre(
+                  "warning: 1 list of a split not used in " + at("voc/ImageSets/Main").string() +
+                  ": train.txt; give each split its own source with \"ids\", a sample id a line"));
+  write("flat/test.jpg");  // has a label so called
+  write("flat/test.txt");
+  EXPECT_THAT(find("flat").remarks, Not(Contains(HasSubstr("of a split"))));
+}
+
+TEST_F(FindSource, FoldersOfSequencesMayBeTwoDeep) {
+  write("days/monday/a/1.jpg");
+  write("days/tuesday/b/1.jpg");
+  EXPECT_EQ(find("days").dataset, DatasetKind::kFrames);
+  EXPECT_EQ(find("days").root, at("days"));
+  // A folder of datasets is none.
+  write("sets/one/images/1.jpg");
+  write("sets/two/images/1.jpg");
+  EXPECT_THROW(find("sets"), InputError);
+}
+
 TEST_F(FindSource, SplitsWithLabelsOfTheirOwnAreSources) {
   const auto splits = [&](const fs::path& name) {
     std::vector<std::array<std::string, 3>> found;
@@ -326,6 +351,14 @@ TEST_F(FindSource, SplitsWithLabelsOfTheirOwnAreSources) {
     write("voc/" + std::string(split) + "/1.jpg");
     write("voc/" + std::string(split) + "/1.xml");
   }
+  for (const char* name : {"Training", "VAL"}) {
+    write("caps/" + std::string(name) + "/1.jpg");
+    write("caps/" + std::string(name) + "/1.xml");
+    write("dev/" + std::string(name == std::string("VAL") ? "dev" : "train") + "/1.jpg");
+    write("dev/" + std::string(name == std::string("VAL") ? "dev" : "train") + "/1.xml");
+  }
+  EXPECT_EQ(splits("caps"), (Splits{{"", "Training", "Training"}, {"val", "VAL", "VAL"}}));
+  EXPECT_EQ(splits("dev"), (Splits{{"", "train", "train"}, {"val", "dev", "dev"}}));
   write("roboflow/data.yaml");
   EXPECT_EQ(splits("roboflow"), (Splits{{"", "train/images", "."},
                                         {"val", "valid/images", "."},

@@ -131,6 +131,27 @@ TEST_F(FrameSelectionTest, FramesWithoutASequenceCountByThemselves) {
   EXPECT_THAT(select_frames(frames_, spec_, folder_.path(), 7).notes, IsEmpty());
 }
 
+TEST_F(FrameSelectionTest, OneSequenceIsTakenWholeOrNotAtAll) {
+  spec_.dataset = DatasetKind::kFrames;
+  for (LabelledFrame& frame : frames_) frame.sequence = "clip";
+  spec_.selection.fraction = {0, 0.5};
+  std::string refused;
+  std::size_t count = 0;
+  for (int half = 0; half < 2; ++half) {
+    try {
+      const FrameSelection taken = select_frames(frames_, spec_, folder_.path(), 7);
+      count += taken.frames.size();
+      EXPECT_THAT(taken.notes,
+                  ElementsAre("one sequence, clip, which fraction takes whole or not at all"));
+    } catch (const InputError& error) {
+      refused += error.what();
+    }
+    spec_.selection.fraction = {0.5, 1};
+  }
+  EXPECT_EQ(count, 24u);
+  EXPECT_THAT(refused, HasSubstr("one sequence, clip"));
+}
+
 TEST_F(FrameSelectionTest, NothingLeftIsAnError) {
   spec_.selection.fraction = {0, 1e-9};
   EXPECT_THAT([&] { selected(); }, ThrowsMessage<InputError>(HasSubstr("got none of 24")));

@@ -92,6 +92,107 @@ TEST(ImageFolder, TellsWhatItLeavesOut) {
 
 TEST(ImageFolder, MayBeEmpty) { EXPECT_THAT(list({}).frames.frames(), IsEmpty()); }
 
+struct Told {
+  std::string name;
+  std::vector<Frame> frames;
+  std::int64_t step = 1;
+  std::vector<double> times_s = {};
+};
+
+void expect_sequences(const std::vector<std::string>& names, const std::vector<Told>& told,
+                      bool are_told = true) {
+  const NamedSequences found = name_sequences(list(names).frames);
+  EXPECT_EQ(found.are_told, are_told) << names[0];
+  ASSERT_EQ(found.sequences.size(), told.size()) << names[0];
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    const NamedSequence& sequence = found.sequences[i];
+    EXPECT_EQ(sequence.name, told[i].name);
+    EXPECT_EQ(sequence.frames.frames(), told[i].frames) << told[i].name;
+    EXPECT_EQ(sequence.frames.stride(), told[i].step) << told[i].name;
+    ASSERT_EQ(sequence.times_s.size(), told[i].times_s.size()) << told[i].name;
+    for (std::size_t k = 0; k < told[i].times_s.size(); ++k) {
+      EXPECT_NEAR(sequence.times_s[k], told[i].times_s[k], 1e-9) << told[i].name;
+    }
+  }
+}
+
+TEST(NameSequences, AreWhatNamesSayBeforeTheNumber) {
+  // KITTI's flow, Cityscapes, MOT17 made flat, VisDrone, Roboflow.
+  expect_sequences({"000000_10.png", "000000_11.png", "000001_10.png", "000001_11.png"},
+                   {{"000000", {{10, "000000_10.png"}, {11, "000000_11.png"}}},
+                    {"000001", {{10, "000001_10.png"}, {11, "000001_11.png"}}}});
+  expect_sequences({"aachen_000000_000019_leftImg8bit.png", "aachen_000000_000020_leftImg8bit.png",
+                    "aachen_000001_000019_leftImg8bit.png", "aachen_000001_000021_leftImg8bit.png"},
+                   {{"aachen_000000",
+                     {{19, "aachen_000000_000019_leftImg8bit.png"},
+                      {20, "aachen_000000_000020_leftImg8bit.png"}}},
+                    {"aachen_000001",
+                     {{19, "aachen_000001_000019_leftImg8bit.png"},
+                      {21, "aachen_000001_000021_leftImg8bit.png"}}}});
+  expect_sequences({"left_1.png", "left_2.png", "right_1.png", "right_2.png"},
+                   {{"left", {{1, "left_1.png"}, {2, "left_2.png"}}},
+                    {"right", {{1, "right_1.png"}, {2, "right_2.png"}}}});
+  expect_sequences({"a_mp4-9_jpg.rf.0f3c.jpg", "a_mp4-10_jpg.rf.99e1.jpg"},
+                   {{"", {{9, "a_mp4-9_jpg.rf.0f3c.jpg"}, {10, "a_mp4-10_jpg.rf.99e1.jpg"}}}});
+  expect_sequences({"3l.png", "4l.png", "3r.png", "4r.png", "cover.png"},
+                   {{"*l", {{3, "3l.png"}, {4, "4l.png"}}},
+                    {"*r", {{3, "3r.png"}, {4, "4r.png"}}},
+                    {"cover", {{0, "cover.png"}}}});
+}
+
+TEST(NameSequences, NumbersAloneAreTheFoldersOwn) {
+  expect_sequences({"1.png", "2.png", "thumb.png"},
+                   {{"", {{1, "1.png"}, {2, "2.png"}}}, {"thumb", {{0, "thumb.png"}}}});
+}
+
+TEST(NameSequences, TheSmallestStepOfASequenceIsOneFrame) {
+  // Of two frames alone it is the folder's.
+  expect_sequences({"a_0.png", "a_10.png", "a_30.png", "b_4.png", "b_9.png", "c_7.png"},
+                   {{"a", {{0, "a_0.png"}, {10, "a_10.png"}, {30, "a_30.png"}}, 10},
+                    {"b", {{4, "b_4.png"}, {9, "b_9.png"}}, 5},
+                    {"c", {{7, "c_7.png"}}, 1}});
+  expect_sequences(
+      {"a_1.png", "a_2.png", "b_1.png", "b_9.png"},
+      {{"a", {{1, "a_1.png"}, {2, "a_2.png"}}}, {"b", {{1, "b_1.png"}, {9, "b_9.png"}}}});
+}
+
+TEST(NameSequences, NamesThatTellNoneAreOneInNaturalOrder) {
+  expect_sequences({"0f3c-9.png", "77ab-2.png", "ffff-2.png"},
+                   {{"", {{0, "0f3c-9.png"}, {1, "77ab-2.png"}, {2, "ffff-2.png"}}}}, false);
+  expect_sequences({"first.png", "second.png"}, {{"", {{0, "first.png"}, {1, "second.png"}}}},
+                   false);
+  expect_sequences({"only.png"}, {{"", {{0, "only.png"}}}});
+  expect_sequences({"07.png", "7.png"}, {{"", {{0, "07.png"}, {1, "7.png"}}}});
+  EXPECT_THAT(name_sequences({}).sequences, IsEmpty());
+}
+
+TEST(NameSequences, TimesLackNoFrame) {
+  // TUM's and Argoverse's seconds, nuScenes' microseconds, EuRoC's nanoseconds, milliseconds.
+  expect_sequences({"315971930.9.png", "315971931.123456.png", "315971931.5.png"},
+                   {{"",
+                     {{0, "315971930.9.png"}, {1, "315971931.123456.png"}, {2, "315971931.5.png"}},
+                     1,
+                     {0, 0.223456, 0.6}}});
+  expect_sequences(
+      {"n015__CAM_BACK__1532402927612460.jpg", "n015__CAM_BACK__1532402928112460.jpg",
+       "n015__CAM_FRONT__1532402927612460.jpg"},
+      {{"n015__CAM_BACK",
+        {{0, "n015__CAM_BACK__1532402927612460.jpg"}, {1, "n015__CAM_BACK__1532402928112460.jpg"}},
+        1,
+        {0, 0.5}},
+       {"n015__CAM_FRONT", {{0, "n015__CAM_FRONT__1532402927612460.jpg"}}, 1, {0}}});
+  expect_sequences({"1403636579763555584.png", "1403636579813555456.png"},
+                   {{"",
+                     {{0, "1403636579763555584.png"}, {1, "1403636579813555456.png"}},
+                     1,
+                     {0, 0.049999872}}});
+  expect_sequences({"1403636579763.png", "1403636580000.png"},
+                   {{"", {{0, "1403636579763.png"}, {1, "1403636580000.png"}}, 1, {0, 0.237}}});
+  // A date is no time since an epoch: its digits carry at 60. It lacks no frame either.
+  expect_sequences({"20200101095959.png", "20200101100000.png"},
+                   {{"", {{0, "20200101095959.png"}, {1, "20200101100000.png"}}}});
+}
+
 TEST(OpenFramesDataset, OpensFoldersAndRefusesWhatIsNeitherFolderNorVideo) {
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "clip/1.png", "");
@@ -142,7 +243,7 @@ TEST_F(ImagesDatasetTest, EveryImageIsASample) {
   EXPECT_THAT(ids(), ElementsAre("f10", "f12", "f9"));
   const auto dataset = open();
   const LabelledFrame& ten = dataset->labelled_frames()[0];
-  EXPECT_EQ(ten.sequence, "");
+  EXPECT_EQ(ten.sequence, "clip");
   EXPECT_EQ(ten.frame, (FrameRef{"clip/f10.png", 10}));
   EXPECT_TRUE(std::isnan(ten.frame.time_s));
   EXPECT_EQ(dataset->paired_frame(ten, 0).frame, ten.frame);
@@ -158,6 +259,75 @@ TEST_F(ImagesDatasetTest, TheRateGivesTheTime) {
   touch({"3.png"});
   spec_.frames_per_second = 24;
   EXPECT_EQ(open()->labelled_frames()[0].frame.time_s, 3.0 / 24);
+}
+
+TEST_F(ImagesDatasetTest, TheRateCountsFramesNotNumbers) {
+  touch({"7959.png", "7961.png", "7963.png"});
+  spec_.frames_per_second = 15;
+  const auto dataset = open();
+  const LabelledFrame& last = dataset->labelled_frames()[2];
+  EXPECT_NEAR(last.frame.time_s - dataset->paired_frame(last, -1).frame.time_s, 1 / 15., 1e-9);
+}
+
+TEST_F(ImagesDatasetTest, NamesThatAreTimesGiveThem) {
+  touch({"1305031102.175304.png", "1305031102.211214.png"});
+  EXPECT_NEAR(open()->labelled_frames()[1].frame.time_s, 0.03591, 1e-9);
+  spec_.frames_per_second = 30;
+  EXPECT_DOUBLE_EQ(open()->labelled_frames()[1].frame.time_s, 1 / 30.);
+}
+
+TEST_F(ImagesDatasetTest, NoPairGoesFromOneSequenceToAnother) {
+  touch({"a_1.png", "a_2.png", "a_4.png", "b_1.png", "b_2.png"});
+  EXPECT_THAT(ids(), ElementsAre("a_1", "a_2", "a_4", "b_1", "b_2"));
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  EXPECT_EQ(frames[2].sequence, "a");
+  EXPECT_EQ(frames[3].sequence, "b");
+  EXPECT_EQ(dataset->paired_frame(frames[2], -1).state, State::kMissing);
+  EXPECT_EQ(dataset->paired_frame(frames[2], 1).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frames[3], -1).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frames[3], 1).frame, (FrameRef{"clip/b_2.png", 2}));
+}
+
+TEST_F(ImagesDatasetTest, TheOnlySequenceIsCalledAsItsFolder) {
+  touch({"highway/images/1.png", "highway/images/2.png"});
+  const auto sequence = [&](const std::string& root) {
+    spec_.root = root;
+    return open()->labelled_frames()[0].sequence;
+  };
+  EXPECT_EQ(sequence("clip/highway/images"), "highway");
+  EXPECT_EQ(sequence("clip/highway/images/"), "highway");
+  EXPECT_EQ(sequence("clip/highway/images/."), "highway");
+  // Wherever the manifest lies, it says the same.
+  spec_.root = ".";
+  EXPECT_EQ(
+      open_images_dataset(spec_, folder_ / "clip/highway/images")->labelled_frames()[0].sequence,
+      "frames");
+}
+
+TEST_F(ImagesDatasetTest, StillsAreOfNoSequence) {
+  touch({"2007_1.png", "2008_1.png", "2008_2.png"});
+  spec_.pairs.stills.emplace();
+  for (const LabelledFrame& frame : open()->labelled_frames()) EXPECT_EQ(frame.sequence, "");
+}
+
+TEST_F(ImagesDatasetTest, SaysWhereNamesTellNoSequences) {
+  touch({"0f-9.png", "7b-2.png", "ff-2.png"});
+  EXPECT_THAT(open()->notes(), ElementsAre("names of images tell no sequences: 3 images in the "
+                                           "order of their names in clip"));
+  EXPECT_EQ(open()->labelled_frames()[0].sequence, "clip");
+}
+
+TEST_F(ImagesDatasetTest, FoldersMayBeTwoDeep) {
+  touch({"day/a/1.png", "day/a/2.png", "day/b/1.png", "night/1.png", "night/c/1.png", "x/y/z.txt"});
+  EXPECT_THAT(ids(), ElementsAre("day/a/1", "day/a/2", "day/b/1", "night/1"));
+  const auto dataset = open();
+  EXPECT_EQ(dataset->labelled_frames()[1].sequence, "day/a");
+  EXPECT_EQ(dataset->paired_frame(dataset->labelled_frames()[1], -1).frame,
+            (FrameRef{"clip/day/a/1.png", 1}));
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("1 folder left out in clip/night: c", "1 folder left out in clip/x: y",
+                          "1 folder without images in clip"));
 }
 
 TEST_F(ImagesDatasetTest, EachFolderIsASequence) {

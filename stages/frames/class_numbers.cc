@@ -1,0 +1,140 @@
+#include "stages/frames/class_numbers.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "manifests/values/faults.h"
+
+namespace eventgan {
+namespace {
+
+/// A dataset with other numbers for its classes.
+class RenumberedDataset final : public Dataset {
+ public:
+  /// `names` has all the dataset's.
+  RenumberedDataset(std::unique_ptr<Dataset> dataset, ClassNames names)
+      : dataset_(std::move(dataset)), schema_(dataset_->label_schema()) {
+    for (const std::string& name : schema_.class_names) {
+      numbers_.push_back(static_cast<int>(std::ranges::find(names, name) - names.begin()));
+    }
+    schema_.class_names = std::move(names);
+  }
+
+  std::unique_ptr<Dataset> take() { return std::move(dataset_); }
+
+  const LabelSchema& label_schema() const override { return schema_; }
+  Outcome<Annotation> annotation(const std::string& label_key) const override {
+    Outcome<Annotation> read = dataset_->annotation(label_key);
+    if (is_fault(read)) return read;
+    for (Box& box : read->boxes) box.class_id = numbers_.at(static_cast<std::size_t>(box.class_id));
+    return read;
+  }
+
+  const std::vector<LabelledFrame>& labelled_frames() const override {
+    return dataset_->labelled_frames();
+  }
+  PairedFrame paired_frame(const LabelledFrame& frame, int steps) const override {
+    return dataset_->paired_frame(frame, steps);
+  }
+  ImageSize sensor_size(const std::string& label_key) const override {
+    return dataset_->sensor_size(label_key);
+  }
+  Outcome<EventWindow> events(const std::string& label_key) const override {
+    return dataset_->events(label_key);
+  }
+  ImageSizes* image_sizes() const override { return dataset_->image_sizes(); }
+  std::string label_place(const std::string& label_key) const override {
+    return dataset_->label_place(label_key);
+  }
+  std::vector<std::string> annotation_files() const override {
+    return dataset_->annotation_files();
+  }
+  std::vector<std::string> notes() const override { return dataset_->notes(); }
+  std::vector<std::string> warnings() const override { return dataset_->warnings(); }
+
+ private:
+  std::unique_ptr<Dataset> dataset_;
+  LabelSchema schema_;
+  std::vector<int> numbers_;  ///< by the dataset's own
+};
+
+void add_names(const ClassNames& more, ClassNames& names) {
+  if (names.empty()) {
+    names = more;
+    return;
+  }
+  std::set<std::string_view> known(names.begin(), names.end());
+  ClassNames added;
+  for (const std::string& name : more) {
+    if (known.insert(name).second) added.push_back(name);
+  }
+  std::ranges::move(added, std::back_inserter(names));
+}
+
+bool begins_with(const ClassNames& names, const ClassNames& first) {
+  return names.size() >= first.size() && std::equal(first.begin(), first.end(), names.begin());
+}
+
+/// Refuses numbers that mean other names: a stored name that is none any more, or a new one before
+/// one that is stored.
+void require_same_numbers(const SourceSpec& source, const ClassNames& today,
+                          const ClassNames& stored, const std::set<std::string>& all_today) {
+  const auto is_stored = [&](const std::string& name) {
+    return std::ranges::find(stored, name) != stored.end();
+  };
+  const auto first_new = std::ranges::find_if_not(today, is_stored);
+  const bool are_same = std::ranges::all_of(
+      stored, [&](const std::string& name) { return all_today.contains(name); });
+  if (are_same && std::none_of(first_new, today.end(), is_stored)) return;
+  throw InputError(fmt::format(
+      "expected new classes behind those of the shards, {}, since labels name classes by number, "
+      "got {}, in {}: put them at the end, or make all shards again (eventgan convert --overwrite)",
+      fmt::join(stored, ", "), fmt::join(today, ", "), source.labels->path));
+}
+
+}  // namespace
+
+void number_classes(const std::vector<SourceSpec>& sources,
+                    std::vector<std::unique_ptr<Dataset>>& datasets,
+                    const std::vector<std::optional<ClassNames>>& stored) {
+  std::map<DatasetKind, ClassNames> of_kind;
+  std::set<std::string> all_today;
+  for (std::size_t i = 0; i < stored.size(); ++i) {
+    if (stored[i]) add_names(*stored[i], of_kind[sources[i].dataset]);
+  }
+  for (std::size_t i = 0; i < datasets.size(); ++i) {
+    if (auto* earlier = dynamic_cast<RenumberedDataset*>(datasets[i].get())) {
+      datasets[i] = earlier->take();
+    }
+    if (!datasets[i]) continue;
+    const ClassNames& today = datasets[i]->label_schema().class_names;
+    add_names(today, of_kind[sources[i].dataset]);
+    all_today.insert(today.begin(), today.end());
+  }
+  for (std::size_t i = 0; i < datasets.size(); ++i) {
+    if (!datasets[i]) continue;
+    const ClassNames& today = datasets[i]->label_schema().class_names;
+    ClassNames names = of_kind[sources[i].dataset];
+    if (i < stored.size() && stored[i] && !stored[i]->empty()) {
+      if (!begins_with(names, *stored[i])) {  // each source had its own list
+        names = *stored[i];
+        add_names(of_kind[sources[i].dataset], names);
+      }
+      const auto& labels = sources[i].labels;
+      if (labels && labels->format == LabelFormat::kYolo) {
+        require_same_numbers(sources[i], today, *stored[i], all_today);
+      }
+    } else if (today.empty()) {
+      continue;
+    }
+    if (names == today) continue;
+    datasets[i] = std::make_unique<RenumberedDataset>(std::move(datasets[i]), std::move(names));
+  }
+}
+
+}  // namespace eventgan

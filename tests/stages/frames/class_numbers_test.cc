@@ -1,0 +1,120 @@
+#include "stages/frames/class_numbers.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "manifests/values/faults.h"
+#include "tests/testing/image_file.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+
+/// Sources of one image each, with a table or texts of labels.
+class ClassNumbers : public ::testing::Test {
+ protected:
+  SourceSpec source(const std::string& name) {
+    testing::write_flat_image(folder_ / name / "images/1.png", {30, 40}, 9);
+    SourceSpec spec;
+    spec.root = name + "/images";
+    return spec;
+  }
+  /// A box of each class.
+  void add_table(const std::string& name, const ClassNames& classes) {
+    std::string text = "image,class,left,top,right,bottom\n";
+    for (const std::string& one : classes) text += "1.png," + one + ",1,1,9,9\n";
+    if (classes.empty()) text += "1.png,,,,,\n";
+    testing::write_file(folder_ / name / "boxes.csv", text);
+    sources_.push_back(source(name));
+    sources_.back().labels = {LabelFormat::kCsv, name + "/boxes.csv"};
+    open();
+  }
+  /// A box of the last class.
+  void add_texts(const std::string& name, const ClassNames& classes) {
+    std::string names;
+    for (const std::string& one : classes) names += one + "\n";
+    testing::write_file(folder_ / name / "classes.txt", names);
+    testing::write_file(folder_ / name / "labels/1.txt",
+                        std::to_string(classes.size() - 1) + " 0.5 0.5 0.5 0.5\n");
+    sources_.push_back(source(name));
+    sources_.back().labels = {LabelFormat::kYolo, name};
+    open();
+  }
+  void open() { datasets_.push_back(open_dataset(sources_.back(), folder_.path())); }
+
+  const ClassNames& names(std::size_t i) const { return datasets_[i]->label_schema().class_names; }
+  /// What each box of the source is called.
+  ClassNames boxes(std::size_t i) const {
+    ClassNames found;
+    for (const LabelledFrame& frame : datasets_[i]->labelled_frames()) {
+      const Annotation annotation = *datasets_[i]->annotation(frame.label_key);
+      for (const Box& box : annotation.boxes) {
+        found.push_back(names(i).at(static_cast<std::size_t>(box.class_id)));
+      }
+    }
+    return found;
+  }
+
+  testing::TemporaryFolder folder_;
+  std::vector<SourceSpec> sources_;
+  std::vector<std::unique_ptr<Dataset>> datasets_;
+};
+
+TEST_F(ClassNumbers, AreThoseOfTheFirstSourceThenTheNext) {
+  add_table("train", {"person", "car"});
+  add_table("val", {"person", "bike"});
+  add_table("test", {});
+  datasets_.push_back(nullptr);
+  sources_.emplace_back();
+  number_classes(sources_, datasets_);
+  EXPECT_THAT(names(0), ElementsAre("car", "person", "bike"));
+  EXPECT_EQ(names(1), names(0));
+  EXPECT_THAT(names(2), IsEmpty());
+  EXPECT_THAT(boxes(0), ElementsAre("person", "car"));
+  EXPECT_THAT(boxes(1), ElementsAre("person", "bike"));
+}
+
+TEST_F(ClassNumbers, EachKindOfDatasetHasItsOwn) {
+  add_table("train", {"car"});
+  add_table("val", {"person"});
+  sources_[1].dataset = DatasetKind::kKittiObject;
+  number_classes(sources_, datasets_);
+  EXPECT_THAT(names(0), ElementsAre("car"));
+  EXPECT_THAT(names(1), ElementsAre("person"));
+}
+
+TEST_F(ClassNumbers, WhatIsStoredKeepsItsNumbers) {
+  add_table("train", {"person", "bike"});
+  add_table("val", {"ant"});
+  number_classes(sources_, datasets_);
+  number_classes(sources_, datasets_, {ClassNames{"car", "person"}, std::nullopt});
+  EXPECT_THAT(names(0), ElementsAre("car", "person", "bike", "ant"));
+  EXPECT_EQ(names(1), names(0));
+  EXPECT_THAT(boxes(0), ElementsAre("person", "bike"));
+  // Shards of which each source had its own list.
+  number_classes(sources_, datasets_, {ClassNames{"person"}, ClassNames{"ant"}});
+  EXPECT_THAT(names(0), ElementsAre("person", "ant", "bike"));
+  EXPECT_THAT(names(1), ElementsAre("ant", "person", "bike"));
+  EXPECT_THAT(boxes(1), ElementsAre("ant"));
+}
+
+TEST_F(ClassNumbers, OfLabelsByNumberNewOnesComeLast) {
+  add_texts("train", {"car", "person", "bike"});
+  number_classes(sources_, datasets_, {ClassNames{"car", "person"}});
+  EXPECT_THAT(names(0), ElementsAre("car", "person", "bike"));
+  EXPECT_THAT(boxes(0), ElementsAre("bike"));
+  for (const ClassNames& stored : {ClassNames{"car", "bike"}, ClassNames{"car", "man"}}) {
+    EXPECT_THAT([&] { number_classes(sources_, datasets_, {stored}); },
+                ThrowsMessage<InputError>(HasSubstr("since labels name classes by number, got car, "
+                                                    "person, bike, in train: ")));
+  }
+}
+
+}  // namespace
+}  // namespace eventgan
