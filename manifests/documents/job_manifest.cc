@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
 
@@ -253,8 +254,14 @@ void list_image(Fields& fields, ImageSpec& spec, const std::vector<SourceSpec>& 
   }
   fields.rule(R"({"properties": {"blur": {"anyOf": [{"const": 0},
                                                     {"minimum": 3, "not": {"multipleOf": 2}}]}}})");
+  std::optional<std::array<double, 2>> range;
+  const auto of_range = fields.find(
+      "range", range, pairs_of(0, 65535, Ends::kAbove),
+      "Of images of 16 bits: the values that become 0 and 255, others are cut. Default: the upper "
+      "8 bits are taken. Images of 8 bits stay as they are.");
+  if (range) spec.range = {(*range)[0], (*range)[1]};
   if (!sources.empty() && std::ranges::all_of(sources, has_events, &SourceSpec::dataset)) {
-    for (const auto& key : {of_preset, of_grey, of_blur}) {
+    for (const auto& key : {of_preset, of_grey, of_blur, of_range}) {
       if (key) key->fault("no such key for events, which have no grey values");
     }
     return;

@@ -11,8 +11,8 @@ namespace eventgan {
 
 /// The values of images of 16 bits that become 0 and 255.
 struct ValueRange {
-  int low = 0;
-  int high = 65535;  ///< > low
+  double low = 0;
+  double high = 65535;  ///< > low
   bool operator==(const ValueRange&) const = default;
 };
 

@@ -157,6 +157,7 @@ struct ImageSpec {
   std::string preset;  ///< "kitti", "mpii", "demo", or empty when the keys were given one by one
   GreyOrder grey = GreyOrder::kBeforeResize;
   int blur = 0;  ///< side of the Gaussian kernel in pixels, odd, 3..31; 0 = none
+  std::optional<ValueRange> range;  ///< of images of 16 bits; none: their upper 8 bits are taken
 };
 
 /// Which part of a volume is generated; the rest is zeros.

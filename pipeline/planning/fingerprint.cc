@@ -165,6 +165,7 @@ std::string preprocessing_json(const ImageSpec& image) {
                          {"grey", to_string(image.grey)},
                          {"blur", image.blur},
                          {"preset", image.preset}};
+  if (image.range) json["range"] = {image.range->low, image.range->high};
   return json.dump();
 }
 

@@ -173,7 +173,8 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
     return frame_image(
         state_->has_events
             ? decode_recorded(state_->frames, state_->source, which, state_->recording)
-            : state_->decoder.decode(which, sample.pair.video_stride(), orientation),
+            : state_->decoder.decode(which, sample.pair.video_stride(), orientation,
+                                     state_->manifest.image.range),
         which, sample, state_->manifest.image, state_->warnings);
   };
   content.previous_bgr = frame(sample.pair.previous);

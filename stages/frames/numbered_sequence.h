@@ -16,8 +16,9 @@ inline bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 /// Images that a folder of frames may hold. Where a frame is there under two of them, the first
 /// counts.
-inline const std::vector<std::string_view> kImageExtensions = {".png", ".jpg",  ".jpeg", ".bmp",
-                                                               ".tif", ".tiff", ".webp"};
+inline const std::vector<std::string_view> kImageExtensions = {
+    ".png",  ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp",
+    ".jfif", ".mpo", ".ppm",  ".pgm", ".pbm", ".pnm"};
 
 /// A folder of frames whose names end in their number: "img_000006.jpg" is frame 6. Listed once;
 /// after that no question goes to the disk. A value; reading it from several threads is safe.

@@ -8,7 +8,9 @@ import shutil
 import subprocess
 import zipfile
 
+import h5py
 import numpy as np
+import PIL.Image
 
 import failing_files
 import program
@@ -232,3 +234,33 @@ class Names(program.InFolder):
 
 if __name__ == "__main__":
     program.main()
+
+
+class SixteenBits(program.InFolder):
+    """A thermal camera's images, whose values fill a seventieth of the 16 bits."""
+
+    def convert(self, folder, **image):
+        job = program.manifest([{"dataset": "frames", "root": folder, "pairs": program.pairs([1])}],
+                               name=folder, image=image, output={"directory": f"out-{folder}"},
+                               generator={"kind": "difference"})
+        _, errors = run("convert", self.write_manifest(job, f"{folder}.json"), "--overwrite")
+        with h5py.File(next((self.folder / f"out-{folder}").glob("*.h5"))) as shard:
+            return errors, shard["events/volume"][()], json.loads(shard.attrs["preprocessing"])
+
+    def test_a_narrow_range_is_named_and_can_be_spread(self):
+        wide = np.random.default_rng(5).integers(51_200, 52_220, (2, 24, 32), endpoint=True)
+        wide[:, 0, 0], wide[:, 0, 1] = 51_200, 52_220  # both ends are there
+        for folder, images in (("wide", wide.astype(np.uint16)), ("narrow", ((wide - 51_200) / 4 + 0.5).astype(np.uint8))):
+            (self.folder / folder).mkdir()
+            for number, image in enumerate(images):
+                PIL.Image.fromarray(image).save(self.folder / folder / f"{number}.png")
+        errors, volume, _ = self.convert("wide")
+        self.assertRegex(errors, r"note: images of 16 bits use the values from 512\d\d to 522\d\d alone, of which their "
+                                 r'upper 8 bits keep 4 steps: set "image": {"range": \[512\d\d, 522\d\d\]}, in wide')
+        _, expected, _ = self.convert("narrow")
+        self.assertGreater(expected.sum(), 3 * volume.sum())
+        errors, volume, preprocessing = self.convert("wide", range=[51_200, 52_220])
+        np.testing.assert_array_equal(volume, expected)
+        self.assertEqual(preprocessing["range"], [51_200, 52_220])
+        self.assertNotIn("16 bits", errors)
+        run("verify", "--deep", self.folder / "out-wide")

@@ -106,7 +106,7 @@ ColourFrame narrowed(const WideFrame& wide, const ValueRange& range) {
   const double scale = 255.0 / (range.high - range.low);
   for (int value = 0; value < 65536; ++value) {
     bytes[static_cast<std::size_t>(value)] =
-        static_cast<std::uint8_t>(std::clamp(std::lround((value - range.low) * scale), 0L, 255L));
+        static_cast<std::uint8_t>(std::lround(std::clamp((value - range.low) * scale, 0.0, 255.0)));
   }
   ColourFrame frame{wide.size, std::vector<std::uint8_t>(wide.bgr.size())};
   std::ranges::transform(wide.bgr, frame.bgr.begin(),

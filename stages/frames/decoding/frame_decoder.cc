@@ -1,5 +1,7 @@
 #include "stages/frames/decoding/frame_decoder.h"
 
+#include <algorithm>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -20,6 +22,27 @@ Outcome<ImageSize> probe_image_size(const std::filesystem::path& file,
   } catch (const std::runtime_error& error) {
     return SampleFault{std::string(error.what()) + ", in " + file.string()};
   }
+}
+
+std::optional<ValueRange> wide_value_range(const std::vector<std::filesystem::path>& files) {
+  std::vector<std::int64_t> counts(65536);
+  for (const std::filesystem::path& file : files) {
+    try {
+      if (!count_wide_values(open_image_file(file), counts)) return std::nullopt;
+    } catch (const std::runtime_error&) {  // who converts it says why
+    }
+  }
+  const auto total = std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
+  if (total == 0) return std::nullopt;
+  const auto outside = [&](const auto& first, const auto& last) {
+    std::int64_t seen = 0;
+    return static_cast<double>(
+        std::find_if(first, last,
+                     [&](std::int64_t count) { return (seen += count) > total / 1000; }) -
+        first);
+  };
+  return ValueRange{outside(counts.begin(), counts.end()),
+                    65535 - outside(counts.rbegin(), counts.rend())};
 }
 
 Outcome<ImageSize> ImageSizes::of(const std::filesystem::path& file, ImageOrientation orientation) {
@@ -46,10 +69,11 @@ FrameDecoder::FrameDecoder(std::filesystem::path base, int kept_frames)
       videos_(std::make_unique<OpenVideos<ColourFrame>>(kept_frames, copy_of)) {}
 
 Outcome<ColourFrame> FrameDecoder::decode(const FrameRef& frame, std::int64_t video_stride,
-                                          ImageOrientation orientation) const {
+                                          ImageOrientation orientation,
+                                          const std::optional<ValueRange>& range) const {
   const std::filesystem::path path = base_ / frame.path;
   try {
-    return frame.video_frame < 0 ? decode_image_file(path, orientation)
+    return frame.video_frame < 0 ? decode_image_file(path, orientation, range)
                                  : videos_->frames<1>(path, {frame.video_frame}, video_stride)[0];
   } catch (const std::runtime_error& error) {
     return SampleFault{std::string(error.what()) + ", in " + frame.path};

@@ -124,7 +124,8 @@ SharedFrame PairReader::frame(const FrameRef& ref, ImageOrientation orientation)
   if (ref.video_frame >= 0) return videos_->frames<1>(base_ / ref.path, {ref.video_frame})[0];
   return images_->get(name_of(ref, orientation), [&] {
     return frame_or_fault([&] {
-      const ColourFrame image = decode_image(files_->take(base_ / ref.path), orientation);
+      const ColourFrame image =
+          decode_image(files_->take(base_ / ref.path), orientation, spec_.range);
       return prepare_frame({image.size, image.bgr.data()}, spec_);
     });
   });
@@ -155,7 +156,8 @@ Outcome<std::array<PreparedFrame, 2>> PairReader::still(const FramePair& pair,
                                                         std::int64_t stride) const {
   try {
     if (pair.next.video_frame < 0) {
-      const ColourFrame image = decode_image(files_->take(base_ / pair.next.path), orientation);
+      const ColourFrame image =
+          decode_image(files_->take(base_ / pair.next.path), orientation, spec_.range);
       return prepare_still({image.size, image.bgr.data()}, pair, spec_);
     }
     const Outcome<ColourFrame> image = stills_.decode(pair.next, stride);

@@ -89,7 +89,8 @@ TEST(JobManifest, HoldsEveryValueGiven) {
        "pairs": {"gaps": [2]}},
       {"dataset": "frames", "root": "h", "frames_per_second": 29.97,
        "labels": {"format": "voc", "path": "i", "edges_from": 0}, "pairs": {"gaps": [2]}}],
-    "image": {"width": 861, "height": 260, "fit": "crop", "grey": "after_resize", "blur": 5},
+    "image": {"width": 861, "height": 260, "fit": "crop", "grey": "after_resize", "blur": 5,
+              "range": [7000, 9000.5]},
     "generator": {"weights": "untrained:8", "engine": "onednn", "device": "cuda",
                   "precision": "int8",
                   "scope": "labels", "motion_threshold": 2.5, "motion_margin_px": 0,
@@ -126,6 +127,7 @@ TEST(JobManifest, HoldsEveryValueGiven) {
   EXPECT_EQ(manifest.image.preset, "");
   EXPECT_EQ(manifest.image.grey, GreyOrder::kAfterResize);
   EXPECT_EQ(manifest.image.blur, 5);
+  EXPECT_EQ(manifest.image.range, (ValueRange{7000, 9000.5}));
   EXPECT_EQ(manifest.generator.weights, "untrained:8");
   EXPECT_EQ(manifest.generator.engine, Engine::kOnednn);
   EXPECT_EQ(manifest.generator.device, Device::kCuda);

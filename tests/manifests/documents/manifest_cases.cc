@@ -123,6 +123,7 @@ std::vector<ManifestCase> source_cases() {
         {"/sources/2",
          R"({"dataset": "recording", "root": "r", "window_events": 0, "without_actions": ["1"]})"},
         {"/image/blur", "3"},
+        {"/image/range", "[0, 1]"},
         {"/generator", R"({"kind": "events", "duration_s": 1})"}},
        {R"($.sources[0].camera: expected "left" or "right", got "both")",
         "$.sources[0].window_events: expected no such key together with window_s, which sets it, "
@@ -135,6 +136,9 @@ std::vector<ManifestCase> source_cases() {
         "$.sources[2].window_events: expected an integer 1..1000000000, got 0",
         R"($.image.preset: expected no such key for events, which have no grey values, got "kitti")",
         "$.image.blur: expected no such key for events, which have no grey values, got 3",
+        "$.image.range: expected no such key for events, which have no grey values, got an array "
+        "of "
+        "2",
         R"($.generator.duration_s: expected no such key for kind "events" (only for network, esim, difference), got 1)"}},
       {"a recording for a network",
        {{"/sources/0", R"({"dataset": "recording", "root": "r"})"}, own_size},
@@ -258,7 +262,8 @@ std::vector<ManifestCase> source_cases() {
       {"frames with labels and a class",
        {{"/sources/0/dataset", R"("frames")"},
         {"/sources/0/labels", R"({"format": "csv", "path": "x", "class": 3})"}},
-       {"$.sources[0].labels.class: expected one of the keys format, path, edges_from, got an unknown key"}},
+       {"$.sources[0].labels.class: expected one of the keys format, path, edges_from, got an "
+        "unknown key"}},
       {"frames with edges from 0",
        {{"/sources/0/dataset", R"("frames")"},
         {"/sources/0/labels", R"({"format": "voc", "path": "x", "edges_from": 0})"}},
@@ -270,7 +275,8 @@ std::vector<ManifestCase> source_cases() {
       {"frames with edges of shares",
        {{"/sources/0/dataset", R"("frames")"},
         {"/sources/0/labels", R"({"format": "yolo", "path": "x", "edges_from": 1})"}},
-       {"$.sources[0].labels.edges_from: expected no such key for this format (only for voc and mot), got 1"}},
+       {"$.sources[0].labels.edges_from: expected no such key for this format (only for voc and "
+        "mot), got 1"}},
       {"KITTI with labels of one's own",
        {{"/sources/0/dataset", R"("kitti_object")"},
         {"/sources/0/labels", R"({"format": "coco", "path": "x"})"}},
@@ -406,6 +412,12 @@ std::vector<ManifestCase> setting_cases() {
        {{"/image/grey", R"("after_resize")"}, {"/image/blur", "3"}},
        {R"($.image.grey: expected no such key together with preset, which sets it, got "after_resize")",
         "$.image.blur: expected no such key together with preset, which sets it, got 3"}},
+      {"a range without values in it",
+       {{"/image/range", "[7000, 7000]"}},
+       {"$.image.range[1]: expected a number above the previous one, got 7000"}},
+      {"a range beyond 16 bits",
+       {{"/image/range", "[0, 65536]"}},
+       {"$.image.range[1]: expected a number 0..65535, got 65536"}},
       {"an even blur",
        {{"/image/preset", ""}, {"/image/grey", R"("after_resize")"}, {"/image/blur", "4"}},
        {"$.image.blur: expected 0 (no blur) or an odd integer 3..31, got 4"}},
