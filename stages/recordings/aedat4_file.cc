@@ -274,10 +274,10 @@ std::vector<PacketPlace> Aedat4File::read_table() const {
     const auto* const entries = table_of<aedat4::PacketTable>(bytes, "FTAB").packets();
     for (flatbuffers::uoffset_t i = 0; entries && i < entries->size(); ++i) {
       const aedat4::PacketEntry& entry = *entries->Get(i);
-      const aedat4::Packet nowhere(-1, -1);
-      const aedat4::Packet& packet = entry.packet() ? *entry.packet() : nowhere;
-      told.push_back({entry.byte(), packet.size_bytes(), packet.stream(), entry.count(),
-                      entry.begin_us(), entry.end_us()});
+      const aedat4::Packet* const packet = entry.packet();
+      told.push_back({entry.byte(), packet ? packet->size_bytes() : -1,
+                      packet ? packet->stream() : -1, entry.count(), entry.begin_us(),
+                      entry.end_us()});
     }
   });
   std::ranges::stable_sort(told, {}, &PacketPlace::byte);
