@@ -358,14 +358,18 @@ TEST_F(CocoLabels, ABadEntryIsAFaultOfItsImage) {
 }
 
 TEST_F(CocoLabels, CrowdsAreToldByANumberOrABoolean) {
-  for (const auto& [crowd, ignore] :
-       {std::pair("0", false), {"1", true}, {"false", false}, {"true", true}}) {
+  for (const auto& [crowd, ignore] : {std::pair("0", false),
+                                      {"1", true},
+                                      {"false", false},
+                                      {"true", true},
+                                      {"1.0", true},
+                                      {"null", false}}) {
     write(image(7, "000001.png"),
           box(1, 7, "[1, 2, 3, 4]", std::string(", \"iscrowd\": ") + crowd));
     EXPECT_EQ(fault(), "no fault") << crowd;
     EXPECT_EQ(annotation("7").boxes.at(0).ignore, ignore) << crowd;
   }
-  for (const char* crowd : {"\"true\"", "null", "2", "0.5"}) {
+  for (const char* crowd : {"\"true\"", "2", "0.5"}) {
     write(image(7, "000001.png"),
           box(1, 7, "[1, 2, 3, 4]", std::string(", \"iscrowd\": ") + crowd));
     EXPECT_THAT(fault(), HasSubstr("(annotation 1): $.iscrowd: expected")) << crowd;
