@@ -90,6 +90,8 @@ Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const Pa
   }
   if (!result.sample.fault.empty()) {
     result.state = State::kMissing;
+    // What is wrong with the frame itself comes first: it may lie where it is not looked for.
+    if (!frame.fault.empty()) result.sample.fault = frame.fault;
   } else if (previous.state == State::kPresent && next.state == State::kPresent) {
     result.state = frame.fault.empty() ? State::kPresent : State::kMissing;
     result.sample.fault = frame.fault;
