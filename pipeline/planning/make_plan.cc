@@ -84,18 +84,16 @@ Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const Pa
   }
   if (too_far_apart(result.sample.pair, spec.max_gap_s)) return result;
   if (previous.state == State::kBeyond || next.state == State::kBeyond) return result;
+  // What is wrong with the frame itself comes first: it may lie where it is not looked for.
+  std::string& fault = result.sample.fault;
+  fault = frame.fault;
   for (const PairedFrame* paired_frame : {&previous, &next}) {
-    if (paired_frame->state == State::kMissing && result.sample.fault.empty()) {
-      result.sample.fault = "expected a frame, got no file, in " + paired_frame->frame.path + " (" +
-                            frame.sample_id + ")";
+    if (paired_frame->state == State::kMissing && fault.empty()) {
+      fault = "expected a frame, got no file, in " + paired_frame->frame.path + " (" +
+              frame.sample_id + ")";
     }
   }
-  if (!result.sample.fault.empty()) {
-    result.state = State::kMissing;
-  } else {
-    result.state = frame.fault.empty() ? State::kPresent : State::kMissing;
-    result.sample.fault = frame.fault;
-  }
+  result.state = fault.empty() ? State::kPresent : State::kMissing;
   return result;
 }
 

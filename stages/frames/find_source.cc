@@ -31,7 +31,11 @@ std::optional<Place> look_at(const fs::path& root, std::optional<DatasetKind> da
     if (dataset && reader->kind != *dataset) continue;
     if (is_own(reader->kind) && !own_too) continue;
     for (const DatasetLayout& layout : reader->layouts) {
-      if (layout.fits(root)) return Place{reader->kind, &layout, root};
+      // Labels of it whose images are of one's own, and may have others.
+      const bool has_others = !layout.image_folder.empty() &&
+                              !has_folder(root / layout.image_folder) &&
+                              has_folder(root / "images");
+      if (layout.fits(root) && !has_others) return Place{reader->kind, &layout, root};
     }
   }
   return std::nullopt;

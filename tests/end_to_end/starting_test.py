@@ -129,7 +129,7 @@ class Init(program.InFolder):
             for dataset in [[], ["frames"]]:
                 with self.subTest(path=path, dataset=dataset):
                     told, manifest = self.init(*dataset, self.folder / path)
-                    self.assertIn(f"images or videos: {frames} labelled frames", told)
+                    self.assertIn(f"images or videos: {frames} frames", told)
                     self.assertIn(f"gap 1: {gap_1}, ", told)
                     self.assertEqual("frames_per_second" in told, path.startswith("clips"))
             self.trial(manifest, gap_1, limit=100)
@@ -301,7 +301,7 @@ class Init(program.InFolder):
         self.assertEqual((written["name"], written["output"]["directory"]), ("cars-events", "out/cars-events"))
         for path, finding in zip(given,
                                  ["KITTI object: 3 labelled frames", "MPII as a list of people: 2 labelled frames",
-                                  "images or videos: 4 labelled frames", "images or videos: 5 labelled frames"]):
+                                  "images or videos: 4 frames", "images or videos: 5 frames"]):
             self.assertIn(f"{path}\n{finding}", told)
             self.assertIn(f"    // {path}\n    // {finding}", manifest.read_text())
         self.trial(manifest, 3 + 2 + 3 + 4, limit=100)
@@ -352,7 +352,8 @@ class Init(program.InFolder):
             with self.subTest(path):
                 told, manifest = self.init(SHARED / path)
                 self.assertEqual(read_commented(manifest)["sources"][0]["dataset"], dataset)
-                self.assertIn(f": {frames} labelled frames", told)
+                word = "frames" if dataset == "frames" else "labelled frames"
+                self.assertIn(f": {frames} {word}", told)
                 self.assertRegex(told, rf"by gap: gap \d: {partners},")
                 self.trial(manifest, partners)
         self.assertIn("gap 1: 1, gap 2: 1, gap 3: 1, gap 4: 1, gap 5: 1, gap 6: 1",

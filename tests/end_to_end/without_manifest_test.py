@@ -66,7 +66,7 @@ class WithoutManifest(program.InFolder):
         _, err = convert(clip / "walk", self.folder / "out")
         self.assertTrue(err.startswith(f"manifest: {self.folder}/out/manifest.json, kept as it was when the "
                                        "job began\n"), err)
-        self.assertNotIn("labelled frames", err)
+        self.assertNotIn("NO LABELS", err)
 
     def test_the_kept_manifest_is_that_of_the_folder(self):
         """Of the same job wherever both lie: the output folder may be moved."""
@@ -116,7 +116,7 @@ class WithoutManifest(program.InFolder):
         self.in_folder()
         told, err = run("plan", clip / "walk")
         self.assertIn("total: 130 pairs in 3 shards", told)
-        self.assertIn("images or videos: 131 labelled frames", err)
+        self.assertIn("images or videos: 131 frames, NO LABELS", err)
         self.assertEqual(os.listdir("."), [])
         run("plan", clip / "walk", "--freeze")
         self.assertEqual(sorted(os.listdir("out/walk-events")), ["manifest.json", "plan.json", "run.json"])
@@ -218,7 +218,7 @@ class WithoutManifest(program.InFolder):
         write_video(self.folder / "one.mp4", 1)
         _, err = convert(self.folder / "one.mp4", out, expect=66)
         self.assertIn("error: expected labelled frames that make pairs, got none, in ", err)
-        self.assertIn("1 labelled frame of 1 sequence", err)
+        self.assertIn("1 frame of 1 sequence, NO LABELS", err)
         self.assertEqual(err.count("\n"), 1, err)
         for given in "none.mp4", "none":
             self.assertIn(given, convert(self.folder / given, out, expect=66)[1])

@@ -76,8 +76,8 @@ void OwnLabels::give_named(const std::vector<NamedLabel>& named, const std::stri
     notes_.push_back(count_text(std::ssize(others), "image", " named otherwise in " + labels_path) +
                      ": " + some_of(others, 3));
   }
-  constexpr std::size_t kFew = 2;
-  if (absent.size() > kFew && 4 * absent.size() > named.size()) {
+  constexpr std::size_t kMany = 10;
+  if (absent.size() >= kMany && 4 * absent.size() > named.size()) {
     std::vector<std::string> left_out;
     for (const AbsentFrame& frame : absent) left_out.push_back(frame.name);
     notes_.push_back(std::to_string(absent.size()) + " of " +

@@ -248,7 +248,7 @@ std::vector<std::string> unread_labels(const std::vector<FoundFrames>& places) {
   for (const FoundFrames& frames : places) {
     std::vector<fs::path> folders = folders_around(frames);
     for (const fs::path& above : {frames.root, frames.root.parent_path()}) {
-      for (const char* name : {"labels", "xml", "xmls", "label", "labels_json", "json"}) {
+      for (const char* name : {"labels", "label", "label_2", "xml", "xmls", "json"}) {
         folders.push_back(frames.files->folder(above, name));
       }
     }

@@ -38,6 +38,27 @@ TEST(ReportText, SaysWhatWasWrittenLostAndSpent) {
               ::testing::HasSubstr("quarantined: expected an image, got rubbish, in a.png (id)"));
 }
 
+TEST(ReportText, SaysBoxesByClass) {
+  ConversionReport some = report();
+  EXPECT_THAT(to_text(some), HasSubstr("\nNO LABELS: no boxes and no persons with joints\n"));
+  some.persons = 12;
+  EXPECT_THAT(to_text(some), HasSubstr("\n12 persons with joints\n"));
+  some.boxes = {{"car", 1204}, {"person", 33}, {"tree", 1'234'567}};
+  EXPECT_THAT(to_text(some), HasSubstr("\nboxes: 1,204 car, 33 person, 1,234,567 tree; 12 persons "
+                                       "with joints\n"));
+  EXPECT_THAT(to_json(some), HasSubstr("\"boxes\":{\"car\":1204,\"person\":33,"));
+  some.is_labelled = false;
+  EXPECT_THAT(to_text(some), HasSubstr("\n2 frames without a paired frame"));
+  some.written = 0;
+  EXPECT_THAT(to_text(some), Not(HasSubstr("boxes")));
+  CommitRecord record;
+  record.contents.classes = {{"car", 3}};
+  record.contents.persons = {2, 0, 1};
+  add_shard(record, 0, some);
+  EXPECT_EQ(some.boxes.at("car"), 1207);
+  EXPECT_EQ(some.persons, 15);
+}
+
 TEST(ReportText, TellsUnpairedFramesFromTheirPairs) {
   ConversionReport all = report();
   EXPECT_THAT(

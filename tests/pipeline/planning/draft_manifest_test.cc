@@ -79,10 +79,9 @@ TEST_F(DraftManifest, OfASequenceTakesPairsOfNeighboursAsTheyAre) {
       HasSubstr(R"(// "generator": { "weights": "shipped:sensor", "sensor": "davis346" },)"));
   EXPECT_FALSE(job.image.size);
   EXPECT_TRUE(made.has_samples);
-  EXPECT_THAT(made.findings,
-              ElementsAre("what was found: 3 labelled frames of 1 sequence, 0 annotation files",
-                          HasSubstr("by gap: gap 1: 2, gap 2: 1, gap 3: 0"),
-                          HasSubstr("set \"frames_per_second\"")));
+  EXPECT_THAT(made.findings, ElementsAre("what was found: 3 frames of 1 sequence, NO LABELS",
+                                         HasSubstr("by gap: gap 1: 2, gap 2: 1, gap 3: 0"),
+                                         HasSubstr("set \"frames_per_second\"")));
 }
 
 TEST_F(DraftManifest, OfOneImageProposesStillsWithTheirDefaultsWrittenOut) {
@@ -100,7 +99,7 @@ TEST_F(DraftManifest, OfOneImageProposesStillsWithTheirDefaultsWrittenOut) {
           R"("motion": { "translation_px": [2, 8], "rotation_deg": 2, "scale": 0.03, "frames": 1 })"));
   EXPECT_FALSE(read(made).image.size);
   EXPECT_TRUE(made.has_samples);
-  EXPECT_THAT(made.findings, Contains("what was found: 1 labelled frame, 0 annotation files"));
+  EXPECT_THAT(made.findings, Contains("what was found: 1 frame, NO LABELS"));
 }
 
 TEST_F(DraftManifest, OfSeveralSizesIsLetterboxedStills) {

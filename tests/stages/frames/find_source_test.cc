@@ -150,6 +150,7 @@ TEST_F(FindSource, SaysOfWhichDatasetTheFramesAreAPart) {
   write("mini/label_2/000000.txt");
   write("mini/images/000000.png");
   EXPECT_THAT(find("mini/images").remarks.front(), ::testing::EndsWith("in image_2"));
+  EXPECT_EQ(find("mini").dataset, DatasetKind::kFrames) << "its images are where KITTI has none";
   write("mini/other/000000.png");
   EXPECT_THAT(find("mini/other").remarks, Not(Contains(HasSubstr("a part of"))));
 }
@@ -241,6 +242,158 @@ TEST_F(FindSource, LabelsOfOnesOwnLieBesideTheImages) {
     EXPECT_EQ(found.labels->path / "", at(name) / expected.path / "") << name;
     EXPECT_EQ(find(name + "/" + expected.root).labels->path, found.labels->path) << name;
   }
+}
+
+TEST_F(FindSource, LabelsLieWhereToolsPutThem) {
+  const std::string mot = "1,1,1,1,2,2,1,1,1\n", yolo = "\xEF\xBB\xBF\n1 0.5 0.5 0.25 0.5\n";
+  const auto coco = [](const std::string& images) {
+    return "\xEF\xBB\xBF\n{\"annotations\": [{\"id\": 1, \"bbox\": [1, 2, 3, 4], \"image_id\": "
+           "1}], "
+           "\"categories\": [], \"images\": [" +
+           images + "]}";
+  };
+  const std::string listed = coco(R"({"file_name": "1.jpg", "id": 1})");
+  const struct {
+    LabelFormat format;
+    std::string root, path, split;  ///< what is to be found
+    std::vector<std::pair<std::string, std::string>> files;
+  } cases[] = {
+      {LabelFormat::kCoco,
+       "images/default",
+       "annotations/instances_default.json",
+       "",
+       {{"images/default/1.jpg", ""}, {"annotations/instances_default.json", listed}}},
+      {LabelFormat::kCoco,
+       "val2017",
+       "annotations/instances_val2017.json",
+       "val",
+       {{"val2017/1.jpg", ""}, {"annotations/instances_val2017.json", listed}}},
+      {LabelFormat::kCoco,
+       "images",
+       "result.json",
+       "",
+       {{"images/1.jpg", ""}, {"result.json", coco(R"({"file_name": "images\/1\/1.jpg"})")}}},
+      {LabelFormat::kCoco,
+       "images",
+       "a.json",
+       "",
+       {{"images/\uac70 1.jpg", ""}, {"a.json", coco(R"({"file_name": "\uac70 1.jpg"})")}}},
+      {LabelFormat::kCoco,
+       "Images",
+       "Annotations/a.json",
+       "",
+       {{"Images/1.jpg", ""}, {"Annotations/a.json", listed}}},
+      {LabelFormat::kCoco,
+       "",
+       "labels.json",
+       "",
+       {{"data/1.jpg", ""}, {"labels.json", listed}, {"._labels.json", "Mac"}}},
+      {LabelFormat::kYolo, "", "labels", "", {{"1.jpg", ""}, {"labels/1.txt", yolo}}},
+      {LabelFormat::kYolo,
+       "Images",
+       "",
+       "",
+       {{"Images/1.jpg", ""}, {"Labels/1.txt", ""}, {"data.yaml", ""}}},
+      {LabelFormat::kYolo,
+       "",
+       "",
+       "",
+       {{"obj_train_data/1.jpg", ""},
+        {"obj_train_data/1.txt", ""},
+        {"obj.names", "car"},
+        {"obj.data", "classes = 1"},
+        {"train.txt", "data/obj_train_data/1.jpg"}}},
+      {LabelFormat::kYolo,
+       "",
+       "",
+       "",
+       {{"clip.mp4", ""}, {"labels/clip_000012.txt", ""}, {"data.yaml", ""}}},
+      {LabelFormat::kYolo,
+       "",
+       "",
+       "",
+       {{"clip.mp4", ""}, {"clip/12.txt", ""}, {"classes.txt", ""}}},
+      {LabelFormat::kVoc,
+       "images",
+       "annotations/xmls",
+       "",
+       {{"images/1.jpg", ""}, {"annotations/xmls/1.xml", ""}}},
+      {LabelFormat::kVoc, "images", "labels", "", {{"images/1.jpg", ""}, {"labels/1.xml", ""}}},
+      {LabelFormat::kVoc, "images", "xml", "", {{"images/1.jpg", ""}, {"xml/1.xml", ""}}},
+      {LabelFormat::kMot, "", "", "", {{"highway.mp4", ""}, {"highway/gt/gt.txt", mot}}},
+      {LabelFormat::kMot, "", "", "", {{"highway.mp4", ""}, {"highway.txt", mot}}},
+      {LabelFormat::kMot, "", "", "", {{"1.jpg", ""}, {"gt/gt.txt", mot}}},
+      {LabelFormat::kCsv,
+       "",
+       "a.csv",
+       "",
+       {{"highway.mp4", ""}, {"a.csv", "frame;label;x;y;w;h\nhighway.mp4/12;car;1;2;3;4\n"}}},
+      {LabelFormat::kCsv,
+       "train",
+       "train/_annotations.csv",
+       "",
+       {{"train/1.jpg", ""},
+        {"train/_annotations.csv",
+         "filename,width,height,class,xmin,ymin,xmax,ymax\n1.jpg,9,9,car,1,2,3,4\n"}}},
+  };
+  int number = 0;
+  for (const auto& expected : cases) {
+    const std::string name = "tool" + std::to_string(number++);
+    for (const auto& [file, text] : expected.files) write(name + "/" + file, text);
+    const FoundSource found = find(name);
+    EXPECT_EQ(found.root, (at(name) / expected.root / "").parent_path()) << name;
+    ASSERT_TRUE(found.labels) << name << " " << ::testing::PrintToString(found.unread);
+    EXPECT_EQ(found.labels->format, expected.format) << name;
+    EXPECT_EQ(found.labels->path / "", at(name) / expected.path / "") << name;
+    EXPECT_EQ(found.split, expected.split) << name;
+    EXPECT_THAT(found.unread, IsEmpty()) << name;
+  }
+}
+
+TEST_F(FindSource, WhatLooksLikeLabelsAndIsNotReadIsNamed) {
+  const std::string box = R"({"label": "car", "coordinates": {"x": 1}})";
+  const std::pair<std::string, std::vector<std::pair<std::string, std::string>>> cases[] = {
+      {"CVAT's XML",
+       {{"images/1.jpg", ""}, {"annotations.xml", "<annotations><image id=\"0\"/></annotations>"}}},
+      {"labelme's", {{"1.jpg", ""}, {"1.json", R"({"shapes": [], "imagePath": "1.jpg"})"}}},
+      {"CreateML's",
+       {{"train/1.jpg", ""},
+        {"train/_annotations.createml.json",
+         "[{\"image\": \"1.jpg\", \"annotations\": [" + box + "]}]"}}},
+      {"Label Studio's",
+       {{"images/1.jpg", ""}, {"project.json", R"([{"id": 1, "data": {}, "annotations": []}])"}}},
+      {"VisDrone's", {{"images/1.jpg", ""}, {"annotations/1.txt", "684,8,273,116,0,0,0,0\n"}}},
+      {"KITTI's",
+       {{"images/1.jpg", ""},
+        {"label_2/1.txt",
+         "Car 0.00 0 -1.58 587 173 614 200 1.65 1.67 3.64 -0.65 1.71 46.70 -1.59\n"}}},
+      {"COCO",
+       {{"images/1.jpg", ""},
+        {"a.json", R"({"images": [{"file_name": "gone.jpg"}], "annotations": [{"bbox": []}]})"}}},
+      {"a table of", {{"1.jpg", ""}, {"a.csv", "1.jpg,1,2,3,4,car\n"}}},
+      {"a table of",
+       {{"1.jpg", ""}, {"a.csv", "image,class,left,top,right,bottom,score\n1.jpg,a,0,0,1,1,1\n"}}},
+  };
+  int number = 0;
+  for (const auto& [title, files] : cases) {
+    const std::string name = "unread" + std::to_string(number++);
+    for (const auto& [file, text] : files) write(name + "/" + file, text);
+    const FoundSource found = find(name);
+    EXPECT_EQ(found.dataset, DatasetKind::kFrames) << name;
+    EXPECT_FALSE(found.labels) << name;
+    EXPECT_THAT(found.unread,
+                ::testing::ElementsAre(AllOf(
+                    ::testing::StartsWith(at(name).string()),
+                    HasSubstr(" looks like " + title + " labels of these images and is not read: "),
+                    HasSubstr("; "))))
+        << name;
+  }
+  write("none/1.jpg");
+  write("none/1.txt", "a street with two cars\n");
+  write("none/captions.json", R"([{"image": "1.jpg", "caption": "a street"}])");
+  write("none/frames.csv", "image,width,height,sequence,index\n1.jpg,64,48,a,1\n");
+  write("none/1.json", R"({"mine": [1, 2]})");
+  EXPECT_THAT(find("none").unread, IsEmpty());
 }
 
 TEST_F(FindSource, TextsBesideTheImagesAreTakenWhereTheReaderLooks) {

@@ -264,10 +264,10 @@ TEST_F(CocoLabels, AnotherImageIsNotTakenForOne) {
 
 TEST_F(CocoLabels, OfALargerSetWhatIsNotThereIsNoted) {
   std::string images = image(1, "000001.png");
-  for (int id = 2; id < 10; ++id) images += "," + image(id, "gone" + std::to_string(id) + ".png");
+  for (int id = 2; id < 12; ++id) images += "," + image(id, "gone" + std::to_string(id) + ".png");
   write(images, "");
   EXPECT_EQ(open()->labelled_frames().size(), 1u);
-  EXPECT_THAT(open()->notes(), Contains("8 of 9 images in instances.json are not in images, and "
+  EXPECT_THAT(open()->notes(), Contains("10 of 11 images in instances.json are not in images, and "
                                         "left out: gone2.png, gone3.png, gone4.png, ..."));
 }
 
@@ -358,14 +358,18 @@ TEST_F(CocoLabels, ABadEntryIsAFaultOfItsImage) {
 }
 
 TEST_F(CocoLabels, CrowdsAreToldByANumberOrABoolean) {
-  for (const auto& [crowd, ignore] :
-       {std::pair("0", false), {"1", true}, {"false", false}, {"true", true}}) {
+  for (const auto& [crowd, ignore] : {std::pair("0", false),
+                                      {"1", true},
+                                      {"false", false},
+                                      {"true", true},
+                                      {"1.0", true},
+                                      {"null", false}}) {
     write(image(7, "000001.png"),
           box(1, 7, "[1, 2, 3, 4]", std::string(", \"iscrowd\": ") + crowd));
     EXPECT_EQ(fault(), "no fault") << crowd;
     EXPECT_EQ(annotation("7").boxes.at(0).ignore, ignore) << crowd;
   }
-  for (const char* crowd : {"\"true\"", "null", "2", "0.5"}) {
+  for (const char* crowd : {"\"true\"", "2", "0.5"}) {
     write(image(7, "000001.png"),
           box(1, 7, "[1, 2, 3, 4]", std::string(", \"iscrowd\": ") + crowd));
     EXPECT_THAT(fault(), HasSubstr("(annotation 1): $.iscrowd: expected")) << crowd;

@@ -294,15 +294,29 @@ TEST_F(YoloLabels, ClassesAreInTheFolderAboveWhateverThePathIs) {
   }
 }
 
-TEST_F(YoloLabels, NeedTheClassesNames) {
+TEST_F(YoloLabels, WithoutTheClassesNamesTheseAreTheirNumbers) {
   image("d/images/1.png");
-  text("d/labels/1.txt");
+  text("d/labels/1.txt", "");
   EXPECT_THAT([&] { open("d/images", "d/labels"); },
               ThrowsMessage<InputError>(HasSubstr(
-                  "expected data.yaml or classes.txt with the classes' names, got neither, in "
-                  "d/labels and the folder above it")));
-  text("d/classes.txt", "cat\n");
-  EXPECT_EQ(open("d/images", "d/labels")->labelled_frames().size(), 1u);
+                  "expected data.yaml or classes.txt with the classes' names, or boxes, got "
+                  "neither, in d/labels and the folder above it")));
+  text("d/labels/1.txt", "2 0.5 0.5 0.25 0.5\n0 0.5 0.5 0.25 0.5\n");
+  const auto numbered = open("d/images", "d/labels");
+  EXPECT_THAT(numbered->label_schema().class_names, ElementsAre("0", "1", "2"));
+  EXPECT_THAT(numbered->notes(),
+              ElementsAre("classes are named by their numbers, 0..2, since no data.yaml or "
+                          "classes.txt with names is in d/labels or the folder above it"));
+  EXPECT_EQ(numbered->annotation("1.txt")->boxes.at(0).class_id, 2);
+  for (const char* name : {"d/classes.txt", "d/obj.names", "d/_darknet.labels"}) {
+    text(name, "cat\ndog\nbird\n");
+    EXPECT_THAT(open("d/images", "d/labels")->label_schema().class_names,
+                ElementsAre("cat", "dog", "bird"));
+    std::filesystem::remove(folder_ / name);
+  }
+  text("d/street.yaml", "train: images\nnames: [cat, dog, bird]\n");
+  EXPECT_THAT(open("d/images", "d/labels")->label_schema().class_names,
+              ElementsAre("cat", "dog", "bird"));
   EXPECT_THAT([&] { open("d/images", "nowhere"); },
               ThrowsMessage<InputError>(HasSubstr("expected a folder")));
 }
