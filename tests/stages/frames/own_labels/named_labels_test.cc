@@ -335,10 +335,11 @@ TEST_F(NamedLabels, CopiesOfASequenceAreToldOf) {
   text("m/M-02-DPM/gt/gt.txt", "1,1,1,1,5,5,1,1,1\n");
   text("m/M-02-SDP/gt/gt.txt", "1,1,1,1,5,5,1,1,1\n");
   text("m/M-04-DPM/gt/gt.txt", "1,1,2,1,5,5,1,1,1\n");
-  EXPECT_THAT(open(LabelFormat::kMot, "m", "m")->notes(),
-              ElementsAre(HasSubstr("M-02-SDP (of M-02-DPM) (MOT17 has each three times")));
-  EXPECT_THAT(open(LabelFormat::kMot, "m", "m")->notes().at(0),
-              HasSubstr("1 sequence with the labels of another: "));
+  const auto dataset = open(LabelFormat::kMot, "m", "m");
+  ASSERT_EQ(dataset->notes().size(), 1u);
+  EXPECT_THAT(dataset->notes()[0],
+              ::testing::StartsWith("1 sequence with the labels of another, as MOT17 has each"));
+  EXPECT_THAT(dataset->notes()[0], ::testing::EndsWith("): M-02-SDP (of M-02-DPM)"));
 }
 
 TEST_F(NamedLabels, MotsLengthAloneIsEnough) {
