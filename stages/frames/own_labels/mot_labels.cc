@@ -262,8 +262,8 @@ class MotLabels : public ReadLabels {
     }
     schema_.class_names = classes_.names();
     std::ranges::sort(annotation_files_);
-    const auto twice = std::ranges::unique(annotation_files_);  // a labels.txt of several
-    annotation_files_.erase(twice.begin(), twice.end());
+    const auto twice = std::unique(annotation_files_.begin(), annotation_files_.end());
+    annotation_files_.erase(twice, annotation_files_.end());  // a labels.txt of several sequences
     note_without_label(root_.written(""));
   }
 
