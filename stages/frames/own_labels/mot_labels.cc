@@ -84,6 +84,7 @@ void add_row(const std::vector<std::string_view>& columns, const MotForm& form,
   if (columns.size() <= kConf || columns.size() > kMost) {
     throw BadLabel("expected 7 to 10 columns, got " + std::to_string(columns.size()));
   }
+  const bool is_of_2015 = columns.size() == kMost && !columns.back().empty();
   NamedBox read;
   Box& box = read.box;
   constexpr std::int64_t kMostId = std::int64_t{1} << 53;
@@ -107,7 +108,7 @@ void add_row(const std::vector<std::string_view>& columns, const MotForm& form,
     box.occlusion = static_cast<int>(whole(columns[kOcclusion], "0, 1 or 2 as occlusion", 0, 2));
   } else if (!form.class_names.empty() && columns.size() > kClass) {
     mot = {form.class_names[class_of(columns[kClass], 1, form.class_names.size())]};
-  } else if (columns.size() > kClass && columns.size() < kMost) {
+  } else if (columns.size() > kClass && !is_of_2015) {
     mot = kClasses[class_of(columns[kClass], 1, kClasses.size())];
   }
   read.class_name = mot.name;
@@ -262,6 +263,8 @@ class MotLabels : public ReadLabels {
     }
     schema_.class_names = classes_.names();
     std::ranges::sort(annotation_files_);
+    const auto twice = std::unique(annotation_files_.begin(), annotation_files_.end());
+    annotation_files_.erase(twice, annotation_files_.end());  // a labels.txt of several sequences
     note_without_label(root_.written(""));
   }
 
@@ -319,11 +322,10 @@ class MotLabels : public ReadLabels {
     }
     if (!copies_.empty()) {
       notes_.push_back(
-          counted(copies_, "sequence", " with the labels of another") +
-          " (MOT17 has each three times, for three detectors). To take each once, put those to "
-          "take, "
-          "or links to them, into a folder and give that as root: else train and val may share "
-          "images");
+          counted(copies_, "sequence",
+                  " with the labels of another, as MOT17 has each three times (to take "
+                  "each once, put those to take, or links to them, into a folder and "
+                  "give that as root: else train and val may share images)"));
     }
     remarks_.move_to(notes_);
   }

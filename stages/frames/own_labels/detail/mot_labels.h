@@ -54,8 +54,9 @@ bool is_visdrone_table(std::string_view text);
 /// Box's; its truncation 1 is cut by the border, how far is not told.
 ///
 /// CVAT and datumaro write the same table with classes of their own, whose names are in labels.txt
-/// beside it, with edges from 0, and id -1 for an object without track. Whole numbers may have
-/// decimals ("2.0"). That id, id 0 and conf -1, which is taken for 1, are remarks.
+/// beside it, with edges from 0, id -1 for an object without track, and perhaps an empty column at
+/// the end. Whole numbers may have decimals ("2.0"). That id, id 0 and conf -1, which is taken for
+/// 1, are remarks.
 ///
 /// Result: by frame number, from 1, the frame's lines, byte for byte in the file's order, and its
 /// boxes; frames without a line are not in it. A line that is not so, or an id twice in a frame, is

@@ -130,6 +130,12 @@ TEST(MotLabels, WhatIsNotUsedOrOnlyUnusualIsTaken) {
                           "conf -1 taken for 1", "id -1 taken for none"));
 }
 
+TEST(MotLabels, AnEmptyColumnAtTheEndIsNone) {
+  const auto frames = read_mot("1,1,1,1,2,2,1,3,0.86,\n1,2,1,1,2,2,1,3,0.86,0\n");
+  EXPECT_EQ(frames.at(1)->boxes.at(0).class_name, "car");
+  EXPECT_EQ(frames.at(1)->boxes.at(1).class_name, "pedestrian");  // coordinates of 2015
+}
+
 TEST(MotLabels, MayHaveClassesOfTheirOwn) {
   const MotForm form{0, {"car", "truck", "dog"}};
   const auto frames =
