@@ -62,6 +62,19 @@ bool is_among(const FoundFrames& frames, const fs::path& name) {
          });
 }
 
+std::string_view split_of(std::string name) {
+  static const std::map<std::string_view, std::string_view> kSplits = {
+      {"train", "train"}, {"training", "train"}, {"val", "val"},
+      {"valid", "val"},   {"validation", "val"}, {"eval", "val"},
+      {"dev", "val"},     {"test", "test"},      {"testing", "test"}};
+  name.erase(name.find_last_not_of("0123456789") + 1);
+  std::ranges::transform(name, name.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  const auto split = kSplits.find(name);
+  return split == kSplits.end() ? "" : split->second;
+}
+
 namespace {
 
 FoundFrames frames_in(const fs::path& root, WholeFiles& files) {
@@ -114,21 +127,6 @@ std::optional<FoundLabels> find_any(const FoundFrames& frames, std::vector<std::
     }
   }
   return found;
-}
-
-/// The split that a folder's name states, in letters of any case: "val" of "valid" and of
-/// "VAL2017"; empty if none.
-std::string_view split_of(std::string name) {
-  static const std::map<std::string_view, std::string_view> kSplits = {
-      {"train", "train"}, {"training", "train"}, {"val", "val"},
-      {"valid", "val"},   {"validation", "val"}, {"eval", "val"},
-      {"dev", "val"},     {"test", "test"},      {"testing", "test"}};
-  name.erase(name.find_last_not_of("0123456789") + 1);
-  std::ranges::transform(name, name.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  const auto split = kSplits.find(name);
-  return split == kSplits.end() ? "" : split->second;
 }
 
 /// The folders of images that labels may be of, those that are most likely first.

@@ -43,6 +43,10 @@ bool is_among(const FoundFrames& frames, const std::filesystem::path& name);
 std::vector<std::filesystem::path> names_with(const FolderListing& listing,
                                               std::string_view extension);
 
+/// The split that a folder's name states, in letters of any case: "val" of "valid" and of
+/// "VAL2017"; empty if none.
+std::string_view split_of(std::string name);
+
 /// Looks for labels of one's own of the frames in found.root, or in a folder of images in it
 /// (LabelReader::find). Sets root and labels, and remarks on labels and on folders of images that
 /// are there and left out. Where train and val or test have a folder each, with labels of its own,
