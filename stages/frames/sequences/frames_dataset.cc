@@ -65,7 +65,8 @@ bool is_frames_root(const std::filesystem::path& root) {
                              [&](const std::string& name) { return has_images(root / name); }) ||
          std::ranges::any_of(top.folders, [&](const std::string& name) {
            return is_mot_sequence(root / name) || has_sequences(root / name) ||
-                  (has_folder(root / name / "labels") && has_images(root / name / "images"));
+                  ((has_folder(root / name / "labels") || !split_of(name).empty()) &&
+                   has_images(root / name / "images"));
          });
 }
 

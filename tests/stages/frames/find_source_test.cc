@@ -485,6 +485,27 @@ TEST_F(FindSource, FoldersOfSequencesMayBeTwoDeep) {
   EXPECT_THROW(find("sets"), InputError);
 }
 
+TEST_F(FindSource, ASplitsImagesMayHaveLabelsOfAnyFormatBesideThem) {
+  const std::string coco = R"({"images": [{"id": 1, "file_name": "1.jpg"}], "annotations": []})";
+  for (const char* split : {"train", "val"}) {
+    write("voc/" + std::string(split) + "/images/1.jpg");
+    write("voc/" + std::string(split) + "/annotations/1.xml");
+    write("coco/" + std::string(split) + "/images/1.jpg");
+    write("coco/" + std::string(split) + "/annotations.json", coco);
+  }
+  for (const char* name : {"voc", "coco"}) {
+    const auto sources = find_sources(at(name));
+    ASSERT_EQ(sources.size(), 2u) << name;
+    for (const FoundSource& source : sources) {
+      const std::string split = source.split.empty() ? "train" : std::string(source.split);
+      EXPECT_THAT(source.root.string(), ::testing::StartsWith((at(name) / split).string()));
+      ASSERT_TRUE(source.labels) << source.root;
+      EXPECT_THAT(source.labels->path.string(), HasSubstr(split + "/annotations"));
+    }
+    EXPECT_EQ(sources[1].split, "val");
+  }
+}
+
 TEST_F(FindSource, SplitsWithLabelsOfTheirOwnAreSources) {
   const auto splits = [&](const fs::path& name) {
     std::vector<std::array<std::string, 3>> found;

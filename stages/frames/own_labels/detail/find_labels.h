@@ -74,7 +74,8 @@ std::vector<std::filesystem::path> folders_around(const FoundFrames& frames);
 std::vector<std::filesystem::path> names_with(const FolderListing& listing,
                                               std::string_view extension);
 
-/// The split that a folder's name states: "val" of "valid" and of "val2017"; empty if none.
+/// The split that a folder's name states, in letters of any case: "val" of "valid" and of
+/// "VAL2017"; empty if none.
 std::string_view split_of(std::string name);
 
 /// Looks for labels of one's own of the frames in found.root, or in a folder of images in it
