@@ -105,10 +105,11 @@ void FaultList::add_unknown_key(std::string_view json_path) {
   unknown_keys_.insert(std::move(place));
 }
 
-std::string FaultList::text() const {
-  std::string text = fmt::format("{}", fmt::join(lines_, "\n"));
-  if (left_out_ > 0)
-    text += "\n" + document_ + ": and " + std::to_string(left_out_) + " more faults";
+std::string FaultList::text(std::string_view between) const {
+  std::string text = fmt::format("{}", fmt::join(lines_, between));
+  if (left_out_ > 0) {
+    text += fmt::format("{}{}: and {} more faults", between, document_, left_out_);
+  }
   return text;
 }
 

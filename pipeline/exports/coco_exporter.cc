@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <map>
@@ -69,12 +70,21 @@ std::optional<OriginalIds> original_ids(const ExportSource& source, const Annota
     OriginalIds ids;
     ids.image = entry.at("image").at("id").get<std::int64_t>();
     for (const nlohmann::json& object : entry.at("annotations")) {
+      const auto sides = object.at("bbox").get<std::array<double, 4>>();
+      const Rectangle box{sides[0], sides[1], sides[0] + sides[2], sides[1] + sides[3]};
+      const std::size_t number = ids.annotations.size();
+      // One that was left out, being outside its image, has no box.
+      if (number == annotation.boxes.size() || annotation.boxes[number].xyxy != box) continue;
       ids.annotations.push_back(object.at("id").get<std::int64_t>());
       ids.categories.push_back(object.at("category_id").get<std::int64_t>());
       const nlohmann::json joints = object.value("keypoints", nlohmann::json::array());
-      bool is_person = false;
-      for (std::size_t i = 2; i < joints.size(); i += 3) is_person = is_person || joints[i] > 0;
-      if (is_person) ids.persons.push_back(ids.annotations.size() - 1);
+      bool has_joints = false;
+      for (std::size_t i = 2; i < joints.size(); i += 3) has_joints = has_joints || joints[i] > 0;
+      const std::size_t person = ids.persons.size();
+      if (has_joints && person < annotation.persons.size() &&
+          annotation.persons[person].box == box) {
+        ids.persons.push_back(number);
+      }
     }
     if (ids.annotations.size() != annotation.boxes.size() ||
         ids.persons.size() != annotation.persons.size()) {

@@ -52,8 +52,9 @@ class FaultList {
   bool empty() const { return lines_.empty(); }
   std::size_t count() const { return lines_.size() + left_out_; }
 
-  /// One fault a line, no newline at the end. Beyond a thousand they are only counted.
-  std::string text() const;
+  /// One fault a line, no newline at the end. Beyond a thousand they are only counted. `between`:
+  /// what stands for a line's end where the text must be one line.
+  std::string text(std::string_view between = "\n") const;
 
  private:
   void add_line(std::string line);

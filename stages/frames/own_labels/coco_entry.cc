@@ -55,7 +55,7 @@ class CocoEntry {
   const std::string& place() const { return place_; }
   StrictObject object() { return StrictValue(document_, faults_).object(); }
   void check() const {
-    if (!faults_.empty()) throw BadLabel(faults_.text());
+    if (!faults_.empty()) throw BadLabel(faults_.text("; "));
   }
 
  private:

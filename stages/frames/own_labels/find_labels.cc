@@ -164,19 +164,6 @@ std::string_view split_of(std::string name) {
   return split == kSplits.end() ? "" : split->second;
 }
 
-std::string_view split_of(std::string name) {
-  static const std::map<std::string_view, std::string_view> kSplits = {
-      {"train", "train"}, {"training", "train"}, {"val", "val"},
-      {"valid", "val"},   {"validation", "val"}, {"eval", "val"},
-      {"dev", "val"},     {"test", "test"},      {"testing", "test"}};
-  name.erase(name.find_last_not_of("0123456789") + 1);
-  std::ranges::transform(name, name.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  const auto split = kSplits.find(name);
-  return split == kSplits.end() ? "" : split->second;
-}
-
 namespace {
 
 FoundFrames frames_in(const fs::path& root, WholeFiles& files) {
