@@ -9,7 +9,8 @@
 
 namespace eventgan {
 
-/// A table of boxes (stages/base/files/csv_records.h), a row a box, with a header line of the columns
+/// A table of boxes (stages/base/files/csv_records.h), a row a box, with a header line of the
+/// columns
 ///   image, class, left, top, right, bottom[, track]
 /// in any order, each once. left to bottom are edges in pixels: 0 is the image's left or top edge,
 /// so that a whole image is 0,0,WIDTH,HEIGHT. track is a whole number from 0, the same for one
