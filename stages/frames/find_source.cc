@@ -88,6 +88,7 @@ void note_dataset_above(FoundSource& found) {
       remark += " once the images are in " + std::string(images);
     }
     found.remarks.insert(found.remarks.begin(), remark);
+    found.unread.clear();  // they are that dataset's, as the remark says
     return;
   }
 }

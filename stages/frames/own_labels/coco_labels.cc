@@ -95,21 +95,23 @@ class CocoLabels : public OwnLabels {
   std::unordered_map<std::int64_t, std::size_t> place_of_id_;
 };
 
-/// The split that the end of a file's name states: "val" of instances_val2017.json.
-std::string_view split_of_file(const std::filesystem::path& file) {
+/// What ends a file's name: "val2017" of instances_val2017.json.
+std::string last_word(const std::filesystem::path& file) {
   const std::string stem = file.stem().string();
-  return split_of(stem.substr(stem.find_last_of("_-. ") + 1));
+  return stem.substr(stem.find_last_of("_-. ") + 1);
 }
 
 bool is_coco_of(const FoundFrames& frames, const std::filesystem::path& file) {
   const std::string stem = file.stem().string();
   if (stem.starts_with("captions") || frames.stems.contains(stem)) return false;
   // instances_train2017.json is of the folder train2017 alone.
-  const std::string_view split = split_of_file(file);
+  const std::string word = last_word(file);
+  const std::string_view split = split_of(word);
   const std::string_view own = split_of(frames.root.filename().string());
   if (!split.empty() && !own.empty() && split != own) return false;
   for (const std::string& folder : frames.folders) {
-    if (stem.ends_with(folder) || (!split.empty() && split_of(folder) == split)) return false;
+    if (stem == folder || word == folder || (!split.empty() && split_of(folder) == split))
+      return false;
   }
   const JsonGlimpse& seen = frames.files->json(file);
   if (seen.file_names.empty()) {  // of no image, and so told by its name
@@ -134,9 +136,9 @@ std::optional<std::filesystem::path> find_coco(const FoundFrames& frames,
     return std::pair(!stem.ends_with(name), !stem.starts_with("instances"));
   };
   std::ranges::stable_sort(files, {}, rank);
-  const std::string_view split = split_of_file(files.front());
+  const std::string_view split = split_of(last_word(files.front()));
   for (std::size_t i = 1; i < files.size(); ++i) {
-    const bool is_of_others = split_of_file(files[i]) != split;
+    const bool is_of_others = split_of(last_word(files[i])) != split;
     remarks.push_back(
         (is_of_others ? "warning: other COCO labels left out: " : "other COCO labels left out: ") +
         files[i].string());

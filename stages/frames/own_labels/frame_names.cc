@@ -244,12 +244,14 @@ FrameNames::Match FrameNames::find_near(const std::string& name, bool is_in_root
       if (number) found = places.find(*number);
     }
     if (found == places.end()) continue;
-    if (found->second == kSeveral) return {kSeveral};
-    // As above: "images/1.jpg" is no image of a folder of the root "images".
+    const bool is_bare = dropped + 1 == parts.size();
+    if (found->second == kSeveral) return dropped == 0 ? Match{kSeveral} : Match{};
+    // As above: "images/1.jpg" is no image of a folder of the root "images", and "a/1.jpg" none of
+    // the folder b.
     const bool is_in_folder = names_[found->second].find('/') != std::string_view::npos;
-    if (is_in_root && is_in_folder && dropped + 1 == parts.size()) continue;
+    if ((is_in_root || dropped > 0) && is_in_folder && is_bare) continue;
     if (dropped > 0 && is_other_image(parts, dropped, found->second)) return {};
-    return {found->second, {}, /*is_near=*/true};
+    return {.frame = found->second, .is_near = true, .drops_folders = dropped > 0};
   }
   return {};
 }

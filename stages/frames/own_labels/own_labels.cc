@@ -36,14 +36,16 @@ void OwnLabels::give_named(const std::vector<NamedLabel>& named, const std::stri
   FrameNames names(source_);
   std::vector<std::string> of_several;
   std::vector<AbsentFrame> absent, elsewhere;
-  std::vector<std::pair<std::size_t, const NamedLabel*>> near;
+  std::vector<std::pair<FrameNames::Match, const NamedLabel*>> near;
+  bool any_exact = false;
   for (const NamedLabel& label : named) {
     const FrameNames::Match match = names.find(label.image);
     if (match.frame == FrameNames::kSeveral) {
       of_several.push_back(label.image);
     } else if (match.is_near) {
-      near.emplace_back(match.frame, &label);
+      near.emplace_back(match, &label);
     } else if (match.frame != FrameNames::kNone) {
+      any_exact = true;
       give(match.frame, label.key);
     } else if (match.is_elsewhere) {
       elsewhere.push_back({label.image, label.key,
@@ -56,21 +58,30 @@ void OwnLabels::give_named(const std::vector<NamedLabel>& named, const std::stri
       absent.push_back({match.below_root, label.key});
     }
   }
+  // The first two that have the name.
+  const auto both_text = [&](const std::string& name) {
+    std::vector<std::string> both;
+    for (const SourceFrame& frame : source_.frames) {
+      if (both.size() < 2 && frame.name.ends_with("/" + name)) both.push_back(frame.name);
+    }
+    return both.empty() ? "" : " (" + some_of(both, 2) + ")";
+  };
   if (!of_several.empty()) {
     throw InputError("expected images' paths below " + source_.root.written("") + ", got " +
                      counted(of_several, "bare name", " that several of its folders have") +
-                     ", in " + labels_path);
+                     ", in " + labels_path + both_text(of_several.front()));
   }
   std::vector<bool> is_named(labels_.size());
   for (std::size_t i = 0; i < labels_.size(); ++i) is_named[i] = !labels_[i].key.empty();
   std::vector<std::string> others;
-  for (const auto& [frame, label] : near) {
-    if (is_named[frame]) {  // by its own name: this is another's
+  for (const auto& [match, label] : near) {
+    // Another's, where the frame has its own name in the file, or others have their folders there.
+    if (is_named[match.frame] || (any_exact && match.drops_folders)) {
       absent.push_back({label->image, label->key});
       continue;
     }
-    give(frame, label->key);
-    others.push_back(label->image + " for " + source_.frames[frame].name);
+    give(match.frame, label->key);
+    others.push_back(label->image + " for " + source_.frames[match.frame].name);
   }
   if (!others.empty()) {
     notes_.push_back(count_text(std::ssize(others), "image", " named otherwise in " + labels_path) +

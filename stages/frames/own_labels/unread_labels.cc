@@ -185,6 +185,12 @@ constexpr std::array kUnreadFormats{
                  },
                  kNoReader,
                  "convert them to YOLO (ultralytics' VisDrone.yaml has a script) or COCO"},
+    UnreadFormat{"YOLO", ".txt",
+                 [](const LabelFile& file) {
+                   return file.is_of_image && is_yolo_text(file.text).value_or(false);
+                 },
+                 "it lies in none of the folders where these are looked for",
+                 "put it beside its image, or into labels/FOLDER for images/FOLDER"},
     UnreadFormat{"KITTI's", ".txt",
                  [](const LabelFile& file) { return file.is_of_image && is_kitti_text(file); },
                  "texts as KITTI has them are read as the dataset kitti_object",
@@ -214,8 +220,12 @@ class UnreadFinder {
       });
       if (name.starts_with('.') || !is_label) continue;
       const std::string stem = file.stem().string();
+      if (looked[{extension, true}] > kMostOfImages && looked[{extension, false}] > kMostOthers) {
+        continue;
+      }
       const bool is_of_image = frames.stems.contains(stem) ||
-                               std::ranges::find(frames.folders, stem) != frames.folders.end();
+                               std::ranges::find(frames.folders, stem) != frames.folders.end() ||
+                               (!frames.folders.empty() && count_among(frames, {stem}) > 0);
       const std::size_t most = is_of_image ? kMostOfImages : kMostOthers;
       if (++looked[{extension, is_of_image}] > most) continue;
       look_at({file, frames, is_of_image, beginning_of(file)}, extension);

@@ -16,21 +16,7 @@
 #include "stages/frames/sequences/image_folder.h"
 
 namespace eventgan {
-namespace {
 
-/// Texts that tools put beside the labels: lists of images, names of classes.
-bool is_other_text(std::string_view file) {
-  constexpr std::array<std::string_view, 10> kOthers = {
-      "classes.txt", "predefined_classes.txt", "labels.txt", "train.txt", "val.txt", "valid.txt",
-      "test.txt",    "autosplit.txt",          "obj.txt",    "readme.txt"};
-  const std::string name = in_small_letters(std::string(file));
-  return name.starts_with("readme.") || std::ranges::find(kOthers, name) != kOthers.end();
-}
-
-const LabelFiles kYoloFiles{".txt", {"images"}, {"labels"}, is_other_text};
-
-/// Whether a text is of YOLO's boxes, by its first line that says anything: a class, and shares of
-/// the image. None if no line does.
 std::optional<bool> is_yolo_text(std::string_view text) {
   for (const TextLine& line : split_lines(text)) {
     const std::vector<std::string_view> columns = split_columns(line.bytes);
@@ -46,6 +32,19 @@ std::optional<bool> is_yolo_text(std::string_view text) {
   }
   return std::nullopt;
 }
+
+namespace {
+
+/// Texts that tools put beside the labels: lists of images, names of classes.
+bool is_other_text(std::string_view file) {
+  constexpr std::array<std::string_view, 10> kOthers = {
+      "classes.txt", "predefined_classes.txt", "labels.txt", "train.txt", "val.txt", "valid.txt",
+      "test.txt",    "autosplit.txt",          "obj.txt",    "readme.txt"};
+  const std::string name = in_small_letters(std::string(file));
+  return name.starts_with("readme.") || std::ranges::find(kOthers, name) != kOthers.end();
+}
+
+const LabelFiles kYoloFiles{".txt", {"images"}, {"labels"}, is_other_text};
 
 /// data.yaml, classes.txt, obj.names of CVAT, _darknet.labels of Roboflow, or the only other YAML
 /// file; empty if there is none.

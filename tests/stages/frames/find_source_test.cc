@@ -362,6 +362,8 @@ TEST_F(FindSource, WhatLooksLikeLabelsAndIsNotReadIsNamed) {
          "[{\"image\": \"1.jpg\", \"annotations\": [" + box + "]}]"}}},
       {"Label Studio's",
        {{"images/1.jpg", ""}, {"project.json", R"([{"id": 1, "data": {}, "annotations": []}])"}}},
+      {"YOLO",
+       {{"images/a/1.jpg", ""}, {"images/b/2.jpg", ""}, {"labels/2.txt", "0 .5 .5 .2 .2\n"}}},
       {"VisDrone's", {{"images/1.jpg", ""}, {"annotations/1.txt", "684,8,273,116,0,0,0,0\n"}}},
       {"KITTI's",
        {{"images/1.jpg", ""},

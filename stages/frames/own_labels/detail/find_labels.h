@@ -5,6 +5,7 @@
 #include <initializer_list>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -69,6 +70,10 @@ std::size_t count_among(const FoundFrames& frames, const std::vector<std::string
 /// The folders in which a file with labels of all frames may lie: the root and the one above,
 /// `annotations` in them, and above a folder of images of a split.
 std::vector<std::filesystem::path> folders_around(const FoundFrames& frames);
+
+/// Whether a text is of YOLO's boxes, by its first line that says anything: a class, and shares of
+/// the image. None if no line does.
+std::optional<bool> is_yolo_text(std::string_view text);
 
 /// Names of a folder's files with that extension, in small letters; no hidden ones.
 std::vector<std::filesystem::path> names_with(const FolderListing& listing,

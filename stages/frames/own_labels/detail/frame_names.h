@@ -33,6 +33,7 @@ class FrameNames {
     std::size_t frame = kNone;
     std::string below_root = {};  ///< the name without what ROOT ends in
     bool is_near = false;         ///< by another name than its own
+    bool drops_folders = false;   ///< is_near, and the name has folders that the frame has not
     bool is_elsewhere = false;    ///< none, but there is such a file outside ROOT
   };
   Match find(const std::string& name);

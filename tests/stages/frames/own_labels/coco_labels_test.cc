@@ -251,6 +251,8 @@ TEST_F(CocoLabels, AnotherImageIsNotTakenForOne) {
   EXPECT_EQ(open()->labelled_frames().at(0).label_key, "8");
   write(image(7, "other/000001.png"), "");
   EXPECT_EQ(open()->labelled_frames().at(0).frame.index, -1);
+  write(image(7, "cam/000002.png") + "," + image(8, "000001.png"), "");
+  EXPECT_EQ(open()->labelled_frames().at(1).frame.index, -1) << "others have no folder";
   write(image(7, "val/000001.png"), "");
   EXPECT_EQ(open("set/train")->labelled_frames().at(0).frame.index, -1);
   write(image(7, "cam/000001.png") + "," + image(8, "images/000001.png"), "");
@@ -302,9 +304,13 @@ TEST_F(CocoLabels, ABareNameMayBeInAFolder) {
   EXPECT_EQ(frames[1].sample_id, "a/z");
   EXPECT_EQ(frames[2].sample_id, "b/y");
   write(image(1, "z.png"), "");
-  EXPECT_THAT([&] { open("clips"); },
-              ThrowsMessage<InputError>(HasSubstr("got 1 bare name that several of its folders "
-                                                  "have: z.png, in instances.json")));
+  EXPECT_THAT([&] { open("clips"); }, ThrowsMessage<InputError>(HasSubstr(
+                                          "got 1 bare name that several of its folders "
+                                          "have: z.png, in instances.json (a/z.png, b/z.png)")));
+  // A folder that is not there is no other one.
+  write(image(1, "c/x.png") + "," + image(2, "c/z.png"), "");
+  EXPECT_EQ(open("clips")->labelled_frames().at(0).frame.index, -1);
+  EXPECT_EQ(open("clips")->labelled_frames().at(1).frame.index, -1);
 }
 
 TEST_F(CocoLabels, AnEntryWithoutImageIsASampleWhoseFrameIsMissing) {
