@@ -225,7 +225,7 @@ class Recordings(Export):
         run("finalize", manifest.parent / "out")
         self.export("dsec", source=manifest.parent / "out")
         recording, = (self.out / "dsec" / "train").iterdir()
-        self.assertEqual(recording.name, "frames")
+        self.assertEqual(recording.name, "clip")
         self.assertEqual([window[:2] for window in read_windows(recording / "windows.txt")],
                          [(50000 * k, 50000 * (k + 1)) for k in range(3)])
 

@@ -36,7 +36,7 @@ struct ListedFolder {
 /// What a sequence is called that is ROOT itself: after its folder as the manifest writes it, but
 /// for names that most datasets have. The same wherever the manifest lies.
 std::string name_of_root(const fs::path& root) {
-  constexpr std::array<std::string_view, 7> kCommon = {"images",     "img1", "frames", "data",
+  constexpr std::array<std::string_view, 6> kCommon = {"images",     "img1", "data",
                                                        "JPEGImages", ".",    ".."};
   std::string name = "frames";
   const std::vector<std::string> folders(root.begin(), root.end());
