@@ -156,7 +156,7 @@ struct ImageSpec {
   ImageFit fit = ImageFit::kStretch;
   std::string preset;  ///< "kitti", "mpii", "demo", or empty when the keys were given one by one
   GreyOrder grey = GreyOrder::kBeforeResize;
-  int blur = 0;  ///< side of the Gaussian kernel in pixels, odd, 3..31; 0 = none
+  int blur = 0;                     ///< side of the Gaussian kernel in pixels, odd, 3..31; 0 = none
   std::optional<ValueRange> range;  ///< of images of 16 bits; none: their upper 8 bits are taken
 };
 

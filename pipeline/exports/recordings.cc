@@ -34,8 +34,8 @@ struct LaidSample {
   bool is_timed = false;  ///< by its frames' times, not their numbers
 };
 
-/// The sequence that the sample is of; none if it is of none. In shards of earlier programs a folder
-/// of images is one without a name.
+/// The sequence that the sample is of; none if it is of none. Stills in one folder are of none
+/// either, and are laid out as one that has the dataset's name.
 std::optional<std::string> sequence_of(const OutgoingSample& sample) {
   if (!sample.labels.sequence.empty()) return sample.labels.sequence;
   const DatasetRow* const dataset = find_dataset(sample.source.dataset);
