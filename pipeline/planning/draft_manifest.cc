@@ -41,6 +41,8 @@ struct SourceDraft {
     std::ranges::copy_if(habits.gaps, std::back_inserter(gaps), [](int gap) { return gap > 0; });
   }
 
+  bool has_range() const { return range.has_value(); }
+
   const FoundSource& found;
   const DraftHabits& habits;
   std::vector<int> gaps = {};
@@ -51,6 +53,7 @@ struct SourceDraft {
   bool has_frames = false;    ///< recording
   bool needs_sensor = false;  ///< recording whose files do not tell the sensor's size
   bool has_samples = false;
+  std::optional<ValueRange> range = {};  ///< of images of 16 bits that use little of them
 };
 
 std::string quoted(const std::string& text) {
@@ -214,8 +217,8 @@ void compare_neighbours(const Dataset& dataset, const fs::path& folder, SourceDr
       const FrameRef& frame = frames[places[i]].frame;
       const PairedFrame next = dataset.paired_frame(frames[places[i]], 1);
       if (next.state != PairedFrame::State::kPresent) continue;
-      const auto a = decoder.decode(frame, 1, ImageOrientation::kUpright);
-      const auto b = decoder.decode(next.frame, 1, ImageOrientation::kUpright);
+      const auto a = decoder.decode(frame, 1, ImageOrientation::kUpright, draft.range);
+      const auto b = decoder.decode(next.frame, 1, ImageOrientation::kUpright, draft.range);
       if (is_fault(a) || is_fault(b)) continue;
       const auto alike = likeness(*a, *b);
       if (!alike) continue;
@@ -450,6 +453,13 @@ class Draft {
     } else if (!first.habits.size.empty()) {
       keys.emplace_back(first.habits.size);
     }
+    if (std::ranges::all_of(sources, &SourceDraft::has_range)) {  // else it would cut others
+      ValueRange range = *first.range;
+      for (const SourceDraft& source : sources) {
+        range = {std::min(range.low, source.range->low), std::max(range.high, source.range->high)};
+      }
+      keys.push_back(fmt::format("\"range\": [{}, {}]", range.low, range.high));
+    }
     std::string text = fmt::format("  // {}\n", comment);
     if (has_presets) {
       text += fmt::format("  // The sources' own presets differ; this is that of {}.\n",
@@ -527,6 +537,13 @@ ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const Draf
       source.has_samples = counted.labelled_frames > 0 && !source.needs_sensor;
     } else {
       source.gaps = gaps_to_take(counted, source.gaps);
+      source.range = narrow_value_range(dataset->labelled_frames(), place.folder);
+      if (source.range) {
+        source.findings.push_back(
+            fmt::format("images of 16 bits use less than a quarter of their values: those from {} "
+                        "to {} are spread (\"range\")",
+                        source.range->low, source.range->high));
+      }
       source.has_samples =
           std::ranges::any_of(counted.pairs_by_gap, [](const auto& gap) { return gap.second > 0; });
       consider_stills(*dataset, place.folder, source);

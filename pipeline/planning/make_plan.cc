@@ -290,25 +290,16 @@ class SizeProbe {
   ImageSizes sizes_;  ///< of the other datasets
 };
 
-/// Images of 16 bits become 8 by their upper ones: says so where these have seen little.
+/// Images of 16 bits become 8 by their upper ones: says so where these see little.
 void note_narrow_values(const JobManifest& manifest, const SourceSpec& spec,
                         const std::vector<LabelledFrame>& frames, SourceSummary& summary) {
-  constexpr std::size_t kLookedAt = 8;
-  constexpr int kNarrow = 65536 / 4;
   if (manifest.image.range || has_events(spec.dataset)) return;
-  std::vector<std::filesystem::path> files;
-  for (std::size_t i = 0; i < std::min(kLookedAt, frames.size()); ++i) {
-    const FrameRef& frame = frames[i * frames.size() / std::min(kLookedAt, frames.size())].frame;
-    if (frame.video_frame < 0) files.push_back(resolve(manifest, frame.path));
-  }
-  const auto range = wide_value_range(files);
-  if (!range || range->high - range->low >= kNarrow) return;
+  const auto range = narrow_value_range(frames, manifest.directory);
+  if (!range) return;
   summary.notes.push_back(fmt::format(
-      "images of 16 bits use the values from {0} to {1} alone, of which their upper 8 bits keep "
-      "{2}: set \"image\": {{\"range\": [{0}, {1}]}}, in {3}",
-      range->low, range->high,
-      count_text(std::lround(range->high) / 256 - std::lround(range->low) / 256 + 1, "step"),
-      spec.root));
+      "images of 16 bits use less than a quarter of their values, and of 16 bits the upper 8 are "
+      "taken: \"image\": {{\"range\": [{}, {}]}} would spread them, in {}",
+      range->low, range->high, spec.root));
 }
 
 struct PlannedSource {

@@ -4,6 +4,7 @@ line, in no time and never in a crash."""
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import zipfile
@@ -255,8 +256,9 @@ class SixteenBits(program.InFolder):
             for number, image in enumerate(images):
                 PIL.Image.fromarray(image).save(self.folder / folder / f"{number}.png")
         errors, volume, _ = self.convert("wide")
-        self.assertRegex(errors, r"note: images of 16 bits use the values from 512\d\d to 522\d\d alone, of which their "
-                                 r'upper 8 bits keep 4 steps: set "image": {"range": \[512\d\d, 522\d\d\]}, in wide')
+        # 0.1 % of 1,536 values at either end is one value; room of a quarter is 255.
+        self.assertRegex(errors, r"note: images of 16 bits use less than a quarter of their values, .*"
+                                 r'"image": {"range": \[509\d\d, 524\d\d\]} would spread them, in wide')
         _, expected, _ = self.convert("narrow")
         self.assertGreater(expected.sum(), 3 * volume.sum())
         errors, volume, preprocessing = self.convert("wide", range=[51_200, 52_220])
@@ -264,3 +266,8 @@ class SixteenBits(program.InFolder):
         self.assertEqual(preprocessing["range"], [51_200, 52_220])
         self.assertNotIn("16 bits", errors)
         run("verify", "--deep", self.folder / "out-wide")
+        told, _ = run("init", self.folder / "wide", "--out", self.folder / "drafted.json")
+        self.assertIn("images of 16 bits use less than a quarter of their values", told)
+        written = re.search(r'"range": \[(\d+), (\d+)\]', (self.folder / "drafted.json").read_text())
+        low, high = map(int, written.groups())
+        self.assertTrue(50_900 < low < 51_000 < 52_400 < high < 52_500, (low, high))

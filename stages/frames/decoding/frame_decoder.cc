@@ -1,6 +1,7 @@
 #include "stages/frames/decoding/frame_decoder.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <stdexcept>
 #include <string>
@@ -24,11 +25,15 @@ Outcome<ImageSize> probe_image_size(const std::filesystem::path& file,
   }
 }
 
-std::optional<ValueRange> wide_value_range(const std::vector<std::filesystem::path>& files) {
+std::optional<ValueRange> narrow_value_range(const std::vector<LabelledFrame>& frames,
+                                             const std::filesystem::path& base) {
+  const std::size_t looked_at = std::min<std::size_t>(8, frames.size());
   std::vector<std::int64_t> counts(65536);
-  for (const std::filesystem::path& file : files) {
+  for (std::size_t i = 0; i < looked_at; ++i) {
+    const FrameRef& frame = frames[i * frames.size() / looked_at].frame;
+    if (frame.video_frame >= 0 || frame.path.empty()) continue;
     try {
-      if (!count_wide_values(open_image_file(file), counts)) return std::nullopt;
+      if (!count_wide_values(open_image_file(base / frame.path), counts)) return std::nullopt;
     } catch (const std::runtime_error&) {  // who converts it says why
     }
   }
@@ -36,13 +41,15 @@ std::optional<ValueRange> wide_value_range(const std::vector<std::filesystem::pa
   if (total == 0) return std::nullopt;
   const auto outside = [&](const auto& first, const auto& last) {
     std::int64_t seen = 0;
-    return static_cast<double>(
-        std::find_if(first, last,
-                     [&](std::int64_t count) { return (seen += count) > total / 1000; }) -
-        first);
+    const auto end = std::find_if(
+        first, last, [&](std::int64_t count) { return (seen += count) > total / 1000; });
+    return static_cast<double>(end - first);
   };
-  return ValueRange{outside(counts.begin(), counts.end()),
-                    65535 - outside(counts.rbegin(), counts.rend())};
+  const double low = outside(counts.begin(), counts.end());
+  const double high = 65535 - outside(counts.rbegin(), counts.rend());
+  if (high <= low || high - low >= 65536 / 4.0) return std::nullopt;
+  const double room = std::max(1.0, std::round((high - low) / 4));
+  return ValueRange{std::max(0.0, low - room), std::min(65535.0, high + room)};
 }
 
 Outcome<ImageSize> ImageSizes::of(const std::filesystem::path& file, ImageOrientation orientation) {

@@ -14,6 +14,7 @@
 #include "manifests/values/frames.h"
 #include "manifests/values/job.h"
 #include "stages/base/images/image_file.h"
+#include "stages/frames/dataset.h"
 #include "stages/frames/decoding/video_frames.h"
 
 namespace eventgan {
@@ -28,9 +29,13 @@ inline ImageOrientation orientation_of(DatasetKind dataset) {
 Outcome<ImageSize> probe_image_size(const std::filesystem::path& file,
                                     ImageOrientation orientation);
 
-/// What values the images of 16 bits among `files` have, from the 0.1 % of the lowest to the 0.1 %
-/// of the highest; none if the first that can be read has fewer bits. Thread safe.
-std::optional<ValueRange> wide_value_range(const std::vector<std::filesystem::path>& files);
+/// The range to spread (ImageSpec::range) where images of 16 bits use less than a quarter of their
+/// values, as far as eight of `frames` tell: without the lowest and the highest 0.1 % of the
+/// values, and with room of a quarter at either end for the images that were not looked at. None of
+/// videos, of images of one value alone, and if one of those looked at has fewer bits. Paths start
+/// at `base`. Thread safe.
+std::optional<ValueRange> narrow_value_range(const std::vector<LabelledFrame>& frames,
+                                             const std::filesystem::path& base);
 
 /// The sizes of images and videos: what one reader has learnt of a file, the next need not learn
 /// again. Thread safe.
