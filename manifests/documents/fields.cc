@@ -166,7 +166,9 @@ void Pairs::read(const StrictValue& value, std::array<double, 2>& member) const 
     if (!both.empty()) value.fault("an array of 2");
     return;
   }
-  member = {both[0].number(least, most), both[1].number(least, most)};
+  const auto first = both[0].sound_number(least, most), second = both[1].sound_number(least, most);
+  if (!first || !second) return;
+  member = {*first, *second};
   if (ends == Ends::kNotBelow && member[1] < member[0]) {
     both[1].fault("a number not below the previous one");
   } else if (ends == Ends::kAbove && member[1] <= member[0]) {

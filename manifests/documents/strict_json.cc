@@ -55,13 +55,13 @@ std::optional<std::int64_t> StrictValue::sound_integer(std::int64_t lowest,
   return std::nullopt;
 }
 
-double StrictValue::number(double lowest, double highest) const {
+std::optional<double> StrictValue::sound_number(double lowest, double highest) const {
   if (node_ != nullptr && node_->is_number()) {
     const auto value = node_->get<double>();
     if (value >= lowest && value <= highest) return value;
   }
   fault("a number " + shortest(lowest) + ".." + shortest(highest));
-  return lowest;
+  return std::nullopt;
 }
 
 bool StrictValue::boolean() const {

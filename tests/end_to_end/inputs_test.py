@@ -251,7 +251,8 @@ class SixteenBits(program.InFolder):
     def test_a_narrow_range_is_named_and_can_be_spread(self):
         wide = np.random.default_rng(5).integers(51_200, 52_220, (2, 24, 32), endpoint=True)
         wide[:, 0, 0], wide[:, 0, 1] = 51_200, 52_220  # both ends are there
-        for folder, images in (("wide", wide.astype(np.uint16)), ("narrow", ((wide - 51_200) / 4 + 0.5).astype(np.uint8))):
+        narrow = (wide - 51_200) / 4 + 0.5  # 255 / 1,020, and rounded
+        for folder, images in (("wide", wide.astype(np.uint16)), ("narrow", narrow.astype(np.uint8))):
             (self.folder / folder).mkdir()
             for number, image in enumerate(images):
                 PIL.Image.fromarray(image).save(self.folder / folder / f"{number}.png")

@@ -53,7 +53,10 @@ class StrictValue {
   std::optional<std::int64_t> sound_integer(std::int64_t lowest, std::int64_t highest) const;
 
   /// A number in lowest..highest, whole or not.
-  double number(double lowest, double highest) const;
+  double number(double lowest, double highest) const {
+    return sound_number(lowest, highest).value_or(lowest);
+  }
+  std::optional<double> sound_number(double lowest, double highest) const;
 
   /// true or false; false after a fault.
   bool boolean() const;

@@ -191,7 +191,8 @@ class Generator:
                 scope is a part, generated_fraction and tiles
             threshold : float, drawn for the pair, if sensor={"threshold": ...} was given
             source_to_volume : float64 [2, 3], the map of points (pixel centres are whole numbers)
-            boxes : dict with xyxy, clipped to what the volume shows of the image, and xyxy_unclipped, if boxes were given; row for row
+            boxes : dict with xyxy, clipped to what the volume shows of the image, and xyxy_unclipped, if boxes were
+                given; row for row
             joints : float64 [P, J, 2] in volume pixels, if joints were given
         """
         return self._engine.sample(_array(previous, "previous"), _array(following, "following"),
