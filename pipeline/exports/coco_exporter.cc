@@ -349,9 +349,8 @@ class CocoExporter : public Exporter {
     const ShardHeader& header = sample.reader.header();
     const JointChoice choice = choose_joints(header.label_schema);
     const auto ids = ids_of(sample);
-    const auto originals = kept_ids_ && !kept_ids_->person_categories().empty()
-                               ? original_ids(sample.source, labels.annotation)
-                               : std::nullopt;
+    const auto originals = original_ids(sample.source, labels.annotation);
+    const bool keeps_categories = kept_ids_ && !kept_ids_->person_categories().empty();
     const auto same_joints = std::ranges::find_if(
         categories, [&](const auto& known) { return known.second.joints == choice.names; });
     for (std::size_t p = 0; p < labels.labels.persons.size(); ++p) {
@@ -359,11 +358,8 @@ class CocoExporter : public Exporter {
       if (!box) continue;
       const std::int64_t own = ids ? ids->annotations[ids->persons[p]] : ++id;
       const std::int64_t category =
-          originals ? originals->categories[originals->persons[p]] : same_joints->first;
-      const auto& annotated = labels.annotation.persons[p].box;
-      const bool is_crowd = std::ranges::any_of(labels.annotation.boxes, [&](const Box& one) {
-        return one.ignore && annotated && one.xyxy == *annotated;
-      });
+          keeps_categories ? originals->categories[originals->persons[p]] : same_joints->first;
+      const bool is_crowd = originals && labels.annotation.boxes[originals->persons[p]].ignore;
       file.add(coco_person({own, ids ? ids->image : place, static_cast<int>(category)}, *box,
                            is_crowd, exported_joints(labels, p, choice), header.volume.size));
     }
