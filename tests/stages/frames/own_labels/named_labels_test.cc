@@ -116,24 +116,24 @@ TEST_F(NamedLabels, OneEdgeAt0TellsThatVocsCountFrom0) {
     const char* note;
   } cases[] = {
       {"10", "5", {}, 9, "edges count from 1 in x, as Pascal VOC's do, since none is at 0"},
-      {"10", "0", {}, 10, "edges count from 0 in x, since one is at 0 in x/b.xml"},
-      {"10", "0.5", {}, 10, "edges count from 0 in x, since one is at 0 in x/b.xml"},
+      {"10", "0", {}, 10, "edges count from 0 in x, since one is at 0 in x/2.xml"},
+      {"10", "0.5", {}, 10, "edges count from 0 in x, since one is at 0 in x/2.xml"},
       {"10", "-4", {}, 9, "edges count from 1 in x"},  // of a box that is cut off
       {"10", "0", 1, 9, nullptr},
       {"10", "5", 0, 10, nullptr},
   };
-  image("i/a.png");
-  image("i/b.png");
+  image("i/1.png");
+  image("i/2.png");
   for (const auto& one : cases) {
-    text("x/a.xml", cat(one.first, "7", "40"));
-    text("x/b.xml", cat("3", one.second, "40"));
+    text("x/1.xml", cat(one.first, "7", "40"));
+    text("x/2.xml", cat("3", one.second, "40"));
     SourceSpec spec;
     spec.root = "i";
     spec.labels = LabelSpec{LabelFormat::kVoc, "x", one.edges_from};
     const auto dataset = open_frames_dataset(spec, folder_.path());
     const double from = 10 - one.left;
-    EXPECT_EQ(read(*dataset, "a.xml").boxes.at(0).xyxy, (Rectangle{one.left, 7 - from, 40, 20}));
-    EXPECT_EQ(read(*dataset, "b.xml").boxes.at(0).xyxy,
+    EXPECT_EQ(read(*dataset, "1.xml").boxes.at(0).xyxy, (Rectangle{one.left, 7 - from, 40, 20}));
+    EXPECT_EQ(read(*dataset, "2.xml").boxes.at(0).xyxy,
               (Rectangle{3 - from, std::stod(one.second) - from, 40, 20}));
     if (one.note) {
       EXPECT_THAT(dataset->notes(), ElementsAre(HasSubstr(one.note)));
@@ -144,20 +144,20 @@ TEST_F(NamedLabels, OneEdgeAt0TellsThatVocsCountFrom0) {
 }
 
 TEST_F(NamedLabels, WhatVocHasBesideItsFormatIsANote) {
-  for (const char* name : {"a", "b", "c"}) image("i/" + std::string(name) + ".png");
+  for (const char* name : {"1", "2", "3"}) image("i/" + std::string(name) + ".png");
   const std::string mark = "<difficult>Unspecified</difficult>";
-  text("x/a.xml", cat("5", "5", "9", mark));
-  text("x/b.xml", cat("5", "5", "9", mark));
-  text("x/c.xml", cat("50", "5", "60", mark + "<truncated>0.25</truncated>"));
+  text("x/1.xml", cat("5", "5", "9", mark));
+  text("x/2.xml", cat("5", "5", "9", mark));
+  text("x/3.xml", cat("50", "5", "60", mark + "<truncated>0.25</truncated>"));
   const auto dataset = open(LabelFormat::kVoc, "i", "x");
   EXPECT_THAT(dataset->notes(),
               ElementsAre(HasSubstr("edges count from 1"),
                           "<difficult> that is no 0 or 1 taken for unknown: 3 times, first in "
-                          "x/a.xml"));
-  EXPECT_THAT(read(*dataset, "c.xml").boxes, IsEmpty());
-  EXPECT_THAT(read(*dataset, "c.xml").left_out,
+                          "x/1.xml"));
+  EXPECT_THAT(read(*dataset, "3.xml").boxes, IsEmpty());
+  EXPECT_THAT(read(*dataset, "3.xml").left_out,
               ElementsAre("expected a box within the image of 40x30, got one from (49, 4) to (60, "
-                          "20), in x/c.xml"));
+                          "20), in x/3.xml"));
 }
 
 TEST_F(NamedLabels, NamesThatNoPlanCanHaveAreLeftOut) {
