@@ -67,8 +67,8 @@ TEST_F(Convert, OpensAnImageOnceToPlanAndOnceToDecode) {
     for (int frame = 0; frame < 12; ++frame) of_images.push_back(counter.of(image(frame)).opens);
     return of_images;
   };
-  std::vector<std::uint64_t> expected(12, 2);
-  expected[0] = 1;  // no pair's next image, whose size counts
+  const std::vector<std::uint64_t> expected(12, 2);
+  // The first is no pair's next image, whose size counts; but its bits are looked at.
   {
     const InputCounter counter;
     run("plain", 1);
@@ -100,7 +100,9 @@ TEST_F(Convert, OpensAnImageOnceToPlanAndOnceToDecode) {
          R"("from": "stills", "motion": {"translation_px": [0, 2]}, "side": "before")");
   const InputCounter counter;
   EXPECT_EQ(run("stills", 1).written, 12);
-  EXPECT_EQ(opens(counter), std::vector<std::uint64_t>(12, 2));
+  std::vector<std::uint64_t> of_stills(12, 2);
+  of_stills[0] = 3;
+  EXPECT_EQ(opens(counter), of_stills);
 }
 
 TEST_F(Convert, OpensARecordingToRecogniseItAndReadsItOnce) {
