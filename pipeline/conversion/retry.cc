@@ -78,13 +78,34 @@ RetryReport new_report(const fs::path& folder, const QuarantinedSamples& found,
   return report;
 }
 
-/// The amendable fields in which the inputs differ now. Throws UsageError if other fields do.
+/// Refuses labels whose numbers mean others than they did when shards were made.
+void require_same_meanings(const fs::path& folder, const Fingerprint& accepted,
+                           const Fingerprint& now) {
+  Fingerprint were, are;
+  for (const auto& [field, value] : accepted) {
+    if (!is_addable(field)) continue;
+    were[field] = value;
+    if (const auto same = now.find(field); same != now.end()) are.insert(*same);
+  }
+  const auto differences = fingerprint_differences(were, are);
+  if (differences.empty()) return;
+  throw InputError(
+      fmt::format("expected labels whose numbers mean what they did when shards were made, got "
+                  "others, in {}: put new classes at the end and the others back, or make all "
+                  "shards again (eventgan convert --overwrite):\n  {}",
+                  folder.string(), fmt::join(differences, "\n  ")));
+}
+
+/// The fields in which the inputs differ now and may. Throws InputError if labels mean others,
+/// UsageError if other fields differ.
 Fingerprint changed_inputs(const fs::path& folder, Fingerprint accepted, const Fingerprint& now) {
   Fingerprint changed;
   for (const auto& [field, value] : now) {
-    if (!is_amendable(field) || accepted[field] == value) continue;
+    const bool may_differ = is_amendable(field) || (is_addable(field) && !accepted.contains(field));
+    if (!may_differ || accepted[field] == value) continue;
     changed[field] = accepted[field] = value;
   }
+  require_same_meanings(folder, accepted, now);
   const auto differences = fingerprint_differences(accepted, now);
   if (differences.empty()) return changed;
   std::string message = "expected the job of " + (folder / "plan.json").string() +
@@ -256,7 +277,9 @@ std::optional<RetryReport> nothing_to_retry(const fs::path& folder, const Frozen
   Fingerprint& now = job.plan.fingerprint;
   for (auto& [field, value] : now) {
     const auto known = before.find(field);
-    if (known == before.end() || is_amendable(field) || field.starts_with("manifest ")) continue;
+    const bool is_compared =
+        is_amendable(field) || is_addable(field) || field.starts_with("manifest ");
+    if (known == before.end() || is_compared) continue;
     value = known->second;  // weights, processor, libraries: for `convert` to compare
   }
   accept_inputs(folder, frozen.hash, before, now, manifest, {}, report);
