@@ -355,13 +355,27 @@ class RetryOfClasses(program.InFolder):
         self.assertIn("nothing to retry", out)
         self.assertNotIn("classes were added", out)
 
+    def test_boxes_that_mended_labels_lose_are_counted(self):
+        self.table(of_5="bike")
+        self.spoil_row()
+        self.convert({"format": "csv", "path": "boxes.csv"})
+        self.table(of_5="bike")
+        with (self.folder / "boxes.csv").open("a") as rows:
+            rows.write("000005.png,car,90,90,99,99\n000002.png,car,90,90,99,99\n")  # that one is stored as it was
+        out, _ = run("retry", self.out)
+        self.assertIn("note: 1 box of labels left out: expected a box ", out)
+        self.assertIn("boxes.csv#000005.png", out)
+        self.check(["car", "bike"], {5: "bike"})
+
     def test_so_it_does_in_shards_that_are_made_later(self):
         self.table()
         self.convert({"format": "csv", "path": "boxes.csv"})
         for path in self.out.glob("*-00001-of-*"):
             path.unlink()
         self.table(of_4="ant", of_5="bike")
-        run("retry", self.out)  # nothing is quarantined; the labels are others
+        out, _ = run("retry", self.out)  # nothing is quarantined; the labels are others
+        self.assertIn("classes were added", out)
+        self.assertNotIn("nothing to retry", out)
         run("convert", self.folder / "manifest.json", "--output", self.out, "--progress", "none")
         self.check(["car", "ant", "bike"], {4: "ant", 5: "bike"})
 
