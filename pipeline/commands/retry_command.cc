@@ -74,7 +74,8 @@ void add_retry_command(CLI::App& app, int& exit_code) {
   auto* command =
       app.add_subcommand("retry",
                          "Make quarantined samples again\nFor use after their inputs have been "
-                         "fixed. All other bytes of the shards stay the same.");
+                         "fixed. Good samples stay as they are; classes that labels have "
+                         "gained are named in all shards of their source.");
   const auto arguments = std::make_shared<RetryArguments>();
   add_folder_argument(*command, arguments->folder);
   command

@@ -19,6 +19,7 @@
 #include "manifests/values/job.h"
 #include "manifests/values/text.h"
 #include "pipeline/conversion/shard_rewrite.h"
+#include "pipeline/conversion/shard_sink.h"
 #include "pipeline/folder/amendments.h"
 #include "pipeline/folder/shard_backup.h"
 #include "pipeline/folder/shard_scan.h"
@@ -78,13 +79,34 @@ RetryReport new_report(const fs::path& folder, const QuarantinedSamples& found,
   return report;
 }
 
-/// The amendable fields in which the inputs differ now. Throws UsageError if other fields do.
+/// Refuses labels whose numbers mean others than they did when shards were made.
+void require_same_meanings(const fs::path& folder, const Fingerprint& accepted,
+                           const Fingerprint& now) {
+  Fingerprint were, are;
+  for (const auto& [field, value] : accepted) {
+    if (!is_addable(field)) continue;
+    were[field] = value;
+    if (const auto same = now.find(field); same != now.end()) are.insert(*same);
+  }
+  const auto differences = fingerprint_differences(were, are);
+  if (differences.empty()) return;
+  throw InputError(
+      fmt::format("expected labels whose numbers mean what they did when shards were made, got "
+                  "others, in {}: put new classes at the end and the others back, or make all "
+                  "shards again (eventgan convert --overwrite):\n  {}",
+                  folder.string(), fmt::join(differences, "\n  ")));
+}
+
+/// The fields in which the inputs differ now and may. Throws InputError if labels mean others,
+/// UsageError if other fields differ.
 Fingerprint changed_inputs(const fs::path& folder, Fingerprint accepted, const Fingerprint& now) {
   Fingerprint changed;
   for (const auto& [field, value] : now) {
-    if (!is_amendable(field) || accepted[field] == value) continue;
+    const bool may_differ = is_amendable(field) || (is_addable(field) && !accepted.contains(field));
+    if (!may_differ || accepted[field] == value) continue;
     changed[field] = accepted[field] = value;
   }
+  require_same_meanings(folder, accepted, now);
   const auto differences = fingerprint_differences(accepted, now);
   if (differences.empty()) return changed;
   std::string message = "expected the job of " + (folder / "plan.json").string() +
@@ -117,6 +139,13 @@ PlannedJob plan_again(const JobManifest& manifest, const std::string& weights_ha
                     .limit = limit_of(frozen)});
 }
 
+/// Each once: a shard may be looked at more than once.
+void report_damage(const std::vector<std::string>& faults, RetryReport& report) {
+  std::ranges::copy_if(faults, std::back_inserter(report.damaged_shards), [&](const auto& fault) {
+    return std::ranges::find(report.damaged_shards, fault) == report.damaged_shards.end();
+  });
+}
+
 /// The shards with quarantined samples that prove whole; the others are reported. After a request
 /// to stop there may be fewer.
 std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenPlan& frozen,
@@ -128,7 +157,7 @@ std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenP
       check_earlier_shards(folder, frozen, shards,
                            {thread_count(options.threads), [&] { return options.stop_requested(); },
                             options.trace, options.show_phase});
-  for (const std::string& fault : earlier.faults) report.damaged_shards.push_back(fault);
+  report_damage(earlier.faults, report);
   if (!options.stop_requested()) {
     report.quarantined = 0;  // what a damaged shard held does not count
     for (const CommittedShard& shard : earlier.done) {
@@ -157,8 +186,8 @@ std::vector<bool> number_as_stored(const fs::path& folder, const FrozenOutline& 
 }
 
 /// Names a source's new classes in all its committed shards, the first of them last: where that has
-/// been done (stored_classes), it has been for all.
-void add_classes(const fs::path& folder, const FrozenPlan& frozen,
+/// been done (stored_classes), it has been for all. False after a request to stop before that.
+bool add_classes(const fs::path& folder, const FrozenPlan& frozen,
                  const std::vector<std::unique_ptr<Dataset>>& datasets,
                  const std::vector<bool>& have_new, const RunOptions& options,
                  RetryReport& report) {
@@ -166,18 +195,20 @@ void add_classes(const fs::path& folder, const FrozenPlan& frozen,
   for (auto shard = frozen.plan.shards.rbegin(); shard != frozen.plan.shards.rend(); ++shard) {
     if (have_new[static_cast<std::size_t>(shard->source)]) shards.push_back(&*shard);
   }
-  if (shards.empty()) return;
+  if (shards.empty()) return true;
   const EarlierShards earlier =
       check_earlier_shards(folder, frozen, shards,
                            {thread_count(options.threads), [&] { return options.stop_requested(); },
                             options.trace, options.show_phase});
+  report_damage(earlier.faults, report);
   for (const CommittedShard& committed : earlier.done) {
-    if (options.stop_requested()) return;
+    if (options.stop_requested()) return false;
     const auto source = static_cast<std::size_t>(committed.shard->source);
     ShardRewrite rewrite(folder, committed.record, std::nullopt,
                          datasets[source]->label_schema().class_names);
     report.shards_renamed += rewrite.commit();
   }
+  return true;
 }
 
 /// Puts redone samples into their committed shards; for each shard once it is through, `report`
@@ -202,7 +233,10 @@ class RetrySink final : public SampleSink {
   void add(const SampleMessage& message) override {
     const int slot = record_->quarantined.at(static_cast<std::size_t>(message.slot)).slot;
     rewrite_->redo(slot, message);
-    if (!message.failed()) return;
+    if (!message.failed()) {
+      left_out_.add(message.sample.annotation.left_out);
+      return;
+    }
     failed_.push_back({record_->shard, slot, message.sample.sample_id, message.sample.fault});
   }
 
@@ -218,6 +252,7 @@ class RetrySink final : public SampleSink {
     report_.quarantined -= mended;
     report_.failed.insert(report_.failed.end(), failed_.begin(), failed_.end());
     failed_.clear();
+    report_.notes = left_out_.notes();
     return true;
   }
 
@@ -236,6 +271,7 @@ class RetrySink final : public SampleSink {
   const CommitRecord* record_ = nullptr;                   // of the shard under way
   std::unique_ptr<ShardRewrite> rewrite_;                  // of the shard under way
   std::vector<QuarantinedSlot> failed_;                    // of the shard under way
+  BoxesLeftOut left_out_;
   RetryReport& report_;
   TraceRecorder* trace_;
 };
@@ -256,7 +292,9 @@ std::optional<RetryReport> nothing_to_retry(const fs::path& folder, const Frozen
   Fingerprint& now = job.plan.fingerprint;
   for (auto& [field, value] : now) {
     const auto known = before.find(field);
-    if (known == before.end() || is_amendable(field) || field.starts_with("manifest ")) continue;
+    const bool is_compared =
+        is_amendable(field) || is_addable(field) || field.starts_with("manifest ");
+    if (known == before.end() || is_compared) continue;
     value = known->second;  // weights, processor, libraries: for `convert` to compare
   }
   accept_inputs(folder, frozen.hash, before, now, manifest, {}, report);
@@ -287,7 +325,7 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
   job.plan = {};  // the frozen one counts, and it can be huge
   complete_plan(manifest, job.datasets, frozen.plan);
   const bool finalized = fs::exists(folder / "dataset.json");
-  add_classes(folder, frozen, job.datasets, have_new, options, report);
+  const bool all_named = add_classes(folder, frozen, job.datasets, have_new, options, report);
 
   const std::vector<CommittedShard> shards = trusted_shards(folder, frozen, found, options, report);
   std::vector<PlannedShard> retried = plan_retry(shards);
@@ -303,7 +341,7 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
   run_conversion("redo samples",
                  {manifest, job.datasets, generator, weights_hash, folder, frozen, options},
                  to_redo, sink);
-  report.stopped = options.stop_requested() && report.tried < to_do;
+  report.stopped = !all_named || (options.stop_requested() && report.tried < to_do);
   report.dataset_outdated = finalized && !fs::exists(folder / "dataset.json");
   report.too_many_faults = beyond_limits(manifest.errors, report.quarantined, report.planned);
   report.wall_seconds =
@@ -335,7 +373,8 @@ std::string to_text(const RetryReport& report) {
     text += "classes were added: named in " + count_text(report.shards_renamed, "shard") + "\n";
   }
   if (report.tried == 0 && report.quarantined == 0) {
-    text += "nothing to retry: no sample of a committed shard is quarantined\n";
+    const bool is_all = report.shards_renamed == 0 && !report.stopped;
+    if (is_all) text += "nothing to retry: no sample of a committed shard is quarantined\n";
   } else {
     text += fmt::format("{} of {} fixed, {} rewritten; still quarantined: {} of {}\n",
                         report.mended, count_text(report.tried, "quarantined sample"),
@@ -355,8 +394,8 @@ std::string to_text(const RetryReport& report) {
         "dataset.json and dataset.h5 told of the shards as they were and are removed: run eventgan "
         "finalize again\n";
   }
-  if (report.stopped) text += "stopped before all were tried: run again\n";
-  return text + report.folder + "\n";
+  if (report.stopped) text += "stopped before all were done: run again\n";
+  return text + notes_text(report.notes) + report.folder + "\n";
 }
 
 std::string to_json(const RetryReport& report) {
@@ -379,6 +418,7 @@ std::string to_json(const RetryReport& report) {
                                {"damaged_shards", report.damaged_shards},
                                {"shards_missing", report.shards_missing},
                                {"changed_inputs", report.changed_inputs},
+                               {"notes", report.notes},
                                {"stopped", report.stopped},
                                {"too_many_faults", report.too_many_faults},
                                {"dataset_outdated", report.dataset_outdated},

@@ -48,9 +48,10 @@ struct RetryReport {
   /// Fields of the fingerprint in which the inputs have changed since the plan was frozen, or since
   /// the last retry: recorded, so that `convert` goes on.
   std::vector<std::string> changed_inputs;
-  bool stopped = false;           ///< a request to stop came before all were tried
-  bool too_many_faults = false;   ///< the manifest's limits are passed still
-  bool dataset_outdated = false;  ///< dataset.json and dataset.h5 were removed (outdate_dataset)
+  std::vector<std::string> notes;  ///< boxes that the labels of mended samples lost
+  bool stopped = false;            ///< a request to stop came before all were tried, or renamed
+  bool too_many_faults = false;    ///< the manifest's limits are passed still
+  bool dataset_outdated = false;   ///< dataset.json and dataset.h5 were removed (outdate_dataset)
   double wall_seconds = 0;
 };
 
@@ -71,9 +72,9 @@ std::optional<RetryReport> nothing_to_retry(const std::filesystem::path& folder,
                                             const JobManifest& manifest, const RunOptions& options);
 
 /// Redoes the quarantined samples of an output folder's committed shards, after its inputs were
-/// mended; every other byte of the shards stays, and plan.json does. Classes keep their numbers;
+/// mended; the other samples stay as they are, and plan.json does. Classes keep their numbers;
 /// where a source's labels have gained some, all its committed shards get their names first, behind
-/// those they have (number_classes). A shard is written again only
+/// those they have (number_classes). Else a shard is written again only
 /// if a sample of it is mended now or fails for another reason. Shards that are damaged, or not
 /// made yet, are left to `convert`. A shard whose size was unknown at planning gets that of its
 /// mended images with its first good sample (see complete_plan).
@@ -81,7 +82,8 @@ std::optional<RetryReport> nothing_to_retry(const std::filesystem::path& folder,
 /// The job must be the frozen one in all but its inputs: where the fingerprint differs in fields
 /// that may change, that is recorded first (amendments.json), so that later runs accept the folder.
 /// One retry at a time: it holds the lock of plan.json (FileLock). Throws UsageError listing the
-/// other fields that differ, InputError, Stopped on a request to stop while it plans, or
+/// other fields that differ, InputError where the labels' numbers mean others
+/// (Dataset::label_meanings), Stopped on a request to stop while it plans, or
 /// std::runtime_error when another retry is at work, another process has put a shard in place
 /// meanwhile, or the disk or the generator fails; whole shards stay.
 RetryReport retry(const std::filesystem::path& folder, const JobManifest& manifest,

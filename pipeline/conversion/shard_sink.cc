@@ -90,6 +90,21 @@ void add_write_seconds(std::int64_t start_ns, CommitRecord& record) {
 
 }  // namespace
 
+void BoxesLeftOut::add(const std::vector<std::string>& reasons) {
+  constexpr std::size_t kListed = 3;
+  for (const std::string& reason : reasons) {
+    ++count_;
+    if (listed_.size() < kListed) listed_.push_back(reason);
+  }
+}
+
+std::vector<std::string> BoxesLeftOut::notes() const {
+  if (count_ == 0) return {};
+  const char* const more = count_ > std::ssize(listed_) ? "; ..." : "";
+  return {count_text(count_, "box", " of labels left out: ") +
+          joined(listed_, "; ", std::identity()) + more};
+}
+
 ShardSink::ShardSink(const ConversionJob& job, SharedFolder& shared,
                      std::int64_t quarantined_before)
     : job_(job),
@@ -125,11 +140,7 @@ void ShardSink::add(const SampleMessage& message) {
   } else {
     ++record_.valid;
   }
-  for (const std::string& reason : message.sample.annotation.left_out) {
-    constexpr std::size_t kListed = 3;
-    ++boxes_left_out_;
-    if (left_out_.size() < kListed) left_out_.push_back(reason);
-  }
+  left_out_.add(message.sample.annotation.left_out);
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     record_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }
@@ -172,13 +183,6 @@ bool ShardSink::commit() {
   quarantined_ += std::ssize(record_.quarantined);
   committed_.push_back({shard_, std::move(record_)});
   return true;
-}
-
-std::vector<std::string> ShardSink::notes() const {
-  if (boxes_left_out_ == 0) return {};
-  const char* const more = boxes_left_out_ > std::ssize(left_out_) ? "; ..." : "";
-  return {count_text(boxes_left_out_, "box", " of labels left out: ") +
-          joined(left_out_, "; ", std::identity()) + more};
 }
 
 void ShardSink::abandon() {

@@ -14,6 +14,18 @@
 
 namespace eventgan {
 
+/// Counts the boxes that labels lost (Annotation::left_out), for people.
+class BoxesLeftOut {
+ public:
+  void add(const std::vector<std::string>& reasons);
+  /// One that tells how many, and of the first of them why; none of none.
+  std::vector<std::string> notes() const;
+
+ private:
+  std::int64_t count_ = 0;
+  std::vector<std::string> listed_;
+};
+
 /// Writes the shards of `convert` and commits each with its commit record. Enforces the manifest's
 /// error policy: with "fail" the first fault throws TooManyFaults; with "quarantine" the shard in
 /// which the limits are passed is still committed, then the sink is closed.
@@ -33,7 +45,7 @@ class ShardSink final : public SampleSink {
 
   const std::vector<CommittedShard>& committed() const { return committed_; }
   /// What a person should know of the labels of all samples that were added: boxes left out.
-  std::vector<std::string> notes() const;
+  std::vector<std::string> notes() const { return left_out_.notes(); }
 
  private:
   const ConversionJob& job_;
@@ -44,8 +56,7 @@ class ShardSink final : public SampleSink {
   const PlannedShard* shard_ = nullptr;  // under way, or the last one
   std::unique_ptr<ShardWriter> writer_;  // of the shard under way
   CommitRecord record_;                  // of the shard under way
-  std::int64_t boxes_left_out_ = 0;
-  std::vector<std::string> left_out_;  // of the first of them, why
+  BoxesLeftOut left_out_;
 };
 
 }  // namespace eventgan

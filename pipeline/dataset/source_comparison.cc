@@ -98,11 +98,7 @@ SourceComparison::SourceComparison(JobManifest manifest,
       notes_.push_back("labels of source " + source.root + " not compared: " + error_line(error));
     }
   }
-  try {
-    number_classes(manifest_.sources, datasets_, stored);
-  } catch (const InputError& error) {
-    numbers_fault_ = error.what();
-  }
+  number_classes(manifest_.sources, datasets_, stored);
 }
 
 void SourceComparison::renew_samples(Plan& plan) const {
@@ -113,7 +109,6 @@ std::vector<std::string> SourceComparison::faults(const PlannedShard& planned,
                                                   const ShardReader& reader) {
   const auto& dataset = datasets_.at(static_cast<std::size_t>(planned.source));
   if (!dataset) return {};
-  if (!numbers_fault_.empty()) return {numbers_fault_};
   std::vector<std::string> faults =
       schema_faults(reader.header().label_schema, dataset->label_schema());
   if (!faults.empty()) return faults;  // numbers of other names are others

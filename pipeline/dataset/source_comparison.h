@@ -51,8 +51,7 @@ class SourceComparison {
   JobManifest manifest_;
   std::vector<std::unique_ptr<Dataset>> datasets_;  // null where the source is not there
   std::vector<std::string> notes_;
-  std::string numbers_fault_;  ///< why stored numbers of classes mean others; empty: they do not
-  ImageSizes sizes_;           ///< of the datasets that keep none; a video serves many samples
+  ImageSizes sizes_;  ///< of the datasets that keep none; a video serves many samples
   long long compared_ = 0;
 };
 

@@ -13,6 +13,7 @@
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/pair_key.h"
 #include "pipeline/dataset/dataset_description.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
@@ -101,6 +102,7 @@ void ExportInput::read_description(const std::vector<std::string>& splits) {
     ExportSource& known = sources_.emplace_back();
     known.dataset = to_string(spec.dataset);
     known.split = spec.split;
+    known.key = source_key(manifest.sources, sources_.size() - 1);
     known.has_coco_labels = spec.labels && spec.labels->format == LabelFormat::kCoco;
     const auto& source = json.at("sources").at(sources_.size() - 1);
     if (source.at("dataset") != known.dataset || source.at("split") != known.split) {

@@ -20,6 +20,7 @@ struct ExportSource {
   /// What the names of its samples' files begin with: nothing, unless its split has other sources:
   /// then DATASET and '+', from the second of one kind on DATASET-2 and '+'.
   std::string name_prefix;
+  std::string key;  ///< of its draws: source_key
   std::vector<std::string> class_names,
       joint_names;               ///< empty as long as none of its shards is done
   std::string any_shard;         ///< file name of one that is done; empty if none is

@@ -14,9 +14,9 @@
 #include <utility>
 
 #include "manifests/documents/detail/json_text.h"
-#include "manifests/values/counter_random.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
+#include "manifests/values/pair_key.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/files/sha256.h"
 #include "stages/exports/sampled_events.h"
@@ -149,10 +149,10 @@ double known_gap_s(const FramePair& pair) {
 
 std::vector<Event> drawn_events(const OutgoingSample& sample, const ExportOptions& options,
                                 double duration_s) {
-  const CounterRandom random =
-      CounterRandom(options.seed).keyed(sample.source.dataset).keyed(sample.labels.sample_id);
+  const PairKey key{options.seed, sample.source.dataset, sample.labels.sample_id,
+                    sample.source.key};
   return sample_events(sample.reader.volume(sample.slot), sample.reader.header().volume, duration_s,
-                       options.counts, random);
+                       options.counts, key.pair());
 }
 
 RecordingsExporter::RecordingsExporter(const ExportInput& input, const ExportOptions& options,

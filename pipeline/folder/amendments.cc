@@ -29,7 +29,9 @@ Amendment read_amendment(const StrictValue& value) {
   StrictObject object = value.object();
   for (const auto& [field, text] : object.at("fields").members()) {
     // Anything else would let another job's output pass as this one's.
-    if (!is_amendable(field)) text.fault("fields that may change: annotations, frames", field);
+    if (!is_amendable(field) && !is_addable(field)) {
+      text.fault("fields that may change: annotations, frames, labels", field);
+    }
     amendment.fields[field] = text.text();
   }
   for (const StrictValue& sample : object.at("samples").elements()) {
@@ -62,6 +64,10 @@ bool is_amendable(const std::string& fingerprint_field) {
   return fingerprint_field == "frames" || fingerprint_field == "annotations";
 }
 
+bool is_addable(const std::string& fingerprint_field) {
+  return fingerprint_field.starts_with("labels ");
+}
+
 std::vector<Amendment> read_amendments(const fs::path& folder, const std::string& plan_hash) {
   const fs::path file = folder / kName;
   if (!fs::exists(file)) return {};
@@ -74,7 +80,8 @@ std::vector<Amendment> read_amendments(const fs::path& folder, const std::string
 void record_amendment(const fs::path& folder, const std::string& plan_hash,
                       const Amendment& amendment) {
   for (const auto& [field, value] : amendment.fields) {
-    if (!is_amendable(field)) throw std::invalid_argument("this field may not change: " + field);
+    if (is_amendable(field) || is_addable(field)) continue;
+    throw std::invalid_argument("this field may not change: " + field);
   }
   // Of two that read amendments in order to add one, the one that wrote last would drop the
   // other's.

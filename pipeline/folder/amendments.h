@@ -17,6 +17,9 @@ struct Amendment {
 /// The fingerprint's fields that may change between freezing and a retry: those of inputs.
 bool is_amendable(const std::string& fingerprint_field);
 
+/// Those that may be added between freezing and a retry, and then stay: what labels mean.
+bool is_addable(const std::string& fingerprint_field);
+
 /// FOLDER/amendments.json, oldest first; none if there is no such file or it belongs to another
 /// plan. Throws std::runtime_error if it is damaged.
 std::vector<Amendment> read_amendments(const std::filesystem::path& folder,

@@ -240,6 +240,9 @@ std::string way_out(const Fingerprint& frozen, Fingerprint now) {
   for (const auto& [field, value] : frozen) {
     if (is_amendable(field)) now[field] = value;
   }
+  std::erase_if(now, [&](const auto& field) {
+    return is_addable(field.first) && !frozen.contains(field.first);
+  });
   return frozen == now ? " (if inputs were fixed, `eventgan retry` accepts them and keeps finished "
                          "shards; --overwrite starts again):"
                        : " (--overwrite starts again):";

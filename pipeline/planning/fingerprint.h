@@ -13,7 +13,8 @@ namespace eventgan {
 
 /// Everything that changes a shard's bytes, field by field: each setting of the manifest (see
 /// manifest_fields), annotations, frames, weights, engine, preprocessing, cpu, libraries, program,
-/// the time axis of cropped events, and the tiles that persons get. Annotation files are hashed by
+/// the time axis of cropped events, and the tiles that persons get. make_plan adds what the labels'
+/// numbers mean ("labels 0 class 2", Dataset::label_meanings). Annotation files are hashed by
 /// content; frames by path and size only, since their content would mean reading everything twice,
 /// and by what the plan takes from the inputs: samples, times, sizes, faults, counts. Libraries are
 /// those that are loaded (FFmpeg where frames come from videos), not those compiled against.

@@ -470,6 +470,7 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
   SizeProbe probe(manifest);
   ShardLayout layout(manifest.name, manifest.output.samples_per_shard);
   std::vector<std::string> annotation_files;
+  std::map<std::string, std::string> meanings;  // of the labels, as fields of the fingerprint
   open_datasets(manifest, options, job.datasets);
   for (std::size_t i = 0; i < manifest.sources.size(); ++i) {
     TraceSpan span(options.trace, "plan source", "job");
@@ -483,6 +484,9 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
     job.plan.sources.push_back(std::move(planned.summary));
     job.unpaired_by_gap.push_back(std::move(planned.unpaired_by_gap));
     std::ranges::move(dataset.warnings(), std::back_inserter(job.warnings));
+    for (auto& [what, meaning] : dataset.label_meanings()) {
+      meanings["labels " + std::to_string(i) + " " + what] = meaning;
+    }
     const auto files = dataset.annotation_files();
     annotation_files.insert(annotation_files.end(), files.begin(), files.end());
     if (const auto& ids = manifest.sources[i].selection.ids) annotation_files.push_back(*ids);
@@ -499,6 +503,7 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
         stop_if_asked();
         phase.advance();
       });
+  job.plan.fingerprint.merge(meanings);
   if (options.limit) job.plan.fingerprint[kLimitField] = std::to_string(*options.limit);
   return job;
 }

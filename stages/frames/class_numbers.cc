@@ -1,14 +1,10 @@
 #include "stages/frames/class_numbers.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <map>
 #include <set>
 #include <utility>
-
-#include "manifests/values/faults.h"
 
 namespace eventgan {
 namespace {
@@ -54,6 +50,9 @@ class RenumberedDataset final : public Dataset {
   std::vector<std::string> annotation_files() const override {
     return dataset_->annotation_files();
   }
+  std::map<std::string, std::string> label_meanings() const override {
+    return dataset_->label_meanings();
+  }
   std::vector<std::string> notes() const override { return dataset_->notes(); }
   std::vector<std::string> warnings() const override { return dataset_->warnings(); }
 
@@ -80,30 +79,12 @@ bool begins_with(const ClassNames& names, const ClassNames& first) {
   return names.size() >= first.size() && std::equal(first.begin(), first.end(), names.begin());
 }
 
-/// Refuses numbers that mean other names: a stored name that is none any more, or a new one before
-/// one that is stored.
-void require_same_numbers(const SourceSpec& source, const ClassNames& today,
-                          const ClassNames& stored, const std::set<std::string>& all_today) {
-  const auto is_stored = [&](const std::string& name) {
-    return std::ranges::find(stored, name) != stored.end();
-  };
-  const auto first_new = std::ranges::find_if_not(today, is_stored);
-  const bool are_same = std::ranges::all_of(
-      stored, [&](const std::string& name) { return all_today.contains(name); });
-  if (are_same && std::none_of(first_new, today.end(), is_stored)) return;
-  throw InputError(fmt::format(
-      "expected new classes behind those of the shards, {}, since labels name classes by number, "
-      "got {}, in {}: put them at the end, or make all shards again (eventgan convert --overwrite)",
-      fmt::join(stored, ", "), fmt::join(today, ", "), source.labels->path));
-}
-
 }  // namespace
 
 void number_classes(const std::vector<SourceSpec>& sources,
                     std::vector<std::unique_ptr<Dataset>>& datasets,
                     const std::vector<std::optional<ClassNames>>& stored) {
   std::map<DatasetKind, ClassNames> of_kind;
-  std::set<std::string> all_today;
   for (std::size_t i = 0; i < stored.size(); ++i) {
     if (stored[i]) add_names(*stored[i], of_kind[sources[i].dataset]);
   }
@@ -112,9 +93,7 @@ void number_classes(const std::vector<SourceSpec>& sources,
       datasets[i] = earlier->take();
     }
     if (!datasets[i]) continue;
-    const ClassNames& today = datasets[i]->label_schema().class_names;
-    add_names(today, of_kind[sources[i].dataset]);
-    all_today.insert(today.begin(), today.end());
+    add_names(datasets[i]->label_schema().class_names, of_kind[sources[i].dataset]);
   }
   for (std::size_t i = 0; i < datasets.size(); ++i) {
     if (!datasets[i]) continue;
@@ -124,10 +103,6 @@ void number_classes(const std::vector<SourceSpec>& sources,
       if (!begins_with(names, *stored[i])) {  // each source had its own list
         names = *stored[i];
         add_names(of_kind[sources[i].dataset], names);
-      }
-      const auto& labels = sources[i].labels;
-      if (labels && labels->format == LabelFormat::kYolo) {
-        require_same_numbers(sources[i], today, *stored[i], all_today);
       }
     } else if (today.empty()) {
       continue;

@@ -20,8 +20,8 @@ using ClassNames = std::vector<std::string>;
 /// What is stored keeps its numbers: stored names come first, and stay although no label has them
 /// any more; new ones follow. A second call replaces what the first has given.
 ///
-/// `sources` and `datasets` are one each, a null one is passed over. Throws InputError where labels
-/// name classes by number (YOLO's) and the numbers mean others than they did when shards were made.
+/// `sources` and `datasets` are one each, a null one is passed over. That the labels' own numbers
+/// mean what they did when shards were made is looked at elsewhere (Dataset::label_meanings).
 void number_classes(const std::vector<SourceSpec>& sources,
                     std::vector<std::unique_ptr<Dataset>>& datasets,
                     const std::vector<std::optional<ClassNames>>& stored = {});

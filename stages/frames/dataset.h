@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -94,6 +95,11 @@ class Dataset {
   /// Every file the annotations come from, those with one frame each as well, written as
   /// FrameRef::path is, sorted; part of the plan's fingerprint.
   virtual std::vector<std::string> annotation_files() const = 0;
+
+  /// What the labels' numbers mean, where files tell that may change: "class 2" is "person",
+  /// "edges_from" is "0". What is stored was read so: the plan's fingerprint has each, and an
+  /// input that was mended may add some, but change none.
+  virtual std::map<std::string, std::string> label_meanings() const { return {}; }
 
   /// What the user should know about the source and no sample tells ("3 images without labels in
   /// kitti/training/image_2"); one line each.

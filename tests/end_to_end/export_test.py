@@ -245,6 +245,22 @@ class Formats(Export):
                                            atol=PIXELS)
                 self.assertEqual(one["num_keypoints"], there.sum())
 
+    def test_sources_with_the_same_ids_draw_events_of_their_own(self):
+        folder = demo.folder / "twice"
+        for root in ("a", "b", "c"):
+            for number in range(3):
+                small_job.save_image(folder / root / f"{number:03}.png", np.random.default_rng(number))
+        sources = [{"dataset": "frames", "root": root, "split": split, "pairs": program.pairs([1])}
+                   for root, split in (("a", "train"), ("b", "train"), ("c", "val"))]
+        manifest = folder / "twice.json"
+        manifest.write_text(json.dumps(program.manifest(sources, generator={"kind": "difference"},
+                                                        output={"directory": "out"})))
+        run("convert", manifest, "--progress", "none")
+        run("finalize", folder / "out")
+        self.export("events", source=folder / "out")
+        drawn = {path.relative_to(self.out).as_posix(): path.read_bytes() for path in self.out.glob("events/*/*.txt")}
+        self.assertEqual((len(drawn), len(set(drawn.values()))), (6, 6), sorted(drawn))
+
     def test_coco_categories_of_persons_are_the_same_in_all_splits(self):
         sources = [{"dataset": "mpii", "root": "mpii", "pairs": program.pairs([2], side="around"), "split": "val"},
                    {"dataset": "human36m", "root": "h36m", "layout": "fetch",

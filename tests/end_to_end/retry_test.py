@@ -237,7 +237,7 @@ class ChangedInputs(program.InFolder):
             json.dumps(program.manifest([{"dataset": "frames", "root": "clips", "pairs": program.pairs([1])}])))
         out = self.folder / "out"
         subprocess.run([program.PROGRAM, "convert", manifest, "--output", out], check=True, capture_output=True)
-        self.assertIn("1 file left out in clips/a: caf\ufffd.txt", run("status", out)[0])
+        self.assertIn("1 file left out in clips/a: caf\\xe9.txt", run("status", out)[0])
         foreign.unlink()
         save_image(self.folder / "clips" / "b" / "000.png", random)
         _, err = run("convert", manifest, "--output", out, expect=64)
@@ -355,35 +355,134 @@ class RetryOfClasses(program.InFolder):
         self.assertIn("nothing to retry", out)
         self.assertNotIn("classes were added", out)
 
+    def test_boxes_that_mended_labels_lose_are_counted(self):
+        self.table(of_5="bike")
+        self.spoil_row()
+        self.convert({"format": "csv", "path": "boxes.csv"})
+        self.table(of_5="bike")
+        with (self.folder / "boxes.csv").open("a") as rows:
+            rows.write("000005.png,car,90,90,99,99\n")
+        out, _ = run("retry", self.out)
+        self.assertIn("note: 1 box of labels left out: expected a box ", out)
+        self.assertIn("boxes.csv#000005.png", out)
+        self.check(["car", "bike"], {5: "bike"})
+
     def test_so_it_does_in_shards_that_are_made_later(self):
         self.table()
         self.convert({"format": "csv", "path": "boxes.csv"})
         for path in self.out.glob("*-00001-of-*"):
             path.unlink()
         self.table(of_4="ant", of_5="bike")
-        run("retry", self.out)  # nothing is quarantined; the labels are others
+        out, _ = run("retry", self.out)  # nothing is quarantined; the labels are others
+        self.assertIn("classes were added", out)
+        self.assertNotIn("nothing to retry", out)
         run("convert", self.folder / "manifest.json", "--output", self.out, "--progress", "none")
         self.check(["car", "ant", "bike"], {4: "ant", 5: "bike"})
 
-    def write_texts(self, names):
+    def is_refused(self, *differences):
+        """Of numbers that mean others, by `convert` as by `retry`, which touches nothing."""
+        before = content(self.out)
+        _, told = run("retry", self.out, expect=66)
+        self.assertIn("expected labels whose numbers mean what they did when shards were made, got others, in ", told)
+        for difference in differences:
+            self.assertIn(difference, told)
+        run("convert", self.folder / "manifest.json", "--output", self.out, expect=64)
+        self.assertEqual(content(self.out), before)
+
+    def write_texts(self, names, folder=".", of_5=2):
         for number in range(1, 8):
-            path = self.folder / f"labels/{number:06}.txt"
-            path.parent.mkdir(exist_ok=True)
-            path.write_text(f"{2 * (number == 5)} 0.5 0.5 0.5 0.5\n")
-        (self.folder / "data.yaml").write_text(f"names: [{', '.join(names)}]\n")
+            path = self.folder / folder / f"labels/{number:06}.txt"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(f"{of_5 * (number == 5)} 0.5 0.5 0.5 0.5\n")
+        (self.folder / folder / "data.yaml").write_text(f"names: [{', '.join(names)}]\n")
 
     def test_a_name_that_data_yaml_lacked_is_added(self):
         self.write_texts(["car", "person"])
         self.convert({"format": "yolo", "path": "."})
         self.write_texts(["car", "bike", "person"])  # what was 1 is 2 now
-        before = content(self.out)
-        _, told = run("retry", self.out, expect=66)
-        self.assertIn("expected new classes behind those of the shards, car, person, since labels name classes by "
-                      "number, got car, bike, person", told)
-        self.assertEqual(content(self.out), before)
+        self.is_refused("labels 0 class 1: expected person, got bike")
+        self.write_texts(["person", "car"])
+        self.is_refused("labels 0 class 0: expected car, got person", "labels 0 class 1: expected person, got car")
+        self.write_texts(["car"])
+        self.is_refused("labels 0 class 1: expected person, got nothing")
+        (self.folder / "data.yaml").unlink()
+        self.is_refused("labels 0 class 0: expected car, got 0")
         self.write_texts(["car", "person", "bike"])
         run("retry", self.out)
         self.check(["car", "person", "bike"], {5: "bike"})
+        self.write_texts(["car", "person", "ant"])
+        self.is_refused("labels 0 class 2: expected bike, got ant")
+
+    def test_a_name_that_another_source_has_still_is_none_of_this_one(self):
+        shutil.copytree(self.folder / "images", self.folder / "val")
+        self.write_texts(["car", "person"], "a", of_5=1)
+        self.write_texts(["person"], "b", of_5=0)
+        sources = [{"dataset": "frames", "root": root, "split": split, "labels": {"format": "yolo", "path": path},
+                    "pairs": program.pairs([1])}
+                   for root, split, path in (("images", "train", "a"), ("val", "val", "b"))]
+        path = self.write_manifest(program.manifest(sources, generator={"kind": "difference"}))
+        run("convert", path, "--output", self.out, "--progress", "none")
+        self.write_texts(["pedestrian"], "b", of_5=0)
+        self.is_refused("labels 1 class 0: expected person, got pedestrian")
+
+    def write_coco(self, categories, of_5=5):
+        images = [{"id": i, "file_name": f"{i:06}.png", "width": 32, "height": 24} for i in range(1, 8)]
+        boxes = [{"id": i, "image_id": i, "bbox": [1, 1, 8, 8], "category_id": of_5 if i == 5 else 1}
+                 for i in range(1, 8)]
+        (self.folder / "coco.json").write_text(json.dumps({
+            "images": images, "annotations": boxes,
+            "categories": [{"id": number, "name": name} for number, name in categories.items()]}))
+
+    def test_a_category_that_coco_lacked_is_added(self):
+        self.write_coco({1: "car", 3: "persn"})
+        self.convert({"format": "coco", "path": "coco.json"})
+        self.write_coco({1: "car", 3: "person", 5: "bike"})
+        self.is_refused("labels 0 class 3: expected persn, got person")
+        self.write_coco({1: "persn", 3: "car", 5: "bike"})
+        self.is_refused("labels 0 class 1: expected car, got persn", "labels 0 class 3: expected persn, got car")
+        self.write_coco({1: "car", 2: "bike", 3: "persn"}, of_5=2)  # its id is its own
+        out, _ = run("retry", self.out)
+        self.assertIn("1 of 1 quarantined sample fixed", out)
+        self.check(["car", "persn", "bike"], {5: "bike"})
+
+    def write_table(self, names):
+        folder = self.folder / "gt"
+        folder.mkdir(exist_ok=True)
+        (folder / "labels.txt").unlink(missing_ok=True)
+        if names:
+            (folder / "labels.txt").write_text("\n".join(names) + "\n")
+        (folder / "gt.txt").write_text("".join(
+            f"{number},1,1,1,8,8,1,{3 if number == 5 else 1},1\n" for number in range(1, 8)))
+
+    def test_a_name_that_mots_labels_txt_lacked_is_added(self):
+        self.write_table(["car", "person"])
+        self.convert({"format": "mot", "path": "."})
+        self.write_table(["person", "car", "bike"])
+        self.is_refused("labels 0 class 1 of ./gt/gt.txt: expected car, got person")
+        self.write_table(["car", "man", "bike"])
+        self.is_refused("labels 0 class 2 of ./gt/gt.txt: expected person, got man")
+        self.write_table([])
+        self.is_refused("labels 0 classes of ./gt/gt.txt: expected those of labels.txt, got MOT's")
+        self.write_table(["car", "person", "bike"])
+        out, _ = run("retry", self.out)
+        self.assertIn("1 of 1 quarantined sample fixed", out)
+        self.check(["car", "bike"], {5: "bike"})
+
+    def test_edges_of_voc_count_from_where_they_did(self):
+        """The only file with an edge at 0 was broken: what the shards have was counted from 1."""
+        for number in range(1, 8):
+            path = self.folder / f"Annotations/{number:06}.xml"
+            path.parent.mkdir(exist_ok=True)
+            path.write_text("<annotation><object><name>car</name><bndbox><xmin>1</xmin><ymin>1</ymin>"
+                            "<xmax>9</xmax><ymax>9</ymax></bndbox></object></annotation>")
+        sound = path.read_text().replace("<xmin>1<", "<xmin>0<")
+        path.write_text(sound[:-20])
+        self.convert({"format": "voc", "path": "."})
+        path.write_text(sound)
+        self.is_refused("labels 0 edges_from: expected 1, got 0")
+        path.write_text(sound.replace("<xmin>0<", "<xmin>1<"))
+        run("retry", self.out)
+        self.check(["car"], {})
 
     def test_splits_have_one_list(self):
         """Validation has no car: its numbers are those of training."""

@@ -25,6 +25,9 @@ class CocoLabels : public OwnLabels {
         index_(index_coco(file_, written_)) {
     annotation_files_.push_back(written_);
     schema_ = coco_schema(index_, written_);
+    for (const CocoIndex::Category& category : index_.categories) {
+      meanings_["class " + std::to_string(category.id)] = category.name;
+    }
     find_images();
     note_without_label(written_);
     warn_of_corners();

@@ -298,12 +298,19 @@ class MotLabels : public ReadLabels {
       annotation_files_.push_back(path);
       form.class_names =
           parse_yolo_classes(folder.read_or_throw("labels.txt"), path).names.class_names;
+      for (std::size_t i = 0; i < form.class_names.size(); ++i) {
+        meanings_[fmt::format("class {} of {}", i + 1, root_.written(file))] = form.class_names[i];
+      }
       form.edges_from = 0;
       with_names_.push_back(root_.written(file));
     } else if (is_visdrone_table(text)) {
       form.is_visdrone = true;
       of_visdrone_.push_back(root_.written(file));
     }
+    meanings_["classes of " + root_.written(file)] = form.is_visdrone ? "VisDrone's"
+                                                     : form.class_names.empty()
+                                                         ? "MOT's"
+                                                         : "those of labels.txt";
     if (edges_from_) form.edges_from = *edges_from_;
     return form;
   }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -80,6 +81,7 @@ class OwnLabels {
 
   /// As those of Dataset.
   const std::vector<std::string>& annotation_files() const { return annotation_files_; }
+  const std::map<std::string, std::string>& meanings() const { return meanings_; }
   const std::vector<std::string>& notes() const { return notes_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
   virtual Outcome<Annotation> annotation(const std::string& label_key) const = 0;
@@ -115,6 +117,7 @@ class OwnLabels {
 
   LabelSchema schema_;
   std::vector<std::string> annotation_files_;
+  std::map<std::string, std::string> meanings_;  ///< Dataset::label_meanings
   std::vector<std::string> notes_, warnings_;
 
  private:

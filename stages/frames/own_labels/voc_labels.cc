@@ -172,6 +172,7 @@ class VocLabels : public FilePerImage {
     }
     schema_.class_names = classes.names();
     edges_from_ = spec.edges_from.value_or(at_0.empty() ? 1 : 0);
+    if (has_boxes) meanings_["edges_from"] = std::to_string(edges_from_);
     if (has_boxes && !spec.edges_from) note_edges(at_0);
     remarks.move_to(notes_);
   }

@@ -69,6 +69,9 @@ class YoloLabels : public FilePerImage {
   YoloLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
       : FilePerImage(spec, base, std::move(labelled), kYoloFiles) {
     read_classes();
+    for (std::size_t i = 0; i < schema_.class_names.size(); ++i) {
+      meanings_["class " + std::to_string(i)] = schema_.class_names[i];
+    }
     std::ranges::sort(annotation_files_);
   }
 

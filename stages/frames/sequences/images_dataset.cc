@@ -90,6 +90,9 @@ class ImagesDataset final : public Dataset {
   const LabelSchema& label_schema() const override { return labels_ ? labels_->schema() : schema_; }
   const std::vector<LabelledFrame>& labelled_frames() const override { return labelled_; }
   std::vector<std::string> annotation_files() const override { return annotation_files_; }
+  std::map<std::string, std::string> label_meanings() const override {
+    return labels_ ? labels_->meanings() : std::map<std::string, std::string>();
+  }
   std::vector<std::string> notes() const override { return notes_; }
   std::vector<std::string> warnings() const override {
     return labels_ ? labels_->warnings() : std::vector<std::string>();

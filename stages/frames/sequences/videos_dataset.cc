@@ -123,6 +123,9 @@ class VideosDataset final : public Dataset {
     return labels_ ? labels_->warnings() : std::vector<std::string>();
   }
   std::vector<std::string> annotation_files() const override { return annotation_files_; }
+  std::map<std::string, std::string> label_meanings() const override {
+    return labels_ ? labels_->meanings() : std::map<std::string, std::string>();
+  }
 
   PairedFrame paired_frame(const LabelledFrame& labelled, int steps) const override {
     if (labelled.frame.index == kAbsentFrame) return {PairedFrame::State::kMissing, labelled.frame};

@@ -390,6 +390,46 @@ TEST_F(Retry, ARequestToStopStartsNoShard) {
   EXPECT_EQ(again().mended, 2);
 }
 
+TEST_F(Retry, ARequestToStopAmongNewNamesOfClassesIsNoEnd) {
+  const auto write_table = [&](const std::string& last) {
+    std::string rows = "image,class,left,top,right,bottom\n";
+    for (int i = 0; i < 12; ++i) {
+      rows += "f_" + std::to_string(10 + i) + ".png," + (i == 11 ? last : "car") + ",1,1,9,9\n";
+    }
+    testing::write_file(folder_ / "boxes.csv", rows);
+  };
+  const auto names_in = [&](int shard) {
+    const auto name = "job-train-0000" + std::to_string(shard) + "-of-00003.h5";
+    return ShardReader(out_ / name).header().label_schema.class_names;
+  };
+  write_table("car");
+  manifest_.sources[0].labels = {LabelFormat::kCsv, "boxes.csv"};
+  ASSERT_TRUE(run().complete());
+  write_table("bike");
+  const std::string first_named = "job-train-00002-of-00003.h5";
+  const std::string before = shards("out").at(first_named);
+  options_.since_stop_request = [&] {
+    const bool is_named = testing::read_file(out_ / first_named) != before;
+    return is_named ? std::optional(1.0) : std::nullopt;
+  };
+  RetryReport report = again();
+  EXPECT_TRUE(report.stopped);
+  EXPECT_EQ(report.shards_renamed, 1);
+  EXPECT_THAT(to_text(report), HasSubstr("run again"));
+
+  // One that is damaged keeps its names, which is told.
+  std::string bytes = testing::read_file(out_ / "job-train-00001-of-00003.h5");
+  bytes[bytes.size() / 2] ^= 1;
+  testing::write_file(out_ / "job-train-00001-of-00003.h5", bytes);
+  options_.since_stop_request = {};
+  report = again();
+  EXPECT_FALSE(report.stopped);
+  EXPECT_EQ(report.shards_renamed, 1);
+  EXPECT_THAT(report.damaged_shards, ElementsAre(HasSubstr("job-train-00001-of-00003.h5")));
+  EXPECT_TRUE(run().complete());
+  for (const int shard : {0, 1, 2}) EXPECT_THAT(names_in(shard), ElementsAre("car", "bike"));
+}
+
 TEST_F(Retry, OfTwoAtOnceTheSecondIsRefused) {
   spoil(5);
   run();

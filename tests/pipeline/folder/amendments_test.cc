@@ -95,8 +95,8 @@ TEST(Amendments, MayNotChangeWhatTheJobIs) {
   text.replace(text.find("frames"), 6, "weights");
   testing::write_file(folder / "amendments.json", text);
   EXPECT_THAT([&] { read_amendments(folder.path(), kPlanHash); },
-              ThrowsMessage<std::runtime_error>(
-                  HasSubstr("expected fields that may change: annotations, frames, got weights")));
+              ThrowsMessage<std::runtime_error>(HasSubstr(
+                  "expected fields that may change: annotations, frames, labels, got weights")));
 }
 
 TEST(IsAmendable, HoldsForWhatIsReadFromInputs) {
@@ -104,6 +104,13 @@ TEST(IsAmendable, HoldsForWhatIsReadFromInputs) {
   EXPECT_TRUE(is_amendable("annotations"));
   for (const char* field : {"weights", "engine", "cpu", "manifest $.seed", "", "frame"}) {
     EXPECT_FALSE(is_amendable(field)) << field;
+  }
+}
+
+TEST(IsAddable, HoldsForWhatLabelsMean) {
+  EXPECT_TRUE(is_addable("labels 0 class 2"));
+  for (const char* field : {"labels", "annotations", "manifest $.sources[0].labels"}) {
+    EXPECT_FALSE(is_addable(field)) << field;
   }
 }
 
