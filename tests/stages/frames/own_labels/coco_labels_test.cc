@@ -138,6 +138,24 @@ TEST_F(CocoLabels, ClassesAreNumberedByAscendingId) {
   EXPECT_EQ(annotation("7").boxes.at(1).class_id, 0);
 }
 
+TEST_F(CocoLabels, ACategoryThatNoneHasIsNoClassBesideItsNamesake) {
+  // Roboflow's root: in a split with annotations, and in one without any.
+  const char* categories = R"({"id": 0, "name": "fish"}, {"id": 1, "name": "fish"},
+                              {"id": 2, "name": "crab"})";
+  write(image(7, "000001.png"), R"({"id": 1, "image_id": 7, "category_id": 1,
+                                    "bbox": [1, 1, 2, 2]})",
+        categories);
+  EXPECT_THAT(open()->label_schema().class_names, ElementsAre("fish", "crab"));
+  EXPECT_EQ(annotation("7").boxes.at(0).class_id, 0);
+  write(image(7, "000001.png"), "", categories);
+  EXPECT_THAT(open()->label_schema().class_names, ElementsAre("fish", "crab"));
+  write(image(7, "000001.png"), R"({"id": 1, "image_id": 7, "category_id": 0,
+                                    "bbox": [1, 1, 2, 2]})",
+        categories);
+  EXPECT_THAT(open()->label_schema().class_names, ElementsAre("fish", "crab"));
+  EXPECT_EQ(annotation("7").boxes.at(0).class_id, 0);
+}
+
 TEST_F(CocoLabels, KeypointsAreMeasuredFromTheImagesEdge) {
   const std::string person =
       R"({"id": 3, "name": "person", "keypoints": ["nose", "eye", "ear"], "skeleton": [[1, 2]]})";
@@ -441,7 +459,10 @@ TEST_F(CocoLabels, WhatBelongsToNothingIsCountedAndNamed) {
   write(image(1, "000001.png"), annotations);
   expect_refused("expected annotations of the file's images, got 25 of other image_ids: 100, 101");
   expect_refused("118, 119, ..., in instances.json");
-  write(image(1, "000001.png"), "", R"({"id": 1, "name": "a"}, {"id": 2, "name": "a"})");
+  write(image(1, "000001.png"),
+        R"({"id": 1, "image_id": 1, "category_id": 1, "bbox": [1, 1, 2, 2]},
+           {"id": 2, "image_id": 1, "category_id": 2, "bbox": [1, 1, 2, 2]})",
+        R"({"id": 1, "name": "a"}, {"id": 2, "name": "a"})");
   expect_refused(
       "expected each category with a name of its own, without control characters, got 1 others");
   write(image(1, "000001.png"), "", R"({"id": 1, "name": "a"}, {"id": 1, "name": "b"})");
