@@ -88,7 +88,7 @@ void add_row(const std::vector<std::string_view>& columns, const MotForm& form,
   NamedBox read;
   Box& box = read.box;
   constexpr std::int64_t kMostId = std::int64_t{1} << 53;
-  box.track_id = whole(columns[kId], "an id from 1", -1, kMostId);
+  box.track_id = whole(columns[kId], "an id from 0, or -1", -1, kMostId);
   if (box.track_id < 0) labels.remarks.push_back("id -1 taken for none");
   if (box.track_id == 0 && !form.is_visdrone) labels.remarks.push_back("id 0 taken as it is");
   const auto pixel = [&](std::size_t column, const char* expected) {
