@@ -102,7 +102,8 @@ class OwnLabels {
   /// Gives frames the labels of a file by the names that it has for them (FrameNames). What it
   /// names and the source does not have is absent; but where that is ten or more and over a quarter
   /// of all, the file is of a larger set, and a note tells how many. Throws InputError for names
-  /// that several folders of ROOT have.
+  /// that several folders of ROOT have, and for names that fit only without their folders where
+  /// these are several.
   void give_named(const std::vector<NamedLabel>& named, const std::string& labels_path);
 
   /// Tells how many frames have no label; called once all are given.

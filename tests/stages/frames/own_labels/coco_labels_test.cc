@@ -282,6 +282,39 @@ TEST_F(CocoLabels, AnotherImageIsNotTakenForOne) {
                     HasSubstr("in instances.json#images/7")));
 }
 
+TEST_F(CocoLabels, AnotherSequencesImageIsNotTakenForOne) {
+  const struct {
+    const char *root, *name;
+    bool is_taken;
+  } cases[] = {
+      {"seqA", "seqB/000001.png", false},
+      {"seqA", "/data/SeqB/images/000001.png", false},
+      {"seqA/images", "seqB/images/000001.png", false},
+      {"MOT17-04/img1", "MOT17-02/img1/000001.png", false},
+      {"0002", "0001/000001.png", false},
+      {"city", "highway/000001.png", false},
+      {"left", "right\\000001.png", false},
+      {"0002/images", "images/1/000001.png", true},
+      {"seqA", "images/1/000001.png", true},
+      {"seqA", "seqA/rgb/000001.png", true},
+      {"seqA", "/home/me/seqA/images/000001.png", true},
+      {"city/frames", "highway/000001.png", true},
+      {"images", "/abs/path/images/000001.png", true},
+      {"images", "C:\\Users\\me\\000001.png", true},
+  };
+  for (const auto& [root, name, is_taken] : cases) {
+    testing::write_flat_image(folder_ / root / "000001.png", kImage, 7);
+    write(image(7, name), "");
+    const auto dataset = open(root);
+    EXPECT_EQ(dataset->labelled_frames().at(0).frame.index >= 0, is_taken) << root << ' ' << name;
+  }
+  // Of several folders any may be another video.
+  write(image(7, "a/000001.png") + "," + image(8, "b/000002.png"), "");
+  expect_refused(
+      "expected images' paths below images, got 2 folders that it has not: a, b, in "
+      "instances.json");
+}
+
 TEST_F(CocoLabels, OfALargerSetWhatIsNotThereIsNoted) {
   std::string images = image(1, "000001.png");
   for (int id = 2; id < 12; ++id) images += "," + image(id, "gone" + std::to_string(id) + ".png");
