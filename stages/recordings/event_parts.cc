@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <utility>
@@ -75,7 +76,11 @@ RecentEvents::Events RecentEvents::get(const void* reader, std::size_t part,
   entry->counted = entry->events->size();
   kept_ += entry->counted;
   ages_.splice(ages_.begin(), ages_, entry->age);
-  while (kept_ > most_events_ && ages_.size() > 1) drop(ages_.back());
+  // Not those that are being read, which have nothing to free: they would be read again.
+  for (auto age = std::prev(ages_.end()); kept_ > most_events_ && age != ages_.begin();) {
+    const Key oldest = *age--;
+    if (entries_.at(oldest)->counted > 0) drop(oldest);
+  }
   return entry->events;
 }
 

@@ -334,13 +334,14 @@ class OwnLabels(program.InFolder):
         (self.folder / "sequences").mkdir()
         (self.folder / "images").rename(self.folder / "sequences" / "uav1_v")
         (self.folder / "annotations" / "uav1_v.txt").write_text("".join(
-            f"{i + 1},7,{left + 1},{top + 1},{right - left},{bottom - top},{int(i != 3)},{[4, 9, 0][i % 3]},0,{i % 3}\n"
+            f"{i + 1},7,{left},{top},{right - left},{bottom - top},{int(i != 3)},{[4, 9, 0][i % 3]},0,{i % 3}\n"
             for i, (left, top, right, bottom) in enumerate(squares.values())))
         out = self.job({"format": "mot", "path": "annotations"}, "sequences")
         self.assert_boxes({f"uav1_v/{name}": box for name, box in
                            self.expected(squares, ["car", "bus", "ignored regions"]).items()})
         self.assertEqual([sample["boxes"][0][2] for sample in self.samples.values()], [False, True, True, False, True])
-        self.assertIn("1 file with VisDrone's classes in column 8: annotations/uav1_v.txt", out)
+        self.assertIn("1 file with VisDrone's classes in column 8, with edges from 0 as", out)
+        self.assertIn("annotations/uav1_v.txt", out)
 
     def test_voc_from_0_without_sizes(self):
         squares = self.make_images()

@@ -62,6 +62,13 @@ std::size_t line_length(std::string_view text) {
 
 }  // namespace
 
+char separator_of(std::string_view text) {
+  const std::string_view line = text.substr(0, text.find('\n'));
+  if (line.find(',') != std::string_view::npos) return ',';
+  if (line.find(';') != std::string_view::npos) return ';';
+  return line.find('\t') != std::string_view::npos ? '\t' : ',';
+}
+
 CsvReader::CsvReader(std::string_view text, char separator) : rest_(text), separator_(separator) {
   constexpr std::string_view kMark = "\xEF\xBB\xBF";
   if (rest_.starts_with(kMark)) rest_.remove_prefix(kMark.size());

@@ -19,6 +19,10 @@ struct CsvRecord {
   std::vector<std::unique_ptr<const std::string>> unquoted;
 };
 
+/// What stands between a table's fields: a comma; or a semicolon or a tab, if the first line has
+/// these and no comma.
+char separator_of(std::string_view text);
+
 /// Reads comma-separated values as RFC 4180 has them, UTF-8, lines ended by LF or CRLF: a field in
 /// quotes may have commas, line ends and doubled quotes in it; blanks around a field do not count,
 /// but within its quotes. A byte order mark and blank lines are passed over. Not thread safe.

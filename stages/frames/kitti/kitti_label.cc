@@ -32,12 +32,16 @@ std::vector<std::string_view> split_columns(std::string_view line) {
   return columns;
 }
 
+std::optional<std::int64_t> whole_of(double number) {
+  constexpr double kMost = 9007199254740992;  // 2^53
+  if (!(std::abs(number) <= kMost) || number != std::trunc(number)) return std::nullopt;
+  return static_cast<std::int64_t>(number);
+}
+
 std::optional<std::int64_t> parse_whole(std::string_view token) {
   if (const auto number = parse_number<std::int64_t>(token)) return number;
-  constexpr double kMost = 9007199254740992;  // 2^53: beyond, a double is not exact
   const auto number = parse_number<double>(token);
-  if (!number || std::abs(*number) > kMost || *number != std::trunc(*number)) return std::nullopt;
-  return static_cast<std::int64_t>(*number);
+  return number ? whole_of(*number) : std::nullopt;
 }
 
 std::string in_quotes(std::string_view text) {

@@ -54,6 +54,9 @@ std::optional<Number> parse_number(std::string_view token) {
   return number;
 }
 
+/// The number as a whole one, or nothing: beyond 2^53 a double is not exact.
+std::optional<std::int64_t> whole_of(double number);
+
 /// The whole token as a whole number, also where a tool has written it as "2.0" (as NumPy and
 /// pandas do), or nothing.
 std::optional<std::int64_t> parse_whole(std::string_view token);

@@ -197,7 +197,8 @@ std::vector<std::string> read_mpii_keyframes(const std::filesystem::path& keyfra
 
 std::vector<MpiiEntry> read_mpii_annotations(const std::filesystem::path& annotations,
                                              const std::filesystem::path& keyframes) {
-  std::vector<Json> keyframe_elements = read_keyframe_elements(keyframes);
+  std::vector<Json> keyframe_elements;
+  if (!keyframes.empty()) keyframe_elements = read_keyframe_elements(keyframes);
   const MatVariable release = read_mat_variable(annotations, "RELEASE");
   const auto field = [&](const char* name) {
     return reading(annotations, [&] { return array_of(release.array, name); });
@@ -216,7 +217,7 @@ std::vector<MpiiEntry> read_mpii_annotations(const std::filesystem::path& annota
     throw InputError("expected images in RELEASE.annolist, got none, in " + annotations.string());
   }
   expect_count("img_train", img_train.size, annotations);
-  expect_count("annolist_keyframes", keyframe_elements.size(), keyframes);
+  if (!keyframes.empty()) expect_count("annolist_keyframes", keyframe_elements.size(), keyframes);
 
   return reading(annotations, [&] {
     std::vector<MpiiEntry> entries;
@@ -234,8 +235,10 @@ std::vector<MpiiEntry> read_mpii_annotations(const std::filesystem::path& annota
       read.is_train = entry["img_train"] == 1 || entry["img_train"] == true;
       copy_element(single_person, "single_person", i, entry);
       copy_element(act, "act", i, entry);
-      read.keyframe = image_name(keyframe_elements[i]);
-      entry["annolist_keyframes"] = std::move(keyframe_elements[i]);
+      if (!keyframes.empty()) {
+        read.keyframe = image_name(keyframe_elements[i]);
+        entry["annolist_keyframes"] = std::move(keyframe_elements[i]);
+      }
       read.json = dump(entry);
       entries.push_back(std::move(read));
     }

@@ -21,7 +21,9 @@ class MpiiDataset final : public Dataset {
  public:
   MpiiDataset(MpiiPlaces places, const std::filesystem::path& base, const std::string& split)
       : places_(std::move(places)), frames_(base, places_.image_folders, places_.sequence_folders) {
-    take(read_mpii_annotations(base / places_.annotations, base / places_.keyframes), split);
+    const auto keyframes =
+        places_.keyframes.empty() ? std::filesystem::path() : base / places_.keyframes;
+    take(read_mpii_annotations(base / places_.annotations, keyframes), split);
     sort_samples(labelled_, places_.annotations);
   }
 
@@ -33,8 +35,10 @@ class MpiiDataset final : public Dataset {
   std::vector<std::string> notes() const override { return notes_; }
 
   std::vector<std::string> annotation_files() const override {
-    return {std::min(places_.annotations, places_.keyframes),
-            std::max(places_.annotations, places_.keyframes)};
+    std::vector<std::string> files = {places_.annotations};
+    if (!places_.keyframes.empty()) files.push_back(places_.keyframes);
+    std::ranges::sort(files);
+    return files;
   }
 
   Outcome<Annotation> annotation(const std::string& label_key) const override {

@@ -11,9 +11,9 @@ namespace eventgan {
 /// MPII Human Pose as downloaded.
 ///
 /// ROOT/mpii_human_pose_v1_u12_1.mat, or in ROOT/mpii_human_pose_v1_u12_2/, or the manifest's
-/// `annotations` (file or folder); mpii_human_pose_v1_sequences_keyframes.mat beside it or in ROOT;
-/// ROOT/images; the videos in ROOT/sequences and ROOT/mpii_human_pose_v1_sequences_batchN, or only
-/// in the manifest's `sequences`.
+/// `annotations` (file or folder); mpii_human_pose_v1_sequences_keyframes.mat beside it or in ROOT,
+/// which stills and a ROOT without videos need not have; ROOT/images; the videos in ROOT/sequences
+/// and ROOT/mpii_human_pose_v1_sequences_batchN, or only in the manifest's `sequences`.
 ///
 /// A sample is an image in which somebody has a joint or a centre, named as the image without
 /// extension. `split` train takes only img_train 1, test only img_train 0, any other name both.

@@ -71,16 +71,21 @@ MpiiPlaces find_mpii_places(const SourceSpec& spec, const fs::path& base) {
   const std::vector<std::string> beside = {
       fs::path(places.annotations).parent_path().generic_string(), spec.root};
   places.keyframes = find_mpii_keyframes(beside, base);
-  if (places.keyframes.empty()) refuse_missing(kKeyframes, beside, base);
 
   if (spec.sequences) {
     SourceRoot(*spec.sequences, base).require_folder("");
     places.sequence_folders = {*spec.sequences};
-    return places;
+  } else {
+    places.sequence_folders = {root.written("sequences")};
+    for (const std::string& name : root.folders_in("")) {
+      if (name.starts_with(kMpiiBatchPrefix)) places.sequence_folders.push_back(root.written(name));
+    }
   }
-  places.sequence_folders = {root.written("sequences")};
-  for (const std::string& name : root.folders_in("")) {
-    if (name.starts_with(kMpiiBatchPrefix)) places.sequence_folders.push_back(root.written(name));
+  const bool has_sequences =
+      std::ranges::any_of(places.sequence_folders,
+                          [&](const std::string& folder) { return has_folder(base / folder); });
+  if (places.keyframes.empty() && has_sequences && !spec.pairs.stills) {
+    refuse_missing(kKeyframes, beside, base);
   }
   return places;
 }

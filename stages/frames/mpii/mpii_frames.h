@@ -18,13 +18,14 @@ namespace eventgan {
 /// Where the parts of an MPII download lie, each path as the manifest writes its beginning.
 struct MpiiPlaces {
   std::string annotations;  ///< mpii_human_pose_v1_u12_1.mat
-  std::string keyframes;    ///< mpii_human_pose_v1_sequences_keyframes.mat
+  std::string keyframes;    ///< mpii_human_pose_v1_sequences_keyframes.mat; empty if absent
   std::vector<std::string> image_folders;
   std::vector<std::string> sequence_folders;
 };
 
 /// Finds them; see open_mpii_dataset for where it looks. Throws InputError, saying where it looked,
-/// if a .mat file, the root, or a folder that the manifest names is missing.
+/// if a .mat file, the root, or a folder that the manifest names is missing. The keyframes may be,
+/// where no pair comes of sequences: without them, or of stills.
 MpiiPlaces find_mpii_places(const SourceSpec& spec, const std::filesystem::path& base);
 
 /// mpii_human_pose_v1_u12_1.mat in a root, or in its mpii_human_pose_v1_u12_2; empty if it is in

@@ -1,7 +1,6 @@
 #include "stages/frames/own_labels/detail/coco_entry.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -12,6 +11,7 @@
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/detail/strict_json.h"
 #include "manifests/values/faults.h"
+#include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
 
 namespace eventgan {
@@ -19,14 +19,10 @@ namespace {
 
 /// Takes 2.0 for 2: tools that compute with floating point write all numbers so.
 void make_whole(nlohmann::json& value) {
-  constexpr double kMost = 9007199254740992;  // 2^53
   if (value.is_structured()) {
     for (nlohmann::json& element : value) make_whole(element);
   } else if (value.is_number_float()) {
-    const double number = value.get<double>();
-    if (std::abs(number) <= kMost && std::floor(number) == number) {
-      value = static_cast<std::int64_t>(number);
-    }
+    if (const auto number = whole_of(value.get<double>())) value = *number;
   }
 }
 

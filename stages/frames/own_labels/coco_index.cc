@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -15,6 +14,7 @@
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
+#include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/own_labels/detail/counted_bytes.h"
 #include "stages/frames/source_folders.h"
@@ -60,9 +60,8 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
                           : take_value("a huge number");
   }
   bool number_float(double value, const std::string&) override {
-    constexpr double kMost = 9007199254740992;  // 2^53
-    const bool is_whole = std::abs(value) <= kMost && std::floor(value) == value;
-    if (is_whole && depth_ == kInEntry) return take_integer(static_cast<std::int64_t>(value));
+    const auto whole = whole_of(value);
+    if (whole && depth_ == kInEntry) return take_integer(*whole);
     take_number(value);
     return take_value("a fraction");
   }
@@ -274,19 +273,21 @@ void refuse_any(const std::vector<std::string>& names, const std::string& expect
 }
 
 /// `used`: the ids that annotations have. Some tools write a root of all categories, or a copy of
-/// each, that no annotation has and that has another's name.
+/// each, that no annotation has and that has another's name; where no annotation tells them apart,
+/// the last of a name is the one that others have.
 void check_categories(CocoIndex& index, const std::set<std::int64_t>& used,
                       const std::string& written) {
   auto& categories = index.categories;
   std::ranges::stable_sort(categories, {}, &CocoIndex::Category::id);
-  std::set<std::string, std::less<>> used_names;
+  std::set<std::string, std::less<>> kept;
   for (const CocoIndex::Category& category : categories) {
-    if (used.contains(category.id)) used_names.insert(category.name);
+    if (used.contains(category.id)) kept.insert(category.name);
   }
-  const auto is_copy = [&](const CocoIndex::Category& category) {
-    return !used.contains(category.id) && used_names.contains(category.name);
-  };
-  std::erase_if(categories, is_copy);
+  std::ranges::reverse(categories);
+  std::erase_if(categories, [&](const CocoIndex::Category& category) {
+    return !used.contains(category.id) && !kept.insert(category.name).second;
+  });
+  std::ranges::reverse(categories);
   std::vector<std::string> ids, names;
   std::set<std::string> known;
   for (std::size_t i = 0; i < categories.size(); ++i) {

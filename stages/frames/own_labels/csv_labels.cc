@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "manifests/documents/detail/json_text.h"
-#include "stages/frames/csv_columns.h"
+#include "stages/base/files/csv_records.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
@@ -108,24 +108,17 @@ Outcome<CsvColumns> columns_of(const CsvRecord& header) {
   return columns;
 }
 
-/// A comma; or a semicolon or a tab, if the first line has these and no comma.
-char separator_of(std::string_view text) {
-  const std::string_view line = text.substr(0, text.find('\n'));
-  if (line.find(',') != std::string_view::npos) return ',';
-  if (line.find(';') != std::string_view::npos) return ';';
-  return line.find('\t') != std::string_view::npos ? '\t' : ',';
-}
-
-/// Programs of some countries write 1,5 between semicolons.
-std::optional<double> edge_of(std::string_view field) {
+/// Programs of some countries write 1,5 between semicolons. Between commas "1,024" may be 1024, and
+/// is none.
+std::optional<double> edge_of(std::string_view field, char separator) {
   const std::size_t comma = field.find(',');
-  if (comma == std::string_view::npos) return parse_number<double>(field);
+  if (comma == std::string_view::npos || separator == ',') return parse_number<double>(field);
   std::string number(field);
   number[comma] = '.';
   return parse_number<double>(number);
 }
 
-NamedBox box_of(const Row& row, bool has_sides) {
+NamedBox box_of(const Row& row, bool has_sides, char separator) {
   NamedBox read;
   if (!is_label_name(row[kClass])) {
     throw BadLabel("a class without control characters", in_quotes(row[kClass]));
@@ -135,7 +128,7 @@ NamedBox box_of(const Row& row, bool has_sides) {
   const std::array edges{&xyxy.left, &xyxy.top, &xyxy.right, &xyxy.bottom};
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const std::size_t column = kLeft + i + (has_sides && i >= 2 ? kWidth - kRight : 0);
-    const auto edge = edge_of(row[column]);
+    const auto edge = edge_of(row[column], separator);
     if (!edge || std::abs(*edge) > kFarthest_px) {
       throw BadLabel(fmt::format("{} within {:g} pixels", kColumns[column].title, kFarthest_px),
                      in_quotes(row[column]));
@@ -152,12 +145,7 @@ NamedBox box_of(const Row& row, bool has_sides) {
         fmt::format("{:g}, {:g}, {:g}, {:g}", xyxy.left, xyxy.top, xyxy.right, xyxy.bottom));
   }
   if (!row[kTrack].empty()) {
-    std::string_view number = row[kTrack];
-    if (const std::size_t dot = number.find('.'); dot != std::string_view::npos) {  // pandas' 7.0
-      const std::string_view fraction = number.substr(dot + 1);
-      if (fraction.find_first_not_of('0') == std::string_view::npos) number = number.substr(0, dot);
-    }
-    const auto track = parse_number<std::int64_t>(number);
+    const auto track = parse_whole(row[kTrack]);
     if (!track || *track < 0)
       throw BadLabel("a whole number from 0 as track", in_quotes(row[kTrack]));
     read.box.track_id = *track;
@@ -169,7 +157,7 @@ NamedBox box_of(const Row& row, bool has_sides) {
 class ImageRows {
  public:
   /// Beside the rows before it. Throws BadLabel.
-  void add(const Row& row, bool has_sides) {
+  void add(const Row& row, bool has_sides, char separator) {
     const auto is_empty = [](std::string_view field) { return field.empty(); };
     const bool is_alone = std::all_of(row.begin() + kClass, row.begin() + kWidth, is_empty) &&
                           row[kTrack].empty() &&
@@ -179,7 +167,7 @@ class ImageRows {
     }
     is_without_boxes_ = is_alone;
     if (is_alone) return;
-    NamedBox box = box_of(row, has_sides);
+    NamedBox box = box_of(row, has_sides, separator);
     const std::int64_t track = box.box.track_id;
     if (track >= 0 && !tracks_.insert(track).second) {
       throw BadLabel("each track once in an image", std::to_string(track) + " twice");
@@ -199,7 +187,8 @@ class ImageRows {
 
 std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view text,
                                                              const std::string& path) {
-  CsvReader reader(text, separator_of(text));
+  const char separator = separator_of(text);
+  CsvReader reader(text, separator);
   const auto next = [&] {
     std::optional<CsvRecord> record = reader.next();
     if (!record || record->fault.empty()) return record;
@@ -238,7 +227,7 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
     auto& rows = *image;
     rows.labels().original.append(record->bytes);
     try {
-      rows.add(row, has_sides);
+      rows.add(row, has_sides, separator);
       if (rows.labels().boxes.empty()) continue;
       const Rectangle& box = rows.labels().boxes.back().box.xyxy;
       largest = std::max({largest, box.right, box.bottom});

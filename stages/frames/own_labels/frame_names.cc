@@ -250,8 +250,12 @@ FrameNames::Match FrameNames::find_near(const std::string& name, bool is_in_root
     // the folder b.
     const bool is_in_folder = names_[found->second].find('/') != std::string_view::npos;
     if ((is_in_root || dropped > 0) && is_in_folder && is_bare) continue;
-    if (dropped > 0 && is_other_image(parts, dropped, found->second)) return {};
-    return {.frame = found->second, .is_near = true, .drops_folders = dropped > 0};
+    const bool is_other = dropped > 0 && (is_other_sequence(parts, dropped) ||
+                                          is_other_image(parts, dropped, found->second));
+    if (is_other) return {};
+    const std::vector<std::string> front(parts.begin(),
+                                         parts.begin() + static_cast<std::ptrdiff_t>(dropped));
+    return {.frame = found->second, .is_near = true, .dropped = joined_from(front, 0)};
   }
   return {};
 }
@@ -270,6 +274,59 @@ FrameNames::Match FrameNames::find_near_in_video(const std::vector<std::string>&
   std::size_t frame = look_up(stem.substr(0, mark) + "/" + number);
   if (frame == kNone && stem.starts_with("frame")) frame = look_up(number);  // of the only video
   return {frame, {}, /*is_near=*/frame < kSeveral};
+}
+
+namespace {
+
+bool is_number(std::string_view name) { return std::ranges::all_of(name, is_digit); }
+
+/// A folder's name that says nothing of what is in it.
+bool is_general(const std::string& name) {
+  constexpr std::array<std::string_view, 16> kGeneral = {
+      "data", "dataset", "default",    "frames",   "image",  "images", "img",    "img1",
+      "imgs", "media",   "jpegimages", "pictures", "photos", "rgb",    "upload", "uploads"};
+  return !split_of(name).empty() || std::ranges::find(kGeneral, name) != kGeneral.end();
+}
+
+/// "MOT17-02" and "MOT17-04", "seqA" and "seqB".
+bool are_siblings(const std::string& a, const std::string& b) {
+  const auto without_numbers = [](const std::string& name) {
+    std::string text;
+    for (const char c : name) {
+      if (!is_digit(c)) text += c;
+      if (is_digit(c) && !text.ends_with('#')) text += '#';
+    }
+    return text;
+  };
+  if (a == b) return false;
+  const bool differ_last =
+      a.size() == b.size() && a.size() > 2 && std::equal(a.begin(), a.end() - 1, b.begin());
+  return differ_last || without_numbers(a) == without_numbers(b);
+}
+
+}  // namespace
+
+bool FrameNames::is_other_sequence(const std::vector<std::string>& parts,
+                                   std::size_t dropped) const {
+  constexpr std::size_t kNearest = 3;
+  std::vector<std::string> own;  // the last first
+  for (auto folder = root_folders_.rbegin(); folder != root_folders_.rend(); ++folder) {
+    if (own.size() < kNearest) own.push_back(in_small_letters(*folder));
+  }
+  if (own.empty()) return false;
+  std::string last;  // that is no number
+  for (std::size_t i = 0; i < dropped; ++i) {
+    const std::string name = in_small_letters(parts[i]);
+    const bool is_own = std::ranges::find(own, name) != own.end();
+    const auto is_sibling = [&](const std::string& folder) { return are_siblings(name, folder); };
+    // A number is a task's or a sequence's, which only a root tells that is one as well.
+    if (!is_own && !is_general(name) &&
+        (is_number(name) ? is_number(own.front()) : std::ranges::any_of(own, is_sibling))) {
+      return true;
+    }
+    if (!is_number(name)) last = is_own ? "" : name;
+  }
+  return !last.empty() && !is_general(last) && !is_general(own.front());
 }
 
 /// Whether folders that were dropped from a name tell that it is of another image: of another

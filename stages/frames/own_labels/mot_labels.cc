@@ -88,7 +88,7 @@ void add_row(const std::vector<std::string_view>& columns, const MotForm& form,
   NamedBox read;
   Box& box = read.box;
   constexpr std::int64_t kMostId = std::int64_t{1} << 53;
-  box.track_id = whole(columns[kId], "an id from 1", -1, kMostId);
+  box.track_id = whole(columns[kId], "an id from 0, or -1", -1, kMostId);
   if (box.track_id < 0) labels.remarks.push_back("id -1 taken for none");
   if (box.track_id == 0 && !form.is_visdrone) labels.remarks.push_back("id 0 taken as it is");
   const auto pixel = [&](std::size_t column, const char* expected) {
@@ -305,6 +305,9 @@ class MotLabels : public ReadLabels {
       with_names_.push_back(root_.written(file));
     } else if (is_visdrone_table(text)) {
       form.is_visdrone = true;
+      // Its README does not tell. Ultralytics' VisDrone.yaml takes edges from 0, and VisDrone's own
+      // evaluation (dropObjects.m) lifts those at 0 to MATLAB's 1.
+      form.edges_from = 0;
       of_visdrone_.push_back(root_.written(file));
     }
     meanings_["classes of " + root_.written(file)] = form.is_visdrone ? "VisDrone's"
@@ -317,16 +320,18 @@ class MotLabels : public ReadLabels {
 
   /// Tells what is read otherwise than MOTChallenge writes it, and copies of a sequence.
   void note_forms() {
-    if (!with_names_.empty()) {
-      const std::string edges =
-          edges_from_ ? ""
-                      : ", with edges from 0 as CVAT writes them (or as \"edges_from\" in the "
-                        "manifest's labels says)";
-      notes_.push_back(counted(with_names_, "file", " with the classes of labels.txt" + edges));
-    }
-    if (!of_visdrone_.empty()) {
-      notes_.push_back(counted(of_visdrone_, "file", " with VisDrone's classes in column 8"));
-    }
+    const auto note = [&](const std::vector<std::string>& files, const std::string& classes,
+                          const std::string& writer) {
+      if (files.empty()) return;
+      const std::string edges = edges_from_ ? ""
+                                            : ", with edges from 0 as " + writer +
+                                                  " (or as \"edges_from\" in the manifest's "
+                                                  "labels says)";
+      notes_.push_back(counted(files, "file", " with " + classes + edges));
+    };
+    note(with_names_, "the classes of labels.txt", "CVAT writes them");
+    note(of_visdrone_, "VisDrone's classes in column 8",
+         "the programs that convert VisDrone take them");
     if (!copies_.empty()) {
       notes_.push_back(
           counted(copies_, "sequence",

@@ -1,6 +1,7 @@
 #include "stages/frames/own_labels/own_labels.h"
 
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -37,6 +38,7 @@ void OwnLabels::give_named(const std::vector<NamedLabel>& named, const std::stri
   std::vector<std::string> of_several;
   std::vector<AbsentFrame> absent, elsewhere;
   std::vector<std::pair<FrameNames::Match, const NamedLabel*>> near;
+  std::set<std::string> dropped;
   bool any_exact = false;
   for (const NamedLabel& label : named) {
     const FrameNames::Match match = names.find(label.image);
@@ -44,6 +46,7 @@ void OwnLabels::give_named(const std::vector<NamedLabel>& named, const std::stri
       of_several.push_back(label.image);
     } else if (match.is_near) {
       near.emplace_back(match, &label);
+      if (!match.dropped.empty()) dropped.insert(match.dropped);
     } else if (match.frame != FrameNames::kNone) {
       any_exact = true;
       give(match.frame, label.key);
@@ -71,12 +74,17 @@ void OwnLabels::give_named(const std::vector<NamedLabel>& named, const std::stri
                      counted(of_several, "bare name", " that several of its folders have") +
                      ", in " + labels_path + both_text(of_several.front()));
   }
+  if (dropped.size() > 1 && !any_exact) {  // each may be another video with the same names
+    throw InputError("expected images' paths below " + source_.root.written("") + ", got " +
+                     counted({dropped.begin(), dropped.end()}, "folder", " that it has not") +
+                     ", in " + labels_path);
+  }
   std::vector<bool> is_named(labels_.size());
   for (std::size_t i = 0; i < labels_.size(); ++i) is_named[i] = !labels_[i].key.empty();
   std::vector<std::string> others;
   for (const auto& [match, label] : near) {
     // Another's, where the frame has its own name in the file, or others have their folders there.
-    if (is_named[match.frame] || (any_exact && match.drops_folders)) {
+    if (is_named[match.frame] || (any_exact && !match.dropped.empty())) {
       absent.push_back({label->image, label->key});
       continue;
     }

@@ -104,7 +104,8 @@ class OwnLabels {
   /// Gives frames the labels of a file by the names that it has for them (FrameNames). What it
   /// names and the source does not have is absent; but where that is ten or more and over a quarter
   /// of all, the file is of a larger set, and a note tells how many. Throws InputError for names
-  /// that several folders of ROOT have.
+  /// that several folders of ROOT have, and for names that fit only without their folders where
+  /// these are several.
   void give_named(const std::vector<NamedLabel>& named, const std::string& labels_path);
 
   /// Tells how many frames have no label; called once all are given.
@@ -146,13 +147,13 @@ struct LabelReader {
 /// MOT's gt.txt (parse_mot_labels): `path` is the file of the only sequence, or a folder that has
 /// SEQUENCE/gt/gt.txt, SEQUENCE/gt.txt or SEQUENCE.txt, where SEQUENCE is a folder of images or a
 /// video without its extension; of images right in ROOT gt/gt.txt or gt.txt. labels.txt beside it
-/// names the classes, and then edges count from 0; the columns tell VisDrone's tables. Notes tell
-/// which these are, and which sequences have the same labels. Frame 1 is the image numbered 1, or
-/// the first where images are numbered from 0 (which a note tells), or a video's frame 0. Images
-/// without numbers are counted in their order, and must be all of the
-/// sequence (seqLength, or the last frame with labels), else InputError. seqinfo.ini beside it, or
-/// above its folder gt, gives the sequence's rate and the images' size. The label_key is
-/// "GT_FILE#FRAME", GT_FILE below `path`.
+/// names the classes, and then edges count from 0; the columns tell VisDrone's tables, from 0 too.
+/// Notes tell which these are, and which sequences have the same labels. Frame 1 is the image
+/// numbered 1, or the first where images are numbered from 0 (which a note tells), or a video's
+/// frame 0. Images without numbers are counted in their order, and must be all of the sequence
+/// (seqLength, or the last frame with labels), else InputError. seqinfo.ini beside it, or above its
+/// folder gt, gives the sequence's rate and the images' size. The label_key is "GT_FILE#FRAME",
+/// GT_FILE below `path`.
 extern const LabelReader kMotReader;
 
 /// COCO's instances and person keypoints: `path` is the JSON file. `file_name` is the image's path

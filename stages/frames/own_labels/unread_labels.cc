@@ -73,10 +73,7 @@ bool is_dota_text(const LabelFile& file) {
 /// A table whose rows begin with one of the images, or whose header has them and edges.
 bool is_table(const LabelFile& file) {
   const std::string_view line = std::string_view(file.text).substr(0, file.text.find('\n'));
-  const char separator = line.find(',') != line.npos   ? ','
-                         : line.find(';') != line.npos ? ';'
-                                                       : '\t';
-  CsvReader reader(file.text, separator);
+  CsvReader reader(file.text, separator_of(file.text));
   std::vector<std::string> images;
   for (int row = 0; row < 100; ++row) {
     const auto record = reader.next();

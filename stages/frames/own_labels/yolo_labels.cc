@@ -111,7 +111,8 @@ class YoloLabels : public FilePerImage {
       for (const TextLine& line : split_lines(*text)) {
         const std::vector<std::string_view> columns = split_columns(line.bytes);
         const auto number = columns.empty() ? std::nullopt : parse_number<double>(columns[0]);
-        if (number && *number <= kMost) highest = std::max(highest, static_cast<int>(*number));
+        const bool is_class = number && *number >= 0 && *number <= kMost;
+        if (is_class) highest = std::max(highest, static_cast<int>(*number));
       }
     }
     if (highest < 0) {
@@ -159,11 +160,7 @@ std::optional<std::filesystem::path> find_yolo(const FoundFrames& frames,
   for (int level = 0; level < (is_beside ? 2 : 3); ++level, folder = folder.parent_path()) {
     if (!names_file_in(folder).empty()) return is_beside ? labels : folder;
   }
-  if (has_yolo_texts(labels)) {
-    remarks.push_back("no data.yaml or classes.txt with the classes' names, which are numbers: " +
-                      labels.string());
-    return labels;
-  }
+  if (has_yolo_texts(labels)) return labels;  // which tell that their classes are numbers
   if (!is_beside) {
     remarks.push_back("no data.yaml or classes.txt, so that YOLO's labels are left out: " +
                       labels.string());

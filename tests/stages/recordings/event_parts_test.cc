@@ -139,6 +139,21 @@ TEST(RecentEvents, TheLatestStaysHoweverLargeItIs) {
   EXPECT_THAT(events.reads, ElementsAre(0));
 }
 
+TEST(RecentEvents, WhatIsBeingReadStays) {
+  RecentEvents recent(1);
+  const auto fail = []() -> CompactEvents { throw InputError("is read"); };
+  recent.get(&recent, 0, [&] {  // others read more than are kept meanwhile
+    for (std::size_t part = 1; part < 4; ++part) {
+      recent.get(&recent, part, [] { return events_at({7}); });
+    }
+    return events_at({8});
+  });
+  EXPECT_EQ(recent.get(&recent, 0, fail)->times_s()[0], 8);
+  for (std::size_t part = 1; part < 4; ++part) {
+    EXPECT_THAT([&] { recent.get(&recent, part, fail); }, ThrowsMessage<InputError>("is read"));
+  }
+}
+
 TEST(RecentEvents, WhatCouldNotBeReadIsReadAgain) {
   RecentEvents recent(10);
   const auto fail = []() -> CompactEvents { throw InputError("unreadable"); };

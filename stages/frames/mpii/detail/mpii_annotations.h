@@ -52,8 +52,8 @@ struct MpiiEntry {
 };
 
 /// Reads `annotations` (variable RELEASE) and `keyframes` (variable annolist_keyframes), whose
-/// element i belongs to annolist(i). Throws InputError if a file is missing or damaged, a variable
-/// or an image name is missing, or the arrays differ in length. Thread safe.
+/// element i belongs to annolist(i); an empty path is none. Throws InputError if a file is missing
+/// or damaged, a variable or an image name is missing, or the arrays differ in length. Thread safe.
 std::vector<MpiiEntry> read_mpii_annotations(const std::filesystem::path& annotations,
                                              const std::filesystem::path& keyframes);
 

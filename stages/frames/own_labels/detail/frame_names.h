@@ -17,7 +17,8 @@ namespace eventgan {
 /// STEM_NUMBER.png.
 ///
 /// What fits none of these is looked for as tools write it otherwise (Match::is_near): with other
-/// folders in front, as long as they do not name another split or an image that is there; with
+/// folders in front, as long as they do not name another split, another sequence
+/// (is_other_sequence) or an image that is there; with
 /// Windows' \, with %20, with an extension in other letters or without any, with accents written
 /// apart (NFD), as a number alone. Views into the names, which must outlive it.
 class FrameNames {
@@ -33,7 +34,7 @@ class FrameNames {
     std::size_t frame = kNone;
     std::string below_root = {};  ///< the name without what ROOT ends in
     bool is_near = false;         ///< by another name than its own
-    bool drops_folders = false;   ///< is_near, and the name has folders that the frame has not
+    std::string dropped = {};     ///< folders that the name has in front and the frame has not
     bool is_elsewhere = false;    ///< none, but there is such a file outside ROOT
   };
   Match find(const std::string& name);
@@ -47,6 +48,11 @@ class FrameNames {
   /// `is_in_root`: the name begins with what ROOT ends in, and that has been cut off.
   Match find_near(const std::string& name, bool is_in_root);
   Match find_near_in_video(const std::vector<std::string>& parts) const;
+  /// Whether folders dropped from a name are another sequence than ROOT's: numbers and names such
+  /// as 000001.png are in all of them. "seqB" and "MOT17-02/img1" are others than the roots "seqA"
+  /// and "MOT17-04/img1", and "highway" is than "city"; "images/1" and "highway" may both be what
+  /// is in a root "images", and "home/me/images" what is in any.
+  bool is_other_sequence(const std::vector<std::string>& parts, std::size_t dropped) const;
   bool is_other_image(const std::vector<std::string>& parts, std::size_t dropped,
                       std::size_t frame) const;
   void list_near();

@@ -65,6 +65,23 @@ TEST_F(MpiiDatasetTest, TheSplitChoosesByImgTrain) {
   EXPECT_THAT(mpii_ids(*open()), ElementsAre("a", "b", "c"));
 }
 
+TEST_F(MpiiDatasetTest, StillsNeedNoKeyframes) {
+  write_four();
+  const auto with_keyframes = open();
+  std::filesystem::remove(folder_ / "m/mpii_human_pose_v1_sequences_keyframes.mat");
+  EXPECT_THROW(open(), InputError);
+  spec_.pairs.stills.emplace();
+  const auto dataset = open();
+  EXPECT_EQ(mpii_ids(*dataset), mpii_ids(*with_keyframes));
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("m/mpii_human_pose_v1_u12_1.mat"));
+  const LabelledFrame& b = dataset->labelled_frames().at(1);
+  EXPECT_EQ(b.frame.path, "m/images/b.jpg");
+  EXPECT_EQ(dataset->paired_frame(b, 0).state, State::kPresent);
+  EXPECT_EQ(dataset->annotation(b.label_key)->persons.size(), 2u);
+  EXPECT_THAT(dataset->annotation(b.label_key)->original,
+              ::testing::Not(HasSubstr("annolist_keyframes")));
+}
+
 TEST_F(MpiiDatasetTest, LabelsStayWithTheirImage) {
   write_four();
   const auto dataset = open();

@@ -67,9 +67,14 @@ TEST_F(MpiiPlacesTest, SaysWhatIsMissing) {
                                    HasSubstr("expected mpii_human_pose_v1_u12_1.mat, got none"),
                                    HasSubstr("m or "), HasSubstr("mpii_human_pose_v1_u12_2"))));
   testing::write_file(folder_ / "m/mpii_human_pose_v1_u12_1.mat", "");
+  EXPECT_EQ(find().keyframes, "") << "there are no sequences";
+  testing::write_file(folder_ / "m/sequences/x/1.jpg", "");
   EXPECT_THAT(
       [&] { find(); },
       ThrowsMessage<InputError>(HasSubstr("expected mpii_human_pose_v1_sequences_keyframes.mat")));
+  spec_.pairs.stills.emplace();
+  EXPECT_EQ(find().keyframes, "") << "stills need none";
+  spec_.pairs.stills.reset();
   testing::write_file(folder_ / "m/mpii_human_pose_v1_sequences_keyframes.mat", "");
   spec_.sequences = "videos";
   EXPECT_THAT([&] { find(); }, ThrowsMessage<InputError>(HasSubstr("videos")));

@@ -138,6 +138,24 @@ TEST_F(CocoLabels, ClassesAreNumberedByAscendingId) {
   EXPECT_EQ(annotation("7").boxes.at(1).class_id, 0);
 }
 
+TEST_F(CocoLabels, ACategoryThatNoneHasIsNoClassBesideItsNamesake) {
+  // Roboflow's root: in a split with annotations, and in one without any.
+  const char* categories = R"({"id": 0, "name": "fish"}, {"id": 1, "name": "fish"},
+                              {"id": 2, "name": "crab"})";
+  write(image(7, "000001.png"), R"({"id": 1, "image_id": 7, "category_id": 1,
+                                    "bbox": [1, 1, 2, 2]})",
+        categories);
+  EXPECT_THAT(open()->label_schema().class_names, ElementsAre("fish", "crab"));
+  EXPECT_EQ(annotation("7").boxes.at(0).class_id, 0);
+  write(image(7, "000001.png"), "", categories);
+  EXPECT_THAT(open()->label_schema().class_names, ElementsAre("fish", "crab"));
+  write(image(7, "000001.png"), R"({"id": 1, "image_id": 7, "category_id": 0,
+                                    "bbox": [1, 1, 2, 2]})",
+        categories);
+  EXPECT_THAT(open()->label_schema().class_names, ElementsAre("fish", "crab"));
+  EXPECT_EQ(annotation("7").boxes.at(0).class_id, 0);
+}
+
 TEST_F(CocoLabels, KeypointsAreMeasuredFromTheImagesEdge) {
   const std::string person =
       R"({"id": 3, "name": "person", "keypoints": ["nose", "eye", "ear"], "skeleton": [[1, 2]]})";
@@ -262,6 +280,39 @@ TEST_F(CocoLabels, AnotherImageIsNotTakenForOne) {
               AllOf(HasSubstr("expected an image below images, got ../other/000001.png, which lies "
                               "elsewhere"),
                     HasSubstr("in instances.json#images/7")));
+}
+
+TEST_F(CocoLabels, AnotherSequencesImageIsNotTakenForOne) {
+  const struct {
+    const char *root, *name;
+    bool is_taken;
+  } cases[] = {
+      {"seqA", "seqB/000001.png", false},
+      {"seqA", "/data/SeqB/images/000001.png", false},
+      {"seqA/images", "seqB/images/000001.png", false},
+      {"MOT17-04/img1", "MOT17-02/img1/000001.png", false},
+      {"0002", "0001/000001.png", false},
+      {"city", "highway/000001.png", false},
+      {"left", "right\\000001.png", false},
+      {"0002/images", "images/1/000001.png", true},
+      {"seqA", "images/1/000001.png", true},
+      {"seqA", "seqA/rgb/000001.png", true},
+      {"seqA", "/home/me/seqA/images/000001.png", true},
+      {"city/frames", "highway/000001.png", true},
+      {"images", "/abs/path/images/000001.png", true},
+      {"images", "C:\\Users\\me\\000001.png", true},
+  };
+  for (const auto& [root, name, is_taken] : cases) {
+    testing::write_flat_image(folder_ / root / "000001.png", kImage, 7);
+    write(image(7, name), "");
+    const auto dataset = open(root);
+    EXPECT_EQ(dataset->labelled_frames().at(0).frame.index >= 0, is_taken) << root << ' ' << name;
+  }
+  // Of several folders any may be another video.
+  write(image(7, "a/000001.png") + "," + image(8, "b/000002.png"), "");
+  expect_refused(
+      "expected images' paths below images, got 2 folders that it has not: a, b, in "
+      "instances.json");
 }
 
 TEST_F(CocoLabels, OfALargerSetWhatIsNotThereIsNoted) {
@@ -441,7 +492,10 @@ TEST_F(CocoLabels, WhatBelongsToNothingIsCountedAndNamed) {
   write(image(1, "000001.png"), annotations);
   expect_refused("expected annotations of the file's images, got 25 of other image_ids: 100, 101");
   expect_refused("118, 119, ..., in instances.json");
-  write(image(1, "000001.png"), "", R"({"id": 1, "name": "a"}, {"id": 2, "name": "a"})");
+  write(image(1, "000001.png"),
+        R"({"id": 1, "image_id": 1, "category_id": 1, "bbox": [1, 1, 2, 2]},
+           {"id": 2, "image_id": 1, "category_id": 2, "bbox": [1, 1, 2, 2]})",
+        R"({"id": 1, "name": "a"}, {"id": 2, "name": "a"})");
   expect_refused(
       "expected each category with a name of its own, without control characters, got 1 others");
   write(image(1, "000001.png"), "", R"({"id": 1, "name": "a"}, {"id": 1, "name": "b"})");

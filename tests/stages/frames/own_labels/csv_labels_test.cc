@@ -98,6 +98,8 @@ TEST(CsvLabels, ABadRowSpoilsItsImageAlone) {
             "expected right within 1e+06 pixels, got '1e999'" + place);
   EXPECT_EQ(csv_fault("a.png,car,1,-1000001,3,4,\n"),
             "expected top within 1e+06 pixels, got '-1000001'" + place);
+  EXPECT_EQ(csv_fault("a.png,car,\"1,024\",10,\"1,100\",50,\n"),
+            "expected left within 1e+06 pixels, got '1,024'" + place);
   EXPECT_EQ(csv_fault("a.png,car,3,2,3,4,\n"), "no fault") << "it is left out";
   EXPECT_EQ(csv_fault("a.png,car,3.5,2,3,4,\n"),
             "expected left < right and top < bottom, got 3.5, 2, 3, 4" + place);

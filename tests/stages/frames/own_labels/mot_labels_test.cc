@@ -90,7 +90,7 @@ TEST(MotLabels, ABadLineSpoilsItsFrameAlone) {
   EXPECT_EQ(mot_fault("1,1,1,1,1,1,1,1,1,1,1\n"), "expected 7 to 10 columns, got 11, in gt.txt:1");
   for (const char* id : {"-2", "1.5", "", "9007199254740993"}) {
     EXPECT_EQ(mot_fault("1," + std::string(id) + ",1,1,1,1,1\n"),
-              "expected an id from 1, got '" + std::string(id) + "', in gt.txt:1");
+              "expected an id from 0, or -1, got '" + std::string(id) + "', in gt.txt:1");
   }
   EXPECT_THAT(mot_fault("1,1,nan,1,1,1,1\n"), HasSubstr("for bb_left, got 'nan'"));
   EXPECT_THAT(mot_fault("1,1,1,1e7,1,1,1\n"), HasSubstr("for bb_top, got '1e7'"));

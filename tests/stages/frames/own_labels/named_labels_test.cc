@@ -301,7 +301,7 @@ TEST_F(NamedLabels, MotsTablesOfOtherProgramsAreToldOf) {
   text("m/s/gt/labels.txt",
        "\xEF\xBB\xBF"
        "tram\ndog\n");
-  text("m/t.txt", "1,0,11,6,20,10,1,4,0,1\n");
+  text("m/t.txt", "1,0,10,5,20,10,1,4,0,1\n");
   text("m/u/gt/gt.txt", "1,1,11,6,20,10,1,3,1\n");
   const auto dataset = open(LabelFormat::kMot, "m", "m");
   EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("car", "dog", "tram"));
@@ -311,7 +311,9 @@ TEST_F(NamedLabels, MotsTablesOfOtherProgramsAreToldOf) {
               ElementsAre("1 file with the classes of labels.txt, with edges from 0 as CVAT writes "
                           "them (or as \"edges_from\" in the manifest's labels says): "
                           "m/s/gt/gt.txt",
-                          "1 file with VisDrone's classes in column 8: m/t.txt",
+                          "1 file with VisDrone's classes in column 8, with edges from 0 as the "
+                          "programs that convert VisDrone take them (or as \"edges_from\" in the "
+                          "manifest's labels says): m/t.txt",
                           "conf -1 taken for 1: 1 time, first in m/s/gt/gt.txt#1",
                           "id -1 taken for none: 1 time, first in m/s/gt/gt.txt#1"));
   for (const char* key : {"s/gt/gt.txt#1", "t.txt#1", "u/gt/gt.txt#1"}) {
@@ -323,7 +325,11 @@ TEST_F(NamedLabels, MotsTablesOfOtherProgramsAreToldOf) {
   spec.root = "m";
   spec.labels = LabelSpec{LabelFormat::kMot, "m", 1};
   const auto from_1 = open_frames_dataset(spec, folder_.path());
-  EXPECT_EQ(read(*from_1, "s/gt/gt.txt#1").boxes.at(0).xyxy, (Rectangle{9, 4, 29, 14}));
+  for (const char* key : {"s/gt/gt.txt#1", "t.txt#1"}) {
+    EXPECT_EQ(read(*from_1, key).boxes.at(0).xyxy, (Rectangle{9, 4, 29, 14})) << key;
+  }
+  EXPECT_THAT(from_1->notes(),
+              ::testing::Contains("1 file with VisDrone's classes in column 8: m/t.txt"));
 }
 
 TEST_F(NamedLabels, OneFileOfClassesMayServeSeveralMotSequences) {

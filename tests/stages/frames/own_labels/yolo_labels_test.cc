@@ -301,6 +301,8 @@ TEST_F(YoloLabels, WithoutTheClassesNamesTheseAreTheirNumbers) {
               ThrowsMessage<InputError>(HasSubstr(
                   "expected data.yaml or classes.txt with the classes' names, or boxes, got "
                   "neither, in d/labels and the folder above it")));
+  text("d/labels/1.txt", "-1e300 0.5 0.5 0.25 0.5\n1e300 0.5 0.5 0.25 0.5\n");
+  EXPECT_THROW(open("d/images", "d/labels"), InputError) << "no class's number";
   text("d/labels/1.txt", "2 0.5 0.5 0.25 0.5\n0 0.5 0.5 0.25 0.5\n");
   const auto numbered = open("d/images", "d/labels");
   EXPECT_THAT(numbered->label_schema().class_names, ElementsAre("0", "1", "2"));
