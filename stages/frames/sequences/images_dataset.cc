@@ -181,12 +181,14 @@ class ImagesDataset final : public Dataset {
                        count_text(std::ssize(folder.images.frames.frames()), "image") +
                        " in the order of their names in " + root_.written(folder.path));
     }
-    for (NamedSequence& images : named.sequences) {
-      const std::string key = spelled(fs::path(folder.name) / images.name);
-      Sequence sequence{folder.name, folder.path, images.name.empty() ? folder.name : key,
-                        std::move(images)};
+    // That of names which are numbers alone comes last: called as ROOT, it gives way to another.
+    for (auto images = named.sequences.rbegin(); images != named.sequences.rend(); ++images) {
+      const std::string key = spelled(fs::path(folder.name) / images->name);
+      Sequence sequence{folder.name, folder.path, images->name.empty() ? folder.name : key,
+                        std::move(*images)};
       const bool has_name = !sequence.key.empty() || are_stills;
-      const std::string name = has_name ? sequence.key : name_of_root(root_.written(""));
+      std::string name = has_name ? sequence.key : name_of_root(root_.written(""));
+      while (sequences_.contains(name)) name += '*';
       sequences_.emplace(name, std::move(sequence));
     }
   }

@@ -314,6 +314,17 @@ TEST_F(ImagesDatasetTest, StillsAreOfNoSequence) {
 TEST_F(ImagesDatasetTest, SaysWhereNamesTellNoSequences) {
   touch({"0f-9.png", "7b-2.png", "ff-2.png"});
   EXPECT_THAT(open()->notes(), ElementsAre("names of images tell no sequences: 3 images in the "
+TEST_F(ImagesDatasetTest, NoSequenceTakesTheNameOfAnother) {
+  touch({"000.png", "001.png", "clip_000.png", "clip_001.png"});
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_THAT(ids(), ElementsAre("000", "001", "clip_000", "clip_001"));
+  EXPECT_EQ(frames[0].sequence, "clip*");
+  EXPECT_EQ(frames[2].sequence, "clip");
+  EXPECT_EQ(dataset->paired_frame(frames[0], 1).frame.path, "clip/001.png");
+  EXPECT_EQ(dataset->paired_frame(frames[2], 1).frame.path, "clip/clip_001.png");
+}
+
                                            "order of their names in clip"));
   EXPECT_EQ(open()->labelled_frames()[0].sequence, "clip");
 }
