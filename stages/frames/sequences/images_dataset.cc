@@ -256,18 +256,26 @@ class ImagesDataset final : public Dataset {
 
   /// An absent frame's sequence is the one of its folder that its name tells.
   void name_absent() {
-    std::multimap<std::string, decltype(sequences_)::const_iterator> of_folder;
-    for (auto sequence = sequences_.cbegin(); sequence != sequences_.cend(); ++sequence) {
-      of_folder.emplace(root_.written(sequence->second.path), sequence);
+    std::map<std::string, std::string> only;                       // by folder
+    std::map<std::array<std::string, 3>, std::string> one_of_all;  // and around the number
+    for (const auto& [name, sequence] : sequences_) {
+      const std::string folder = root_.written(sequence.path);
+      const NamedSequence& images = sequence.images;
+      if (images.is_only) {
+        only.emplace(folder, name);
+      } else {
+        one_of_all.emplace(std::array{folder, images.before, images.after}, name);
+      }
     }
     for (LabelledFrame& labelled : labelled_) {
       if (labelled.frame.index != kAbsentFrame) continue;
       const fs::path path(labelled.frame.path);
-      auto [first, end] = of_folder.equal_range(path.parent_path().generic_string());
-      for (; first != end; ++first) {
-        const auto& [name, sequence] = *first->second;
-        if (sequence.images.may_have(path.stem().string())) labelled.sequence = name;
-      }
+      const std::string folder = path.parent_path().generic_string();
+      const NumberInName number = find_number(path.stem().string());
+      const auto alone = only.find(folder);
+      const auto one = one_of_all.find({folder, number.before, number.after});
+      if (alone != only.end()) labelled.sequence = alone->second;
+      if (one != one_of_all.end()) labelled.sequence = one->second;
     }
   }
 

@@ -156,6 +156,16 @@ TEST(NameSequences, TheSmallestStepOfASequenceIsOneFrame) {
       {{"a", {{1, "a_1.png"}, {2, "a_2.png"}}}, {"b", {{1, "b_1.png"}, {9, "b_9.png"}}}});
 }
 
+TEST(NameSequences, TheFoldersStepIsOfNumberedSequencesAlone) {
+  // One has a number twice, one has times a nanosecond apart.
+  expect_sequences(
+      {"img1.png", "img01.png", "b_4.png", "b_14.png", "t_1403636579763555584.png",
+       "t_1403636579763555585.png"},
+      {{"b", {{4, "b_4.png"}, {14, "b_14.png"}}, 10},
+       {"img", {{0, "img01.png"}, {1, "img1.png"}}},
+       {"t", {{0, "t_1403636579763555584.png"}, {1, "t_1403636579763555585.png"}}, 1, {0, 1e-9}}});
+}
+
 TEST(NameSequences, NamesThatTellNoneAreOneInNaturalOrder) {
   expect_sequences({"0f3c-9.png", "77ab-2.png", "ffff-2.png"},
                    {{"", {{0, "0f3c-9.png"}, {1, "77ab-2.png"}, {2, "ffff-2.png"}}}}, false);
@@ -255,6 +265,15 @@ TEST_F(ImagesDatasetTest, EveryImageIsASample) {
   EXPECT_THAT(dataset->annotation_files(), IsEmpty());
 }
 
+TEST_F(ImagesDatasetTest, AMissingFrameHasTheNameItWouldHave) {
+  touch({"a_000001_000019_leftImg8bit.png", "a_000001_000021_leftImg8bit.png",
+         "a_000002_000019_leftImg8bit.png", "a_000002_000020_leftImg8bit.png"});
+  const auto dataset = open();
+  const PairedFrame next = dataset->paired_frame(dataset->labelled_frames()[0], 1);
+  EXPECT_EQ(next.state, State::kMissing);
+  EXPECT_EQ(next.frame.path, "clip/a_000001_000020_leftImg8bit.png");
+}
+
 TEST_F(ImagesDatasetTest, TheRateGivesTheTime) {
   touch({"3.png"});
   spec_.frames_per_second = 24;
@@ -289,6 +308,17 @@ TEST_F(ImagesDatasetTest, NoPairGoesFromOneSequenceToAnother) {
   EXPECT_EQ(dataset->paired_frame(frames[3], 1).frame, (FrameRef{"clip/b_2.png", 2}));
 }
 
+TEST_F(ImagesDatasetTest, NoSequenceTakesTheNameOfAnother) {
+  touch({"000.png", "001.png", "clip_000.png", "clip_001.png"});
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_THAT(ids(), ElementsAre("000", "001", "clip_000", "clip_001"));
+  EXPECT_EQ(frames[0].sequence, "clip*");
+  EXPECT_EQ(frames[2].sequence, "clip");
+  EXPECT_EQ(dataset->paired_frame(frames[0], 1).frame.path, "clip/001.png");
+  EXPECT_EQ(dataset->paired_frame(frames[2], 1).frame.path, "clip/clip_001.png");
+}
+
 TEST_F(ImagesDatasetTest, TheOnlySequenceIsCalledAsItsFolder) {
   touch({"highway/images/1.png", "highway/images/2.png"});
   const auto sequence = [&](const std::string& root) {
@@ -314,17 +344,6 @@ TEST_F(ImagesDatasetTest, StillsAreOfNoSequence) {
 TEST_F(ImagesDatasetTest, SaysWhereNamesTellNoSequences) {
   touch({"0f-9.png", "7b-2.png", "ff-2.png"});
   EXPECT_THAT(open()->notes(), ElementsAre("names of images tell no sequences: 3 images in the "
-TEST_F(ImagesDatasetTest, NoSequenceTakesTheNameOfAnother) {
-  touch({"000.png", "001.png", "clip_000.png", "clip_001.png"});
-  const auto dataset = open();
-  const auto& frames = dataset->labelled_frames();
-  ASSERT_THAT(ids(), ElementsAre("000", "001", "clip_000", "clip_001"));
-  EXPECT_EQ(frames[0].sequence, "clip*");
-  EXPECT_EQ(frames[2].sequence, "clip");
-  EXPECT_EQ(dataset->paired_frame(frames[0], 1).frame.path, "clip/001.png");
-  EXPECT_EQ(dataset->paired_frame(frames[2], 1).frame.path, "clip/clip_001.png");
-}
-
                                            "order of their names in clip"));
   EXPECT_EQ(open()->labelled_frames()[0].sequence, "clip");
 }

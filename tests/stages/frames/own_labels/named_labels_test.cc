@@ -360,6 +360,24 @@ TEST_F(NamedLabels, MotsLengthAloneIsEnough) {
   EXPECT_EQ(read(*dataset, "s/gt/gt.txt#1").boxes.size(), 1u);
 }
 
+TEST_F(NamedLabels, AnAbsentImageIsOfTheSequenceThatItsNameTells) {
+  for (const char* name : {"a_1", "a_2", "b_1", "b_2", "c"}) {
+    image("i/" + std::string(name) + ".png");
+  }
+  const std::string box = ",cat,0,1,2,3\n";
+  text("t.csv", "image,class,left,top,right,bottom\na_1.png" + box + "a_9.png" + box + "b_7.png" +
+                    box + "c.png" + box + "d_1.png" + box);
+  std::map<std::string, std::string> sequences;
+  const auto dataset = open(LabelFormat::kCsv, "i", "t.csv");
+  for (const LabelledFrame& frame : dataset->labelled_frames()) {
+    sequences[frame.sample_id] = frame.sequence;
+  }
+  EXPECT_EQ(sequences["a_1"], "a");
+  EXPECT_EQ(sequences["a_9"], "a");
+  EXPECT_EQ(sequences["b_7"], "b");
+  EXPECT_EQ(sequences["c"], "c");
+}
+
 TEST_F(NamedLabels, ATableNamesItsImages) {
   image("i/a/1.png");
   image("i/a/2.png");
