@@ -170,11 +170,12 @@ class ImagesDataset final : public Dataset {
 
   /// Stills are no sequence, whatever their names: those right in ROOT have none.
   void add_sequences(const ListedFolder& folder, bool are_stills) {
-    NamedSequences named;
-    if (are_stills && !folder.images.frames.empty()) {
+    NamedSequences named = name_sequences(folder.images.frames);
+    if (are_stills && !named.sequences.empty()) {
+      const bool is_numbered = named.sequences.size() == 1 && named.sequences[0].is_numbered;
+      named = {};
       named.sequences.emplace_back().frames = folder.images.frames;
-    } else {
-      named = name_sequences(folder.images.frames);
+      named.sequences[0].is_numbered = is_numbered;
     }
     if (!named.are_told) {
       notes_.push_back("names of images tell no sequences: " +
@@ -234,7 +235,8 @@ class ImagesDataset final : public Dataset {
     for (auto sequence = sequences_.cbegin(); sequence != sequences_.cend(); ++sequence) {
       const auto& [path, key] = std::tie(sequence->second.path, sequence->second.key);
       for (const auto& [number, name] : sequence->second.images.frames.frames()) {
-        source.frames.push_back({spelled(fs::path(path) / name), key, number, std::nullopt});
+        source.frames.push_back({spelled(fs::path(path) / name), key, number, std::nullopt,
+                                 sequence->second.images.is_numbered});
         sequence_of.push_back(sequence);
       }
     }

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
 #include <string>
 
 #include "stages/frames/sequences/frames_dataset.h"
@@ -290,6 +291,15 @@ TEST_F(NamedLabels, MotOfImagesWithoutNumbersNeedsAllOfThem) {
   for (const char* name : {"00", "01", "04"}) image("n/" + std::string(name) + ".png");
   text("n/gt.txt", "5,1,1,1,5,5,1\n");
   EXPECT_EQ(open(LabelFormat::kMot, "n", "n")->labelled_frames().at(0).frame.path, "n/04.png");
+  // As may those that other text follows; the absent frame is called as they are.
+  for (const char* name : {"00_rgb", "01_rgb", "03_rgb"}) image("o/" + std::string(name) + ".png");
+  text("o/gt.txt", "1,1,1,1,5,5,1\n3,1,1,1,5,5,1\n4,1,1,1,5,5,1\n");
+  const auto named = open(LabelFormat::kMot, "o", "o");
+  ASSERT_EQ(named->labelled_frames().size(), 3u);
+  EXPECT_EQ(named->labelled_frames()[0].frame.path, "o/00_rgb.png");
+  EXPECT_EQ(named->labelled_frames()[1].frame.path, "o/02_rgb.png");
+  EXPECT_EQ(named->labelled_frames()[1].frame.index, -1);
+  EXPECT_EQ(named->labelled_frames()[2].frame.path, "o/03_rgb.png");
   text("n/gone/gt/gt.txt", "1,1,1,1,5,5,1\n");
   EXPECT_THAT(open(LabelFormat::kMot, "n", "n")->notes(),
               ::testing::Contains("1 sequence of labels without images left out in n: gone"));
