@@ -421,6 +421,23 @@ TEST_F(NamedLabels, ATableNamesItsImages) {
   EXPECT_EQ(absent->paired_frame(absent->labelled_frames()[0], 0).frame.path, "i/1.png");
 }
 
+TEST_F(NamedLabels, NumbersThatMayCountFrom1AreWarnedOf) {
+  for (const char* name : {"000000", "000001", "000002"}) {
+    image("i/" + std::string(name) + ".png");
+  }
+  const std::string header = "image,class,left,top,right,bottom\n", box = ",cat,0,1,2,3\n";
+  text("t.csv", header + "1" + box + "2" + box + "3" + box);
+  EXPECT_THAT(
+      open(LabelFormat::kCsv, "i", "t.csv")->warnings(),
+      ElementsAre("images are named by their numbers in t.csv (1 for 000001.png), and 000000.png "
+                  "has no label: if the file counts from 1, all labels are one image late; name "
+                  "the images by their file names then"));
+  text("t.csv", header + "0" + box + "2" + box);
+  EXPECT_THAT(open(LabelFormat::kCsv, "i", "t.csv")->warnings(), IsEmpty());
+  text("t.csv", header + "000001.png" + box);
+  EXPECT_THAT(open(LabelFormat::kCsv, "i", "t.csv")->warnings(), IsEmpty());
+}
+
 TEST_F(NamedLabels, OfVideosTheFrameNumberStandsForTheImage) {
   text("v/other.json", R"({"1": "beside the video"})");
   testing::write_counting_video(folder_ / "v/clip.avi", 6);
