@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "stages/frames/sequences/image_folder.h"
+#include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -213,7 +215,11 @@ TEST(OpenFramesDataset, OpensFoldersAndRefusesWhatIsNeitherFolderNorVideo) {
   spec.root = "clip";
   EXPECT_EQ(open_frames_dataset(spec, folder.path())->labelled_frames().size(), 1u);
   for (const auto& [root, got] :
-       {std::pair("notes.txt", "got something else, in "), std::pair("absent", "got nothing, in "),
+       {std::pair("notes.txt",
+                  "expected a video (mp4, avi, mov, mkv, webm, m4v, mpg, mpeg, ts, "
+                  "mts, wmv, flv, gif), a folder of images, of such folders, or of "
+                  "videos, got something else, in "),
+        std::pair("absent", "got nothing, in "),
         std::pair("notes.txt/absent.mp4", "got nothing, in ")}) {
     spec.root = root;
     EXPECT_THAT([&] { open_frames_dataset(spec, folder.path()); },
@@ -333,6 +339,23 @@ TEST_F(ImagesDatasetTest, TheOnlySequenceIsCalledAsItsFolder) {
   EXPECT_EQ(
       open_images_dataset(spec_, folder_ / "clip/highway/images")->labelled_frames()[0].sequence,
       "frames");
+}
+
+TEST_F(ImagesDatasetTest, ImagesMayHaveLessUsualExtensions) {
+  testing::write_flat_image(folder_ / "clip/1.png", ImageSize{6, 8}, 9);
+  testing::write_file(folder_ / "clip/4.ppm", "P6\n8 6\n255\n" + std::string(3 * 6 * 8, 'x'));
+  for (const auto& [format, name] : {std::pair("jpg", "2.jfif"), std::pair("jpg", "3.MPO")}) {
+    const fs::path written = folder_ / (std::string("image.") + format);
+    testing::write_flat_image(written, ImageSize{6, 8}, 9);
+    fs::rename(written, folder_ / "clip" / name);
+  }
+  EXPECT_THAT(ids(), ElementsAre("1", "2", "3", "4"));
+  const auto dataset = open();
+  for (const LabelledFrame& labelled : dataset->labelled_frames()) {
+    const auto size = probe_image_size(folder_ / labelled.frame.path, ImageOrientation::kUpright);
+    ASSERT_FALSE(is_fault(size)) << size.fault().reason;
+    EXPECT_EQ(*size, (ImageSize{6, 8})) << labelled.frame.path;
+  }
 }
 
 TEST_F(ImagesDatasetTest, StillsAreOfNoSequence) {
