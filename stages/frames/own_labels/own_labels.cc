@@ -1,7 +1,6 @@
 #include "stages/frames/own_labels/own_labels.h"
 
 #include <algorithm>
-#include <map>
 #include <stdexcept>
 #include <utility>
 
@@ -76,7 +75,7 @@ void OwnLabels::give_named(const std::vector<NamedLabel>& named, const std::stri
   std::vector<bool> is_named(labels_.size());
   for (std::size_t i = 0; i < labels_.size(); ++i) is_named[i] = !labels_[i].key.empty();
   std::vector<std::string> others;
-  std::map<std::string, std::string> by_number;  // one of `others` by its sequence
+  std::unordered_map<std::string, std::string> by_number;  // one of `others` by its sequence
   for (const auto& [match, label] : near) {
     // Another's, where the frame has its own name in the file, or others have their folders there.
     if (is_named[match.frame] || (any_exact && match.drops_folders)) {
