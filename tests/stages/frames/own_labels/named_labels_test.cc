@@ -131,6 +131,7 @@ TEST_F(NamedLabels, OneEdgeAt0TellsThatVocsCountFrom0) {
     SourceSpec spec;
     spec.root = "i";
     spec.labels = LabelSpec{LabelFormat::kVoc, "x", one.edges_from};
+    spec.pairs.stills.emplace();
     const auto dataset = open_frames_dataset(spec, folder_.path());
     const double from = 10 - one.left;
     EXPECT_EQ(read(*dataset, "a.xml").boxes.at(0).xyxy, (Rectangle{one.left, 7 - from, 40, 20}));
@@ -152,7 +153,7 @@ TEST_F(NamedLabels, WhatVocHasBesideItsFormatIsANote) {
   text("x/c.xml", cat("50", "5", "60", mark + "<truncated>0.25</truncated>"));
   const auto dataset = open(LabelFormat::kVoc, "i", "x");
   EXPECT_THAT(dataset->notes(),
-              ElementsAre(HasSubstr("edges count from 1"),
+              ElementsAre(HasSubstr("tell no sequences"), HasSubstr("edges count from 1"),
                           "<difficult> that is no 0 or 1 taken for unknown: 3 times, first in "
                           "x/a.xml"));
   EXPECT_THAT(read(*dataset, "c.xml").boxes, IsEmpty());
