@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <limits>
 #include <map>
 #include <optional>
 
@@ -46,7 +47,84 @@ std::optional<ParsedName> parse_name(std::string_view name, std::string_view pre
   return std::nullopt;
 }
 
+bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+
+std::optional<std::int64_t> parse_digits(std::string_view digits) {
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  return error == std::errc() ? std::optional(value) : std::nullopt;
+}
+
+/// The time that a number without leading zeros is by its digits; -1 if it is none.
+std::int64_t time_of_digits(std::string_view digits, std::int64_t number) {
+  if (digits.front() == '0') return -1;
+  const auto in_units_of = [&](std::int64_t unit_ns) {
+    return number <= std::numeric_limits<std::int64_t>::max() / unit_ns ? number * unit_ns : -1;
+  };
+  switch (digits.size()) {
+    case 13:
+      return in_units_of(1'000'000);
+    case 15:
+    case 16:
+      return in_units_of(1'000);
+    case 18:
+    case 19:
+      return number;
+    default:
+      return -1;
+  }
+}
+
 }  // namespace
+
+NumberInName find_number(std::string_view stem) {
+  constexpr std::string_view kDigits = "0123456789";
+  constexpr std::size_t kSecondsDigits = 9, kNanosecondsDigits = 9;
+  NumberInName found;
+  found.before = stem;
+  stem = stem.substr(0, stem.rfind(".rf."));
+  const std::size_t last = stem.find_last_of(kDigits);
+  if (last == std::string_view::npos) return found;
+  std::size_t end = last;  // of the number's last digit
+  while (end != std::string_view::npos && end + 1 < stem.size() && is_letter(stem[end + 1])) {
+    const std::size_t before = stem.find_last_not_of(kDigits, end);
+    end = before == std::string_view::npos ? before : stem.find_last_of(kDigits, before);
+  }
+  if (end == std::string_view::npos) end = last;
+  const auto begin_of_run = [&](std::size_t run_end) {
+    const std::size_t before = stem.find_last_not_of(kDigits, run_end);
+    return before == std::string_view::npos ? 0 : before + 1;
+  };
+  std::size_t begin = begin_of_run(end);
+  const std::string digits(stem.substr(begin, end + 1 - begin));
+  const auto number = parse_digits(digits);
+  if (!number) return found;
+  found.number = *number;
+  found.time_ns = time_of_digits(digits, *number);
+  if (begin >= 2 && stem[begin - 1] == '.' && is_digit(stem[begin - 2])) {
+    const std::size_t whole = begin_of_run(begin - 2);
+    const std::string seconds(stem.substr(whole, begin - 1 - whole));
+    if ((seconds.size() == kSecondsDigits || seconds.size() == kSecondsDigits + 1) &&
+        seconds.front() != '0' && digits.size() <= kNanosecondsDigits) {
+      const std::string zeros(kNanosecondsDigits - digits.size(), '0');
+      if (const auto time_ns = parse_digits(seconds + digits + zeros)) {
+        found.time_ns = found.number = *time_ns;
+        begin = whole;
+      }
+    }
+  }
+  found.before = stem.substr(0, begin);
+  found.digits = stem.substr(begin, end + 1 - begin);
+  found.after = stem.substr(end + 1);
+  return found;
+}
+
+std::string renumbered(const std::string& name, std::int64_t number) {
+  const std::filesystem::path path(name);
+  const NumberInName old = find_number(path.stem().string());
+  return fmt::format("{}{:0{}}{}{}", old.before, number, old.digits.size(), old.after,
+                     path.extension().string());
+}
 
 NumberedSequence::NumberedSequence(std::vector<Frame> frames, Stride stride)
     : frames_(std::move(frames)) {
@@ -138,13 +216,7 @@ NumberedSequence::Place NumberedSequence::at(std::int64_t number, int steps) con
 
 std::string NumberedSequence::name_for(std::int64_t number) const {
   if (frames_.empty() || number < 0) return {};
-  // The first frame's name with its digits replaced: the last run of them before the extension.
-  const std::string& like = frames_.front().second;
-  std::size_t end = like.rfind('.');
-  if (end == std::string::npos) end = like.size();
-  std::size_t begin = end;
-  while (begin > 0 && is_digit(like[begin - 1])) --begin;
-  return fmt::format("{}{:0{}}{}", like.substr(0, begin), number, end - begin, like.substr(end));
+  return renumbered(frames_.front().second, number);
 }
 
 }  // namespace eventgan

@@ -20,6 +20,26 @@ inline const std::vector<std::string_view> kImageExtensions = {
     ".png",  ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp",
     ".jfif", ".mpo", ".ppm",  ".pgm", ".pbm", ".pnm"};
 
+/// An image's name, without extension, about its number.
+struct NumberInName {
+  std::string before;  ///< all of it, if it has no number
+  std::string digits;  ///< empty: no number
+  std::string after;   ///< without what Roboflow appends
+  std::int64_t number = 0;
+  std::int64_t time_ns = -1;  ///< -1: the number is no time
+};
+
+/// The number is the last run of digits that no letter follows ("aachen_000000_000019_leftImg8bit"
+/// has 19), or the last run if a letter follows each, before what Roboflow appends (".rf.HASH").
+/// One that is a time is of seconds with decimals ("315971930.123456") or, of so many digits, of
+/// milliseconds (13), microseconds (15, 16) or nanoseconds (18, 19) since some epoch; `number` is
+/// `time_ns` then if there are decimals. What is 2^63 or more is no number and no time.
+NumberInName find_number(std::string_view stem);
+
+/// The name of an image with another number, of as many digits at least: "a_0012_l.png" for 12 of
+/// "a_0003_l.png". A name without number gets it at its end.
+std::string renumbered(const std::string& name, std::int64_t number);
+
 /// A folder of frames whose names end in their number: "img_000006.jpg" is frame 6. Listed once;
 /// after that no question goes to the disk. A value; reading it from several threads is safe.
 class NumberedSequence {

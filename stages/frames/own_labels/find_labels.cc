@@ -110,11 +110,12 @@ FrameNames& names_of(const FoundFrames& frames) {
 bool is_of_video(const FoundFrames& frames, const std::string& name) {
   const fs::path path(video_frame_name(name));
   if (frames.stems.contains(path.parent_path().filename().string())) return true;
-  const std::string stem = fs::path(name).stem().string();
-  const std::size_t mark = stem.find_last_not_of("0123456789");
-  if (mark == std::string::npos) return frames.stems.size() == 1 && !stem.empty();
-  return mark + 1 < stem.size() && (frames.stems.contains(stem.substr(0, mark)) ||
-                                    (stem.starts_with("frame") && frames.stems.size() == 1));
+  const NumberInName number = find_number(fs::path(name).stem().string());
+  const std::string& before = number.before;
+  if (number.digits.empty() || !number.after.empty()) return false;
+  const bool may_be_any = before.empty() || before.starts_with("frame");
+  return (may_be_any && frames.stems.size() == 1) ||
+         (!before.empty() && frames.stems.contains(before.substr(0, before.size() - 1)));
 }
 
 }  // namespace

@@ -129,13 +129,11 @@ void add(std::unordered_map<std::string, std::size_t>& places, const std::string
   if (!is_new && place->second != frame) place->second = FrameNames::kSeveral;
 }
 
-/// "FOLDER/#12" of "FOLDER/in000012.png"; none if no number ends the name.
+/// "FOLDER/#12" of "FOLDER/in000012.png"; none if the name has no number.
 std::optional<std::string> numbered_name(const fs::path& name) {
-  const std::string stem = name.stem().string();
-  std::string number = stem.substr(stem.find_last_not_of("0123456789") + 1);
-  if (number.empty()) return std::nullopt;
-  number.erase(0, std::min(number.find_first_not_of('0'), number.size() - 1));
-  return (name.parent_path() / ("#" + number)).generic_string();
+  const NumberInName found = find_number(name.stem().string());
+  if (found.digits.empty()) return std::nullopt;
+  return (name.parent_path() / ("#" + std::to_string(found.number))).generic_string();
 }
 
 }  // namespace
@@ -267,12 +265,11 @@ FrameNames::Match FrameNames::find_near_in_video(const std::vector<std::string>&
     const std::size_t frame = look_up(joined_from(parts, dropped));
     if (frame != kNone) return {frame, {}, /*is_near=*/true};
   }
-  const std::string stem = fs::path(parts.back()).stem().string();
-  const std::size_t mark = stem.find_last_not_of("0123456789");
-  if (mark == std::string::npos || mark + 1 == stem.size()) return {};
-  const std::string number = stem.substr(mark + 1);
-  std::size_t frame = look_up(stem.substr(0, mark) + "/" + number);
-  if (frame == kNone && stem.starts_with("frame")) frame = look_up(number);  // of the only video
+  const auto [stem, digits, after, number, time] =
+      find_number(fs::path(parts.back()).stem().string());
+  if (stem.empty() || digits.empty() || !after.empty()) return {};
+  std::size_t frame = look_up(stem.substr(0, stem.size() - 1) + "/" + digits);
+  if (frame == kNone && stem.starts_with("frame")) frame = look_up(digits);  // of the only video
   return {frame, {}, /*is_near=*/frame < kSeveral};
 }
 

@@ -14,6 +14,7 @@
 #include "manifests/values/text.h"
 #include "stages/base/files/csv_records.h"
 #include "stages/frames/kitti/kitti_label.h"
+#include "stages/frames/numbered_sequence.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
 #include "stages/frames/own_labels/detail/yolo_text.h"
@@ -357,14 +358,7 @@ class MotLabels : public ReadLabels {
   /// behind it.
   void require_all(const Frames& frames, const std::optional<MotSequence>& info,
                    std::int64_t last_number, const std::string& path) const {
-    const auto tells_number = [&](const auto& frame) {
-      const std::string stem =
-          std::filesystem::path(source().frames[frame.second].name).stem().string();
-      std::string digits = stem.substr(stem.find_last_not_of("0123456789") + 1);
-      digits.erase(0, std::min(digits.find_first_not_of('0'), digits.size() - 1));
-      return digits == std::to_string(frame.first);
-    };
-    if (source().is_video || std::ranges::all_of(frames, tells_number)) return;
+    if (source().is_video || source().frames[frames.begin()->second].is_numbered) return;
     const std::int64_t count = std::ssize(frames);
     const auto length = info ? info->length : std::nullopt;
     if (length ? count == *length : count >= last_number) return;
@@ -403,9 +397,12 @@ class MotLabels : public ReadLabels {
       if (frame != frames.end()) {
         give(frame->second, key);
       } else {
-        const std::filesystem::path other(source().frames[frames.begin()->second].name);
-        const std::string name =
-            fmt::format("{:06}{}", from_0 ? number - 1 : number, other.extension().string());
+        const SourceFrame& first_frame = source().frames[frames.begin()->second];
+        const std::filesystem::path other(first_frame.name);
+        const std::int64_t absent = from_0 ? number - 1 : number;
+        const std::string name = first_frame.is_numbered && !source().is_video
+                                     ? renumbered(other.filename().string(), absent)
+                                     : fmt::format("{:06}{}", absent, other.extension().string());
         give_absent((other.parent_path() / name).generic_string(), key);
       }
     }

@@ -7,6 +7,7 @@
 
 #include "manifests/values/text.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/numbered_sequence.h"
 #include "stages/frames/own_labels/detail/frame_names.h"
 
 namespace eventgan {
@@ -82,6 +83,7 @@ void OwnLabels::give_named(const std::vector<NamedLabel>& named, const std::stri
   std::vector<bool> is_named(labels_.size());
   for (std::size_t i = 0; i < labels_.size(); ++i) is_named[i] = !labels_[i].key.empty();
   std::vector<std::string> others;
+  std::unordered_map<std::string, std::string> by_number;  // one of `others` by its sequence
   for (const auto& [match, label] : near) {
     // Another's, where the frame has its own name in the file, or others have their folders there.
     if (is_named[match.frame] || (any_exact && !match.dropped.empty())) {
@@ -89,7 +91,20 @@ void OwnLabels::give_named(const std::vector<NamedLabel>& named, const std::stri
       continue;
     }
     give(match.frame, label->key);
-    others.push_back(label->image + " for " + source_.frames[match.frame].name);
+    const SourceFrame& frame = source_.frames[match.frame];
+    others.push_back(label->image + " for " + frame.name);
+    const std::string bare = label->image.substr(label->image.rfind('/') + 1);
+    if (std::ranges::all_of(bare, is_digit)) by_number.emplace(frame.sequence, others.back());
+  }
+  for (std::size_t i = 0; i < labels_.size(); ++i) {  // as where the file counts from 1
+    const SourceFrame& frame = source_.frames[i];
+    const auto other = by_number.find(frame.sequence);
+    if (frame.number != 0 || !labels_[i].key.empty() || other == by_number.end()) continue;
+    warnings_.push_back("images are named by their numbers in " + labels_path + " (" +
+                        other->second + "), and " + frame.name +
+                        " has no label: if the file counts from 1, all labels are one image late; "
+                        "name the images by their file names then");
+    break;
   }
   if (!others.empty()) {
     notes_.push_back(count_text(std::ssize(others), "image", " named otherwise in " + labels_path) +

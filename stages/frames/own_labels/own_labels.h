@@ -31,6 +31,7 @@ struct SourceFrame {
   std::string sequence;
   std::int64_t number = 0;        ///< FrameRef::index
   std::optional<ImageSize> size;  ///< of a video's frames; an image is asked when it is needed
+  bool is_numbered = true;        ///< the name has the number; else images are counted from 0
 };
 
 /// What a source is that has labels of its own.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <string>
+#include <string_view>
 
 #include "manifests/values/faults.h"
 #include "stages/frames/dataset_kinds.h"
@@ -26,11 +27,14 @@ std::unique_ptr<Dataset> open_frames_dataset(const SourceSpec& spec,
   if (std::filesystem::is_regular_file(status) && is_video_name(root)) {
     return open_videos_dataset(spec, base);
   }
-  throw InputError(
-      "expected a video (mp4, avi, mov, mkv), a folder of images, of such folders, or of "
-      "videos, got " +
-      std::string(std::filesystem::exists(status) ? "something else" : "nothing") + ", in " +
-      root.string());
+  std::string videos;
+  for (const std::string_view extension : kVideoExtensions) {
+    videos += (videos.empty() ? "" : ", ") + std::string(extension.substr(1));
+  }
+  throw InputError("expected a video (" + videos +
+                   "), a folder of images, of such folders, or of videos, got " +
+                   std::string(std::filesystem::exists(status) ? "something else" : "nothing") +
+                   ", in " + root.string());
 }
 
 namespace {

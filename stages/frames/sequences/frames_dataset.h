@@ -1,11 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "manifests/values/job.h"
 #include "stages/frames/dataset.h"
@@ -17,7 +19,7 @@ namespace eventgan {
 ///     one is named as the folder. sample_id is the file name without extension;
 ///   a folder of such folders, perhaps two deep: each a sequence, or as many as its names tell;
 ///     sample_id is "FOLDER/NAME"; with MOT's labels the images may lie in FOLDER/img1;
-///   a video (mp4, avi, mov, mkv): one sequence named as the file without extension; sample_id is
+///   a video (is_video_name): one sequence named as the file without extension; sample_id is
 ///     "NAME/000012", counted from 0;
 ///   a folder of videos: each a sequence. One that cannot be read is left out, with a note.
 /// How images are numbered, NamedSequence says. Images that are taken as stills are sequences by
@@ -62,7 +64,12 @@ using VideoLabels = std::map<std::int64_t, std::string>;
 std::optional<VideoLabels> read_video_labels(const std::filesystem::path& file,
                                              const std::string& video);
 
-/// True for mp4, avi, mov and mkv, in small or capital letters.
+/// Of videos of one name in a folder, that of the earliest counts.
+inline constexpr auto kVideoExtensions =
+    std::to_array<std::string_view>({".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg",
+                                     ".mpeg", ".ts", ".mts", ".wmv", ".flv", ".gif"});
+
+/// True for a name with one of these, in small or capital letters.
 bool is_video_name(const std::filesystem::path& file);
 
 /// open_frames_dataset for a video or a folder of them. Without SourceSpec::labels the label_key is

@@ -20,8 +20,8 @@ bool natural_less(std::string_view a, std::string_view b);
 
 /// What lies in a folder of images with any names.
 struct ImageFolder {
-  /// If all names are one prefix and then digits, each image has its number, and a missing number
-  /// is a missing frame. Otherwise they are counted from 0 in natural order.
+  /// If all names are alike but for their number (find_number), each image has it, and a missing
+  /// number is a missing frame. Otherwise they are counted from 0 in natural order.
   NumberedSequence frames;
   /// The .json files (also .JSON) beside them: name without extension to name. Of two that differ
   /// only in the extension's letters, the first by name counts.
@@ -48,9 +48,7 @@ struct NamedSequence {
   std::vector<double> times_s;
   std::string before, after;  ///< all that the names say around the number
   bool is_only = true;        ///< in its folder
-
-  /// Whether an image of this name, without extension, would be of the sequence.
-  bool may_have(const std::string& stem) const;
+  bool is_numbered = false;   ///< by its names; else its frames are counted from 0
 };
 
 struct NamedSequences {
@@ -60,16 +58,12 @@ struct NamedSequences {
   bool are_told = true;
 };
 
-/// Divides the images of a folder by their names. The number is the last run of digits that no
-/// letter follows ("aachen_000000_000019_leftImg8bit" is frame 19 of "aachen_000000"), after what
-/// Roboflow appends (".rf.HASH"); names that are alike but for it are of one sequence. One step is
-/// the smallest difference of two numbers in a sequence; of a sequence of two frames, in the
-/// folder.
+/// Divides the images of a folder by their names: those that are alike but for their number
+/// (find_number) are of one sequence. One step is the smallest difference of two numbers in a
+/// sequence; of a sequence of two frames, in the folder.
 ///
-/// A number that is a time is one of seconds with decimals ("315971930.123456") or, of so many
-/// digits, of milliseconds (13), microseconds (15, 16) or nanoseconds (18, 19) since some epoch: no
-/// frame is missing between two of them. Numbers of which a sequence has one twice, and longer ones
-/// than 11 digits that are no times, count in their order.
+/// No frame is missing between two numbers that are times. Numbers of which a sequence has one
+/// twice, and longer ones than 11 digits that are no times, count in their order.
 ///
 /// `images` are those of an ImageFolder.
 NamedSequences name_sequences(const NumberedSequence& images);

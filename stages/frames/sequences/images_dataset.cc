@@ -173,23 +173,26 @@ class ImagesDataset final : public Dataset {
 
   /// Stills are no sequence, whatever their names: those right in ROOT have none.
   void add_sequences(const ListedFolder& folder, bool are_stills) {
-    NamedSequences named;
-    if (are_stills && !folder.images.frames.empty()) {
+    NamedSequences named = name_sequences(folder.images.frames);
+    if (are_stills && !named.sequences.empty()) {
+      const bool is_numbered = named.sequences.size() == 1 && named.sequences[0].is_numbered;
+      named = {};
       named.sequences.emplace_back().frames = folder.images.frames;
-    } else {
-      named = name_sequences(folder.images.frames);
+      named.sequences[0].is_numbered = is_numbered;
     }
     if (!named.are_told) {
       notes_.push_back("names of images tell no sequences: " +
                        count_text(std::ssize(folder.images.frames.frames()), "image") +
                        " in the order of their names in " + root_.written(folder.path));
     }
-    for (NamedSequence& images : named.sequences) {
-      const std::string key = spelled(fs::path(folder.name) / images.name);
-      Sequence sequence{folder.name, folder.path, images.name.empty() ? folder.name : key,
-                        std::move(images)};
+    // That of names which are numbers alone comes last: called as ROOT, it gives way to another.
+    for (auto images = named.sequences.rbegin(); images != named.sequences.rend(); ++images) {
+      const std::string key = spelled(fs::path(folder.name) / images->name);
+      Sequence sequence{folder.name, folder.path, images->name.empty() ? folder.name : key,
+                        std::move(*images)};
       const bool has_name = !sequence.key.empty() || are_stills;
-      const std::string name = has_name ? sequence.key : name_of_root(root_.written(""));
+      std::string name = has_name ? sequence.key : name_of_root(root_.written(""));
+      while (sequences_.contains(name)) name += '*';
       sequences_.emplace(name, std::move(sequence));
     }
   }
@@ -235,7 +238,8 @@ class ImagesDataset final : public Dataset {
     for (auto sequence = sequences_.cbegin(); sequence != sequences_.cend(); ++sequence) {
       const auto& [path, key] = std::tie(sequence->second.path, sequence->second.key);
       for (const auto& [number, name] : sequence->second.images.frames.frames()) {
-        source.frames.push_back({spelled(fs::path(path) / name), key, number, std::nullopt});
+        source.frames.push_back({spelled(fs::path(path) / name), key, number, std::nullopt,
+                                 sequence->second.images.is_numbered});
         sequence_of.push_back(sequence);
       }
     }
@@ -257,18 +261,26 @@ class ImagesDataset final : public Dataset {
 
   /// An absent frame's sequence is the one of its folder that its name tells.
   void name_absent() {
-    std::multimap<std::string, decltype(sequences_)::const_iterator> of_folder;
-    for (auto sequence = sequences_.cbegin(); sequence != sequences_.cend(); ++sequence) {
-      of_folder.emplace(root_.written(sequence->second.path), sequence);
+    std::map<std::string, std::string> only;                       // by folder
+    std::map<std::array<std::string, 3>, std::string> one_of_all;  // and around the number
+    for (const auto& [name, sequence] : sequences_) {
+      const std::string folder = root_.written(sequence.path);
+      const NamedSequence& images = sequence.images;
+      if (images.is_only) {
+        only.emplace(folder, name);
+      } else {
+        one_of_all.emplace(std::array{folder, images.before, images.after}, name);
+      }
     }
     for (LabelledFrame& labelled : labelled_) {
       if (labelled.frame.index != kAbsentFrame) continue;
       const fs::path path(labelled.frame.path);
-      auto [first, end] = of_folder.equal_range(path.parent_path().generic_string());
-      for (; first != end; ++first) {
-        const auto& [name, sequence] = *first->second;
-        if (sequence.images.may_have(path.stem().string())) labelled.sequence = name;
-      }
+      const std::string folder = path.parent_path().generic_string();
+      const NumberInName number = find_number(path.stem().string());
+      const auto alone = only.find(folder);
+      const auto one = one_of_all.find({folder, number.before, number.after});
+      if (alone != only.end()) labelled.sequence = alone->second;
+      if (one != one_of_all.end()) labelled.sequence = one->second;
     }
   }
 

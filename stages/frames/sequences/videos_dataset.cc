@@ -1,7 +1,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cstdint>
 #include <iterator>
@@ -64,10 +63,6 @@ std::optional<VideoLabels> read_video_labels(const std::filesystem::path& file,
 }
 
 namespace {
-
-constexpr auto kVideoExtensions =
-    std::to_array<std::string_view>({".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg",
-                                     ".mpeg", ".ts", ".mts", ".wmv", ".flv", ".gif"});
 
 /// The place of the extension in kVideoExtensions; their number if it is none of them.
 std::size_t video_rank(const fs::path& file) {

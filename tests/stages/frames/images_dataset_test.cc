@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "stages/frames/sequences/image_folder.h"
+#include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -156,6 +158,16 @@ TEST(NameSequences, TheSmallestStepOfASequenceIsOneFrame) {
       {{"a", {{1, "a_1.png"}, {2, "a_2.png"}}}, {"b", {{1, "b_1.png"}, {9, "b_9.png"}}}});
 }
 
+TEST(NameSequences, TheFoldersStepIsOfNumberedSequencesAlone) {
+  // One has a number twice, one has times a nanosecond apart.
+  expect_sequences(
+      {"img1.png", "img01.png", "b_4.png", "b_14.png", "t_1403636579763555584.png",
+       "t_1403636579763555585.png"},
+      {{"b", {{4, "b_4.png"}, {14, "b_14.png"}}, 10},
+       {"img", {{0, "img01.png"}, {1, "img1.png"}}},
+       {"t", {{0, "t_1403636579763555584.png"}, {1, "t_1403636579763555585.png"}}, 1, {0, 1e-9}}});
+}
+
 TEST(NameSequences, NamesThatTellNoneAreOneInNaturalOrder) {
   expect_sequences({"0f3c-9.png", "77ab-2.png", "ffff-2.png"},
                    {{"", {{0, "0f3c-9.png"}, {1, "77ab-2.png"}, {2, "ffff-2.png"}}}}, false);
@@ -203,7 +215,11 @@ TEST(OpenFramesDataset, OpensFoldersAndRefusesWhatIsNeitherFolderNorVideo) {
   spec.root = "clip";
   EXPECT_EQ(open_frames_dataset(spec, folder.path())->labelled_frames().size(), 1u);
   for (const auto& [root, got] :
-       {std::pair("notes.txt", "got something else, in "), std::pair("absent", "got nothing, in "),
+       {std::pair("notes.txt",
+                  "expected a video (mp4, avi, mov, mkv, webm, m4v, mpg, mpeg, ts, "
+                  "mts, wmv, flv, gif), a folder of images, of such folders, or of "
+                  "videos, got something else, in "),
+        std::pair("absent", "got nothing, in "),
         std::pair("notes.txt/absent.mp4", "got nothing, in ")}) {
     spec.root = root;
     EXPECT_THAT([&] { open_frames_dataset(spec, folder.path()); },
@@ -255,6 +271,15 @@ TEST_F(ImagesDatasetTest, EveryImageIsASample) {
   EXPECT_THAT(dataset->annotation_files(), IsEmpty());
 }
 
+TEST_F(ImagesDatasetTest, AMissingFrameHasTheNameItWouldHave) {
+  touch({"a_000001_000019_leftImg8bit.png", "a_000001_000021_leftImg8bit.png",
+         "a_000002_000019_leftImg8bit.png", "a_000002_000020_leftImg8bit.png"});
+  const auto dataset = open();
+  const PairedFrame next = dataset->paired_frame(dataset->labelled_frames()[0], 1);
+  EXPECT_EQ(next.state, State::kMissing);
+  EXPECT_EQ(next.frame.path, "clip/a_000001_000020_leftImg8bit.png");
+}
+
 TEST_F(ImagesDatasetTest, TheRateGivesTheTime) {
   touch({"3.png"});
   spec_.frames_per_second = 24;
@@ -289,6 +314,17 @@ TEST_F(ImagesDatasetTest, NoPairGoesFromOneSequenceToAnother) {
   EXPECT_EQ(dataset->paired_frame(frames[3], 1).frame, (FrameRef{"clip/b_2.png", 2}));
 }
 
+TEST_F(ImagesDatasetTest, NoSequenceTakesTheNameOfAnother) {
+  touch({"000.png", "001.png", "clip_000.png", "clip_001.png"});
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_THAT(ids(), ElementsAre("000", "001", "clip_000", "clip_001"));
+  EXPECT_EQ(frames[0].sequence, "clip*");
+  EXPECT_EQ(frames[2].sequence, "clip");
+  EXPECT_EQ(dataset->paired_frame(frames[0], 1).frame.path, "clip/001.png");
+  EXPECT_EQ(dataset->paired_frame(frames[2], 1).frame.path, "clip/clip_001.png");
+}
+
 TEST_F(ImagesDatasetTest, TheOnlySequenceIsCalledAsItsFolder) {
   touch({"highway/images/1.png", "highway/images/2.png"});
   const auto sequence = [&](const std::string& root) {
@@ -303,6 +339,23 @@ TEST_F(ImagesDatasetTest, TheOnlySequenceIsCalledAsItsFolder) {
   EXPECT_EQ(
       open_images_dataset(spec_, folder_ / "clip/highway/images")->labelled_frames()[0].sequence,
       "frames");
+}
+
+TEST_F(ImagesDatasetTest, ImagesMayHaveLessUsualExtensions) {
+  testing::write_flat_image(folder_ / "clip/1.png", ImageSize{6, 8}, 9);
+  testing::write_file(folder_ / "clip/4.ppm", "P6\n8 6\n255\n" + std::string(3 * 6 * 8, 'x'));
+  for (const auto& [format, name] : {std::pair("jpg", "2.jfif"), std::pair("jpg", "3.MPO")}) {
+    const fs::path written = folder_ / (std::string("image.") + format);
+    testing::write_flat_image(written, ImageSize{6, 8}, 9);
+    fs::rename(written, folder_ / "clip" / name);
+  }
+  EXPECT_THAT(ids(), ElementsAre("1", "2", "3", "4"));
+  const auto dataset = open();
+  for (const LabelledFrame& labelled : dataset->labelled_frames()) {
+    const auto size = probe_image_size(folder_ / labelled.frame.path, ImageOrientation::kUpright);
+    ASSERT_FALSE(is_fault(size)) << size.fault().reason;
+    EXPECT_EQ(*size, (ImageSize{6, 8})) << labelled.frame.path;
+  }
 }
 
 TEST_F(ImagesDatasetTest, StillsAreOfNoSequence) {

@@ -47,6 +47,50 @@ TEST(Counted, NamesTwentyAtMost) {
   EXPECT_EQ(std::ranges::count(many, 'a'), 20);
 }
 
+void expect_number(const std::string& stem, const NumberInName& expected) {
+  const NumberInName found = find_number(stem);
+  EXPECT_EQ(found.before, expected.before) << stem;
+  EXPECT_EQ(found.digits, expected.digits) << stem;
+  EXPECT_EQ(found.after, expected.after) << stem;
+  EXPECT_EQ(found.number, expected.number) << stem;
+  EXPECT_EQ(found.time_ns, expected.time_ns) << stem;
+}
+
+TEST(FindNumber, IsTheLastThatNoLetterFollows) {
+  expect_number("000012", {"", "000012", "", 12});
+  expect_number("aachen_000001_000019_leftImg8bit",
+                {"aachen_000001_", "000019", "_leftImg8bit", 19});
+  expect_number("a_mp4-9_jpg.rf.0f3c77", {"a_mp4-", "9", "_jpg", 9});
+  expect_number("3l", {"", "3", "l", 3});
+  expect_number("cover", {"cover", "", ""});
+  expect_number("", {"", "", ""});
+}
+
+TEST(FindNumber, MayBeATime) {
+  expect_number("cam1_1403636579763555584",
+                {"cam1_", "1403636579763555584", "", 1403636579763555584, 1403636579763555584});
+  expect_number("1305031102.175304",
+                {"", "1305031102.175304", "", 1305031102175304000, 1305031102175304000});
+  expect_number("1532402927612", {"", "1532402927612", "", 1532402927612, 1532402927612000000});
+}
+
+TEST(FindNumber, WhatDoesNotFitInto64BitsIsNoTimeAndNoNumber) {
+  // An ISBN is 9.78e18 as milliseconds in nanoseconds, and 2^63 is 9.22e18.
+  expect_number("9783161484100", {"", "9783161484100", "", 9783161484100});
+  expect_number("9223372036854", {"", "9223372036854", "", 9223372036854, 9223372036854000000});
+  expect_number("9999999999999999", {"", "9999999999999999", "", 9999999999999999});
+  expect_number("9500000000.123456", {"9500000000.", "123456", "", 123456});
+  expect_number("a9223372036854775808", {"a9223372036854775808", "", ""});
+}
+
+TEST(Renumbered, ReplacesTheNumberAlone) {
+  EXPECT_EQ(renumbered("aachen_000001_000019_leftImg8bit.png", 20),
+            "aachen_000001_000020_leftImg8bit.png");
+  EXPECT_EQ(renumbered("a_mp4-9_jpg.rf.0f3c77.jpg", 10), "a_mp4-10_jpg.jpg");
+  EXPECT_EQ(renumbered("7.png", 1234), "1234.png");
+  EXPECT_EQ(renumbered("cover.png", 3), "cover3.png");
+}
+
 using State = PairedFrame::State;
 using Stride = NumberedSequence::Stride;
 

@@ -386,8 +386,8 @@ TEST_F(VideoFolderTest, ImagesCountBeforeVideosAndVideosBeforeFolders) {
 }
 
 TEST(IsVideoName, GoesByTheExtension) {
-  for (const char* name : {"a.mp4", "a.b.AVI", "x/a.mov", "a.Mkv"})
-    EXPECT_TRUE(is_video_name(name));
+  for (const char* name : {"a.mp4", "a.b.AVI", "x/a.mov", "a.Mkv", "a.webm", "a.TS", "a.gif"})
+    EXPECT_TRUE(is_video_name(name)) << name;
   for (const char* name : {"a.png", "mp4", "a.mp4.txt", ""}) EXPECT_FALSE(is_video_name(name));
 }
 

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
 #include <string>
 
 #include "stages/frames/sequences/frames_dataset.h"
@@ -130,6 +131,7 @@ TEST_F(NamedLabels, OneEdgeAt0TellsThatVocsCountFrom0) {
     SourceSpec spec;
     spec.root = "i";
     spec.labels = LabelSpec{LabelFormat::kVoc, "x", one.edges_from};
+    spec.pairs.stills.emplace();
     const auto dataset = open_frames_dataset(spec, folder_.path());
     const double from = 10 - one.left;
     EXPECT_EQ(read(*dataset, "1.xml").boxes.at(0).xyxy, (Rectangle{one.left, 7 - from, 40, 20}));
@@ -151,7 +153,7 @@ TEST_F(NamedLabels, WhatVocHasBesideItsFormatIsANote) {
   text("x/3.xml", cat("50", "5", "60", mark + "<truncated>0.25</truncated>"));
   const auto dataset = open(LabelFormat::kVoc, "i", "x");
   EXPECT_THAT(dataset->notes(),
-              ElementsAre(HasSubstr("edges count from 1"),
+              ElementsAre(HasSubstr("tell no sequences"), HasSubstr("edges count from 1"),
                           "<difficult> that is no 0 or 1 taken for unknown: 3 times, first in "
                           "x/1.xml"));
   EXPECT_THAT(read(*dataset, "3.xml").boxes, IsEmpty());
@@ -290,6 +292,15 @@ TEST_F(NamedLabels, MotOfImagesWithoutNumbersNeedsAllOfThem) {
   for (const char* name : {"00", "01", "04"}) image("n/" + std::string(name) + ".png");
   text("n/gt.txt", "5,1,1,1,5,5,1\n");
   EXPECT_EQ(open(LabelFormat::kMot, "n", "n")->labelled_frames().at(0).frame.path, "n/04.png");
+  // As may those that other text follows; the absent frame is called as they are.
+  for (const char* name : {"00_rgb", "01_rgb", "03_rgb"}) image("o/" + std::string(name) + ".png");
+  text("o/gt.txt", "1,1,1,1,5,5,1\n3,1,1,1,5,5,1\n4,1,1,1,5,5,1\n");
+  const auto named = open(LabelFormat::kMot, "o", "o");
+  ASSERT_EQ(named->labelled_frames().size(), 3u);
+  EXPECT_EQ(named->labelled_frames()[0].frame.path, "o/00_rgb.png");
+  EXPECT_EQ(named->labelled_frames()[1].frame.path, "o/02_rgb.png");
+  EXPECT_EQ(named->labelled_frames()[1].frame.index, -1);
+  EXPECT_EQ(named->labelled_frames()[2].frame.path, "o/03_rgb.png");
   text("n/gone/gt/gt.txt", "1,1,1,1,5,5,1\n");
   EXPECT_THAT(open(LabelFormat::kMot, "n", "n")->notes(),
               ::testing::Contains("1 sequence of labels without images left out in n: gone"));
@@ -366,6 +377,24 @@ TEST_F(NamedLabels, MotsLengthAloneIsEnough) {
   EXPECT_EQ(read(*dataset, "s/gt/gt.txt#1").boxes.size(), 1u);
 }
 
+TEST_F(NamedLabels, AnAbsentImageIsOfTheSequenceThatItsNameTells) {
+  for (const char* name : {"a_1", "a_2", "b_1", "b_2", "c"}) {
+    image("i/" + std::string(name) + ".png");
+  }
+  const std::string box = ",cat,0,1,2,3\n";
+  text("t.csv", "image,class,left,top,right,bottom\na_1.png" + box + "a_9.png" + box + "b_7.png" +
+                    box + "c.png" + box + "d_1.png" + box);
+  std::map<std::string, std::string> sequences;
+  const auto dataset = open(LabelFormat::kCsv, "i", "t.csv");
+  for (const LabelledFrame& frame : dataset->labelled_frames()) {
+    sequences[frame.sample_id] = frame.sequence;
+  }
+  EXPECT_EQ(sequences["a_1"], "a");
+  EXPECT_EQ(sequences["a_9"], "a");
+  EXPECT_EQ(sequences["b_7"], "b");
+  EXPECT_EQ(sequences["c"], "c");
+}
+
 TEST_F(NamedLabels, ATableNamesItsImages) {
   image("i/a/1.png");
   image("i/a/2.png");
@@ -397,6 +426,23 @@ TEST_F(NamedLabels, ATableNamesItsImages) {
   const auto absent = open(LabelFormat::kCsv, "i", "t.csv");
   ASSERT_EQ(absent->labelled_frames().size(), 1u);
   EXPECT_EQ(absent->paired_frame(absent->labelled_frames()[0], 0).frame.path, "i/1.png");
+}
+
+TEST_F(NamedLabels, NumbersThatMayCountFrom1AreWarnedOf) {
+  for (const char* name : {"000000", "000001", "000002"}) {
+    image("i/" + std::string(name) + ".png");
+  }
+  const std::string header = "image,class,left,top,right,bottom\n", box = ",cat,0,1,2,3\n";
+  text("t.csv", header + "1" + box + "2" + box + "3" + box);
+  EXPECT_THAT(
+      open(LabelFormat::kCsv, "i", "t.csv")->warnings(),
+      ElementsAre("images are named by their numbers in t.csv (1 for 000001.png), and 000000.png "
+                  "has no label: if the file counts from 1, all labels are one image late; name "
+                  "the images by their file names then"));
+  text("t.csv", header + "0" + box + "2" + box);
+  EXPECT_THAT(open(LabelFormat::kCsv, "i", "t.csv")->warnings(), IsEmpty());
+  text("t.csv", header + "000001.png" + box);
+  EXPECT_THAT(open(LabelFormat::kCsv, "i", "t.csv")->warnings(), IsEmpty());
 }
 
 TEST_F(NamedLabels, OfVideosTheFrameNumberStandsForTheImage) {
