@@ -140,8 +140,7 @@ TEST_F(Preview, ASheetIsOneImage) {
 TEST_F(Preview, AVideoHasTheSequence) {
   options_.video = true;
   EXPECT_THAT(draw("out"), ElementsAre("clip.mp4"));
-  EXPECT_FALSE(
-      is_fault(probe_image_size(folder_ / "images/clip.mp4", ImageOrientation::kStored)));
+  EXPECT_FALSE(is_fault(probe_image_size(folder_ / "images/clip.mp4", ImageOrientation::kStored)));
 }
 
 TEST_F(Preview, WarnsOfFramesThatAreGone) {
