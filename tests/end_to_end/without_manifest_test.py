@@ -116,7 +116,7 @@ class WithoutManifest(program.InFolder):
         self.in_folder()
         told, err = run("plan", clip / "walk")
         self.assertIn("total: 130 pairs in 3 shards", told)
-        self.assertIn("images or videos: 131 frames, NO LABELS", err)
+        self.assertIn("images or videos: 131 frames of 1 sequence, NO LABELS", err)
         self.assertEqual(os.listdir("."), [])
         run("plan", clip / "walk", "--freeze")
         self.assertEqual(sorted(os.listdir("out/walk-events")), ["manifest.json", "plan.json", "run.json"])

@@ -391,9 +391,10 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
     for (const fs::path& place : with_frames) places.push_back(frames_in(place, files));
     sources.front().unread = unread_labels(places);
   }
-  for (const auto& [place, labels] : others) {
+  for (const auto& other : others) {
+    const auto& [place, labels] = other;
     const bool is_of_source = std::ranges::any_of(
-        sources, [&](const FoundSource& source) { return is_below(place, source.root); });
+        sources, [&](const FoundSource& source) { return is_below(other.first, source.root); });
     if (is_of_source) continue;
     sources.front().remarks.push_back("labels of other images left out: " + labels.string() +
                                       " of " + place.string());
