@@ -230,7 +230,10 @@ std::vector<std::optional<std::vector<std::string>>> stored_classes(
   for (const ShardOutline& shard : shards) {
     auto& of_source = names.at(static_cast<std::size_t>(shard.source));
     if (of_source || !shard_state(folder, shard, plan_hash, ScanDepth::kBytes).done()) continue;
-    of_source = ShardReader(folder / shard.name).header().label_schema.class_names;
+    try {
+      of_source = ShardReader(folder / shard.name).header().label_schema.class_names;
+    } catch (const std::runtime_error&) {  // damaged, whatever its record says: ask the next one
+    }
   }
   return names;
 }
