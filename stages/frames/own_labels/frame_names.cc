@@ -53,9 +53,9 @@ void add_apart(char32_t letter, std::u32string& text) {
   constexpr char32_t kHangul = 0xAC00, kSyllables = 11172, kVowels = 21, kTails = 28;
   if (letter >= kHangul && letter < kHangul + kSyllables) {
     const char32_t place = letter - kHangul;
-    text += char32_t{0x1100} + place / (kVowels * kTails);
-    text += char32_t{0x1161} + place % (kVowels * kTails) / kTails;
-    if (place % kTails != 0) text += char32_t{0x11A7} + place % kTails;
+    text.push_back(U'\u1100' + place / (kVowels * kTails));
+    text.push_back(U'\u1161' + place % (kVowels * kTails) / kTails);
+    if (place % kTails != 0) text.push_back(U'\u11A7' + place % kTails);
     return;
   }
   if (letter < 0x80) {
