@@ -361,7 +361,8 @@ TEST_F(ImagesDatasetTest, ImagesMayHaveLessUsualExtensions) {
 TEST_F(ImagesDatasetTest, StillsAreOfNoSequence) {
   touch({"2007_1.png", "2008_1.png", "2008_2.png"});
   spec_.pairs.stills.emplace();
-  for (const LabelledFrame& frame : open()->labelled_frames()) EXPECT_EQ(frame.sequence, "");
+  const auto dataset = open();
+  for (const LabelledFrame& frame : dataset->labelled_frames()) EXPECT_EQ(frame.sequence, "");
 }
 
 TEST_F(ImagesDatasetTest, SaysWhereNamesTellNoSequences) {
