@@ -203,11 +203,13 @@ std::int64_t VideoFile::announced_count() const {
   if (stream.nb_frames > 0 && !has_edits) return stream.nb_frames;
   // Where there is an edit list, the stream's duration is that of the frames that are shown.
   // Without one the container's counts, which may begin at 0 wherever the first frame is.
-  const std::int64_t start =
-      format.start_time == AV_NOPTS_VALUE ? 0 : std::max<std::int64_t>(0, format.start_time);
+  const auto seconds = [](std::int64_t ticks, double tick_s) {
+    return ticks == AV_NOPTS_VALUE ? 0 : static_cast<double>(ticks) * tick_s;
+  };
   const double duration_s = stream.duration == AV_NOPTS_VALUE
-                                ? static_cast<double>(format.duration - start) / AV_TIME_BASE
-                                : static_cast<double>(stream.duration) * ratio(stream.time_base);
+                                ? seconds(format.duration, 1.0 / AV_TIME_BASE) -
+                                      std::max(0.0, seconds(format.start_time, 1.0 / AV_TIME_BASE))
+                                : seconds(stream.duration, ratio(stream.time_base));
   const double count = std::floor(duration_s * frames_per_second().value_or(0) + 0.5);
   if (!(count > 0 && count < 1e12)) return std::max<std::int64_t>(0, stream.nb_frames);
   const auto shown = static_cast<std::int64_t>(count);
