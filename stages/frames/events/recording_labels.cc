@@ -1,6 +1,6 @@
 #include "stages/frames/events/recording_labels.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -18,8 +18,8 @@
 #include "manifests/values/faults.h"
 #include "stages/base/archives/detail/typed_array.h"
 #include "stages/base/archives/numpy_arrays.h"
+#include "stages/base/files/csv_records.h"
 #include "stages/base/files/input_file.h"
-#include "stages/frames/csv_columns.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
 
@@ -58,6 +58,27 @@ class ClassNumbers {
 
 constexpr std::array<std::string_view, 7> kColumns = {"time_s", "left",  "top",     "right",
                                                       "bottom", "class", "category"};
+
+using Places = std::vector<std::optional<std::size_t>>;
+
+/// The place of each of kColumns by a table's header, none of a column that is absent: only the
+/// last may be. A fault "expected X, got Y" where one is there twice, or another.
+Outcome<Places> places_in(const CsvRecord& header) {
+  Places places(kColumns.size());
+  for (std::size_t i = 0; i < header.fields.size(); ++i) {
+    const auto column =
+        static_cast<std::size_t>(std::ranges::find(kColumns, header.fields[i]) - kColumns.begin());
+    if (column == kColumns.size() || places[column]) {
+      return SampleFault{fmt::format("expected columns {}, each once, got \"{}\"",
+                                     fmt::join(kColumns, ", "), escape_controls(header.fields[i]))};
+    }
+    places[column] = i;
+  }
+  for (std::size_t i = 0; i + 1 < kColumns.size(); ++i) {
+    if (!places[i]) return SampleFault{fmt::format("expected a column {}, got none", kColumns[i])};
+  }
+  return places;
+}
 constexpr std::size_t kCategory = 6;  // may be absent
 using Fields = std::array<std::string_view, kColumns.size()>;
 
@@ -102,7 +123,7 @@ class CsvLabels {
   static std::string quoted(std::string_view text) { return '"' + escape_controls(text) + '"'; }
 
   void read_header(const CsvRecord& header) {
-    const auto places = csv_columns(header, kColumns, kCategory);
+    const auto places = places_in(header);
     if (is_fault(places)) return add_fault(places.fault().reason);
     places_ = *places;
     columns_ = header.fields.size();
@@ -161,7 +182,7 @@ class CsvLabels {
   std::string file_;
   std::string faults_;
   int line_ = 1;
-  std::vector<std::optional<std::size_t>> places_;  ///< of kColumns
+  Places places_;  ///< empty: no header yet
   std::size_t columns_ = 0;
   ClassNumbers classes_;
   RecordingLabels labels_;
