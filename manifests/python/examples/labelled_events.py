@@ -278,14 +278,16 @@ def test_items(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, 
 
 def _drawn(path: pathlib.Path, labels: pathlib.Path, size: tuple[int, int]) -> Item:
     """Of an image in which somebody has drawn positive minus negative events in grey,
-    stretched to 0..255 by its own range."""
+    stretched to 0..255 by its own range, or events without their polarity."""
     image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     if image is None:
         raise ValueError(f"expected an image, got none, in {path}")
     # What is no event is known before the image is made smaller, when values are still whole.
-    events = torch.from_numpy(image.astype(np.float32) - np.bincount(image.ravel()).argmax())
+    events = image.astype(np.float32) - np.bincount(image.ravel()).argmax()
+    if events.min() == 0 or events.max() == 0:  # no polarity: one is drawn for each pixel
+        events *= np.random.default_rng(zlib.crc32(path.stem.encode())).choice(np.float32([-1, 1]), events.shape)
     boxes = torch.from_numpy(_boxes(labels, image.shape)).float()
-    item = {"volume": events[None], "boxes": boxes, "labels": torch.zeros(len(boxes), dtype=torch.int64),
+    item = {"volume": torch.from_numpy(events[None]), "boxes": boxes, "labels": torch.zeros(len(boxes), dtype=torch.int64),
             "ignore": torch.zeros(len(boxes), dtype=torch.bool), "id": path.stem}
     return _smaller(item, size, lambda signed: signed_channel(np.concatenate([signed.clip(0), (-signed).clip(0)])))
 

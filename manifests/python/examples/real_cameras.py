@@ -44,7 +44,7 @@ COUNTS = (50, 100, 200, 400)  # of labelled images
 SENSOR_STEPS = 900
 LONGER = (3000, 1000)  # steps; the longest first, so that all processors are busy to the end
 # the first windows of a recording: settings are chosen on these, which are in no table
-DEVELOPMENT = {"obaid_d1": 26, "pedro": 1}
+DEVELOPMENT = {"cdehp": 48, "obaid_d1": 26, "pedro": 1}
 PLAIN = EventAugmentation(invert=0.5, scale=(0.7, 2.0), shift=0.15)
 FULL = train_detector.AUGMENTATION
 COLUMNS = {"ap50": "AP@0.5", "ap75": "AP@0.75", "ap": "AP@[.5:.95]", "best": "best box"}
