@@ -34,6 +34,16 @@ struct Rectangle {
   bool operator==(const Rectangle&) const = default;
 };
 
+/// What an object covers of its image: closed rings of corners, in pixels as edges are counted (the
+/// centre of pixel 3 is 3.5). A place is covered if the rings wind around it: a ring that runs
+/// clockwise, as one sees it, counts one, the other way minus one, and what does not sum up to 0 is
+/// covered. So parts run clockwise and may overlap, and holes run the other way.
+struct Outline {
+  std::vector<std::vector<Point>> rings;  ///< each of three corners or more; none: not annotated
+  bool empty() const { return rings.empty(); }
+  bool operator==(const Outline&) const = default;
+};
+
 /// One object as annotated, in pixels of the source image. Fields that a dataset does not have
 /// hold KITTI's own values for "unknown".
 struct Box {
@@ -48,6 +58,7 @@ struct Box {
   int difficulty = -1;
   std::int64_t track_id = -1;  ///< object's number within its sequence; -1 none
   bool ignore = false;         ///< a region to leave out of training and scoring (DontCare)
+  Outline outline = {};        ///< of what is seen of the object; may reach out of the image
   bool operator==(const Box&) const = default;
 };
 
@@ -126,6 +137,7 @@ struct VolumeBox {
   Rectangle clipped;    ///< cut to what the volume shows of the image
   Rectangle unclipped;  ///< as mapped
   bool ignore = false;  ///< as annotated, or because a crop left nothing of the box
+  Outline outline;      ///< as mapped, not cut
 };
 
 /// A person in volume pixels; joints and centre that were not annotated stay kMissingPoint.

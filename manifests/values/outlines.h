@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "manifests/values/frames.h"
+#include "manifests/values/labels.h"
+
+namespace eventgan {
+
+/// An outline of parts that may overlap and have no holes, as COCO and YOLO write them: each ring
+/// is turned to run clockwise. Rings of fewer than three corners or without area are left out.
+Outline outline_of_parts(std::vector<std::vector<Point>> parts);
+
+/// The edges of the pixels of `mask` that are not 0, exactly: its rings have whole coordinates, and
+/// pixels that touch at a corner alone lie in rings of their own.
+Outline outline_of(const GreyImage& mask);
+
+/// [y, x] uint8: 1 where the outline covers the pixel's centre, else 0; what lies outside `size` is
+/// left out. A centre that lies on an edge belongs to the part right of it or below it, so that
+/// outlines side by side cover each pixel once. mask_of(outline_of(mask), mask.size) == mask.
+GreyImage mask_of(const Outline& outline, ImageSize size);
+
+/// The least rectangle around all corners; {0, 0, 0, 0} of an empty outline.
+Rectangle bounds(const Outline& outline);
+
+/// COCO's run lengths of a mask: how many pixels are 0, then how many are not, and so on by turns,
+/// column by column from top to bottom.
+std::vector<std::uint32_t> run_lengths(const GreyImage& mask);
+
+/// The mask with these run lengths; none if they do not sum up to the number of its pixels.
+std::optional<GreyImage> mask_of(const std::vector<std::uint32_t>& runs, ImageSize size);
+
+/// COCO's text of run lengths: from the third on, each is less the one two before it; five bits a
+/// character, the lowest first, 32 where more follow, plus 48.
+std::string compressed(const std::vector<std::uint32_t>& runs);
+
+/// The inverse; none if the text is no such thing.
+std::optional<std::vector<std::uint32_t>> run_lengths(std::string_view compressed);
+
+/// The outline as JSON, [[x, y, x, y, ...], ...], a list a ring; "" of an empty one. Coordinates
+/// are rounded to float32, with the fewest digits that give the same float32. This is
+/// `/labels/boxes/outline`.
+std::string outline_text(const Outline& outline);
+
+/// The inverse; none if the text is no such thing, or a ring has fewer than three corners.
+std::optional<Outline> read_outline(std::string_view text);
+
+}  // namespace eventgan
