@@ -14,11 +14,12 @@ ExportFormat webdataset_format();
 ExportFormat events_format();
 ExportFormat dsec_format();
 ExportFormat rvt_format();
+ExportFormat raw_format();
 
 const std::vector<ExportFormat>& export_formats() {
   static const std::vector<ExportFormat> kFormats = {
-      yolo_format(),       coco_format(),   mpii_format(), davis_format(),
-      webdataset_format(), events_format(), dsec_format(), rvt_format()};
+      yolo_format(),   coco_format(), mpii_format(), davis_format(), webdataset_format(),
+      events_format(), dsec_format(), rvt_format(),  raw_format()};
   return kFormats;
 }
 

@@ -18,6 +18,7 @@
 #include "manifests/values/job.h"
 #include "manifests/values/pair_key.h"
 #include "pipeline/runtime/threads.h"
+#include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/files/sha256.h"
 #include "stages/exports/sampled_events.h"
 
@@ -306,6 +307,34 @@ void number_tracks(std::vector<RecordedBox>& boxes, const OutgoingRecording& rec
     throw std::runtime_error(fmt::format("expected track numbers of at most {}, got {}, in {}",
                                          kMost, last, recording.name));
   }
+}
+
+std::string prophesee_boxes(const std::vector<RecordedBox>& boxes) {
+  constexpr char kFields[] =
+      "[('t', '<i8'), ('x', '<f4'), ('y', '<f4'), ('w', '<f4'), ('h', '<f4'), ('class_id', '<u4'), "
+      "('track_id', '<u4'), ('class_confidence', '<f4'), ('', '|V4')]";
+  constexpr std::size_t kBytes = 40;
+  std::string rows;
+  for (const RecordedBox& box : boxes) {
+    put(rows, box.t_us);
+    put(rows, static_cast<float>(box.box.left));
+    put(rows, static_cast<float>(box.box.top));
+    put(rows, static_cast<float>(box.box.right - box.box.left));
+    put(rows, static_cast<float>(box.box.bottom - box.box.top));
+    put(rows, static_cast<std::uint32_t>(box.class_number));
+    put(rows, static_cast<std::uint32_t>(box.track_id));
+    put(rows, 1.0f);
+    put(rows, std::uint32_t{0});
+  }
+  return npy_records(kFields, kBytes, rows);
+}
+
+std::string name_before_bbox(const OutgoingRecording& recording) {
+  std::string name = recording.name;
+  for (auto at = name.find("bbox"); at != name.npos; at = name.find("bbox", at)) {
+    name.replace(at, 1, "%62");
+  }
+  return name;
 }
 
 std::string window_line(const SampleWindow& window, const RecordedSample& sample,

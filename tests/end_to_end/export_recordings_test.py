@@ -42,6 +42,28 @@ def slice_dsec(file, begin_us, end_us):
     return [file[f"events/{name}"][inside].astype(np.int64) + (offset if name == "t" else 0) for name in "txyp"]
 
 
+def decode_evt3(data):
+    """Height and width, and t, x, y, p of a RAW file of short silences, as the page of EVT 3.0 describes it."""
+    header, words = data.split(b"% end\n", 1)
+    height, width = (int(header.split(key, 1)[1].split(end, 1)[0])
+                     for key, end in ((b"height=", b";"), (b"width=", b"\n")))
+    words = np.frombuffer(words, "<u2").astype(np.int64)
+
+    def last(kind, value):
+        """What the last word of a kind told, at each word."""
+        at = np.where(words >> 12 == kind, np.arange(len(words)), 0)
+        return np.maximum.accumulate(at), value[np.maximum.accumulate(at)]
+
+    at_high, _ = last(8, words)
+    highs = words[words >> 12 == 8] & 0xfff
+    high = (highs + 4096 * np.cumsum(np.diff(highs, prepend=0) < 0))[np.cumsum(words >> 12 == 8) - 1]
+    at_low, low = last(6, words & 0xfff)
+    t = (high << 12) + np.where(at_low > at_high, low, 0)
+    events = words >> 12 == 2
+    return (height, width), (t[events], words[events] & 0x7ff, last(0, words & 0x7ff)[1][events],
+                             words[events] >> 11 & 1)
+
+
 class RvtSequence:
     """What RVT's SequenceBase and ObjectLabelFactory make of a sequence; their assertions stay."""
 
@@ -284,6 +306,24 @@ class Recordings(Export):
         self.assertEqual(left_out.get("boxes within the last pixel, where RVT's frame ends (in raw alone)", 0),
                          kept - in_frame)
         self.assertEqual(left_out.get("samples of recordings without boxes (in raw alone)", 0), unlabelled)
+
+    def test_raw_has_the_events_and_boxes_of_rvt(self):
+        rvt, raw = self.out / "rvt", self.out / "raw"
+        self.export("rvt", source=self.source, out=rvt)
+        self.export("raw", source=self.source, out=raw)
+        recordings = sorted((rvt / "raw").glob("*/*_td.h5"))
+        self.assertGreater(len(recordings), 2)
+        for path in recordings:
+            split, name = path.parent.name, path.name.removesuffix("_td.h5")
+            size, (t, x, y, p) = decode_evt3((raw / "raw" / split / f"{name}.raw").read_bytes())
+            with h5py.File(path) as file:
+                self.assertEqual(size, (file["events/height"][()], file["events/width"][()]))
+                for column, found in (("t", t), ("x", x), ("y", y), ("p", p)):
+                    np.testing.assert_array_equal(found, file[f"events/{column}"][:])
+            for ending in ("_bbox.npy", "_windows.txt"):
+                of_rvt, of_raw = path.with_name(name + ending), raw / "raw" / split / (name + ending)
+                self.assertEqual(of_rvt.read_bytes() if of_rvt.exists() else b"",
+                                 of_raw.read_bytes() if ending == "_windows.txt" or len(np.load(of_raw)) else b"")
 
     def test_rvt_names_files_of_gen1_as_its_preprocessing_does_and_leaves_no_bbox_in_a_name(self):
         manifest = self.out.parent / "manifest.json"

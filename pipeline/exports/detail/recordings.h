@@ -122,6 +122,14 @@ void number_tracks(std::vector<RecordedBox>& boxes, const OutgoingRecording& rec
 std::string window_line(const SampleWindow& window, const RecordedSample& sample,
                         std::int64_t clock_us);
 
+/// Boxes as Prophesee's programs and RVT read them, RECORDING_bbox.npy: BBOX_DTYPE of RVT's
+/// utils/evaluation/prophesee.
+std::string prophesee_boxes(const std::vector<RecordedBox>& boxes);
+
+/// The name of a recording's files beside that: their readers cut a name at its first "bbox", so in
+/// it that is "%62box".
+std::string name_before_bbox(const OutgoingRecording& recording);
+
 /// Appends a number's bytes, little endian.
 template <class Number>
 void put(std::string& bytes, Number number) {
