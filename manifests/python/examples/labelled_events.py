@@ -287,8 +287,9 @@ def _drawn(path: pathlib.Path, labels: pathlib.Path, size: tuple[int, int]) -> I
     if events.min() == 0 or events.max() == 0:  # no polarity: one is drawn for each pixel
         events *= np.random.default_rng(zlib.crc32(path.stem.encode())).choice(np.float32([-1, 1]), events.shape)
     boxes = torch.from_numpy(_boxes(labels, image.shape)).float()
-    item = {"volume": torch.from_numpy(events[None]), "boxes": boxes, "labels": torch.zeros(len(boxes), dtype=torch.int64),
-            "ignore": torch.zeros(len(boxes), dtype=torch.bool), "id": path.stem}
+    item = {"volume": torch.from_numpy(events[None]), "boxes": boxes,
+            "labels": torch.zeros(len(boxes), dtype=torch.int64), "ignore": torch.zeros(len(boxes), dtype=torch.bool),
+            "id": path.stem}
     return _smaller(item, size, lambda signed: signed_channel(np.concatenate([signed.clip(0), (-signed).clip(0)])))
 
 

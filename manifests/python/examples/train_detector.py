@@ -22,6 +22,7 @@ import torch
 import torch.nn.functional as F
 import training
 from eventgan import Shards, signed_channel
+from eventgan.augmentation import numbered
 from eventgan.detection_scores import Detections, non_maximum_suppression
 from eventgan.torch import DetectionDataset, EventAugmentation, fitted
 from torch import nn
@@ -205,13 +206,16 @@ def main() -> None:
     size = tuple(32 * math.ceil(side * args.scale / 32) for side in (area[2:] - area[:2])[::-1])
     view, classes = fitted(area, size), args.classes.split(",")
 
-    def items_of(shards: Shards) -> list[dict[str, Any]]:
-        dataset = DetectionDataset(shards.changed(signed) if args.channels == "signed" else shards, classes, size,
-                                   view=view)
+    of_test = training.seen_by(test_shards, numbered(classes), size)
+
+    def items_of(shards: Shards, **seen: Any) -> list[dict[str, Any]]:
+        dataset = DetectionDataset(shards.changed(signed) if args.channels == "signed" else shards, **seen)
         return [dataset[i] for i in range(len(dataset))]
 
     try:
-        items, validation, test = (items_of(shards) for shards in (train_shards, validation_shards, test_shards))
+        items, validation = (items_of(shards, classes=classes, size=size, view=view)
+                             for shards in (train_shards, validation_shards))
+        test = items_of(test_shards, **of_test)
     except ValueError as error:
         raise SystemExit(str(error))
     model = train(args, items, classes, AUGMENTATION, validation)
@@ -224,7 +228,7 @@ def main() -> None:
 
     found = search(model, test, args.batch)
     training.write_predictions(args, (entry for item, boxes in found
-                                      for entry in training.box_predictions(item, boxes, classes, view)))
+                                      for entry in training.box_predictions(item, boxes, classes, of_test["view"])))
     training.write_images(args, len(validation), image_of)
 
 

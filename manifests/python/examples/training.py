@@ -14,7 +14,7 @@ import pickle
 import sys
 import time
 import types
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import cv2
@@ -27,7 +27,7 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package
 
 from eventgan import Sample, Shards, drawing, read_description
 from eventgan.detection_scores import Detections, GroundTruth, detection_scores
-from eventgan.torch import inverse, move_boxes
+from eventgan.torch import fitted, inverse, move_boxes
 
 VALIDATION_SPLITS = ("validation", "valid", "val", "test")
 GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps together, the most first
@@ -188,6 +188,15 @@ def tested(args: argparse.Namespace, train_shards: Shards, validation_shards: Sh
               f"{args.data}")
         shards = shards.changed(functools.partial(_brighter, factor=factor))
     return shards
+
+
+def seen_by(shards: Shards, classes: Mapping[str, int], size: tuple[int, int]) -> dict[str, Any]:
+    """What DetectionDataset takes of samples that another data set's detector of these classes and inputs of the size
+    H, W is to find objects in: their own part of the volume that images fill, and of the classes those that they
+    have."""
+    known = set(shards.known_classes())
+    return {"classes": {name: number for name, number in classes.items() if name in known} or classes, "size": size,
+            "view": fitted(shards.image_area(), size)}
 
 
 def _to_test(args: argparse.Namespace, validation_shards: Shards, usable: Callable[[Shards], Iterable[int]]) -> Shards:

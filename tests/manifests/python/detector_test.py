@@ -16,6 +16,9 @@ EXAMPLES = SOURCE / "manifests" / "python" / "examples"
 sys.path.append(str(EXAMPLES))
 
 import train_detector as detector
+import training
+
+from eventgan.torch import move_boxes
 
 
 def item(boxes, labels=None, ignore=None, height=96, width=128):
@@ -89,6 +92,23 @@ def test_giou():
 
     first, second = boxes([0, 0, 4, 2], [0, 0, 2, 2], [1, 1, 2, 2]), boxes([2, 0, 6, 2], [4, 0, 6, 2], [1, 1, 2, 2])
     torch.testing.assert_close(detector.giou(first, second), torch.tensor([4 / 12, -4 / 12, 1]))
+
+
+def test_samples_of_another_size_are_seen_whole():
+    class Others:
+        def known_classes(self):
+            return ["Van", "Bus"]
+
+        def image_area(self):
+            return np.array([0.0, 10, 200, 110])
+
+    seen = training.seen_by(Others(), {"Car": 0, "Bus": 1}, (96, 128))
+    assert seen["classes"] == {"Bus": 1} and seen["size"] == (96, 128)
+    # 0.64 is as large as fits
+    left, top, right, bottom = move_boxes(np.array([[0.0, 10, 200, 110]]), seen["view"])[0]
+    assert left >= 0 and top >= 0 and right <= 128 and bottom <= 96
+    np.testing.assert_allclose([right - left, bottom - top], [128, 64], atol=1e-9)
+    assert training.seen_by(Others(), {"Car": 0}, (96, 128))["classes"] == {"Car": 0}  # which is refused by name
 
 
 def test_overlapping_boxes_are_one():
