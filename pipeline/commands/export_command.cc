@@ -129,6 +129,10 @@ void add_export_command(CLI::App& app, int& exit_code) {
   take_one_of(add("--layout", options.event_file,
                   "lines of text, t x y p (default), or HDF5 as MVSEC has it"),
               kEventFiles);
+  add("--frames-per-second", options.frames_per_second,
+      "frames a second of images whose times are not known; default: 1")
+      ->check(CLI::Range(1e-3, 1e6))
+      ->option_text("NUMBER");
   add("--seed", options.seed, "random seed; default: 0")->option_text("NUMBER");
   add_threads_option(*command, options.threads);
   command->add_flag("--overwrite", options.overwrite, "Replace an earlier export in FOLDER");

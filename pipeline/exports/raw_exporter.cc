@@ -45,7 +45,7 @@ ExportFormat raw_format() {
   return {.word = "raw",
           .title = "the same events as Prophesee's RAW files (EVT 3.0), with its boxes",
           .need = LabelNeed::kNone,
-          .options = {"--classes", "--counts", "--seed"},
+          .options = {"--classes", "--counts", "--frames-per-second", "--seed"},
           .files = {"raw/SPLIT/RECORDING.raw", "raw/SPLIT/RECORDING_bbox.npy",
                     "raw/SPLIT/RECORDING_windows.txt", "label_map_dictionary.json"},
           .make = make_exporter<RawExporter>};

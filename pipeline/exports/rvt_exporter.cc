@@ -150,7 +150,7 @@ ExportFormat rvt_format() {
   return {.word = "rvt",
           .title = "the same for RVT and eTraM, as events and as the event volumes",
           .need = LabelNeed::kBoxes,
-          .options = {"--classes", "--counts", "--seed"},
+          .options = {"--classes", "--counts", "--frames-per-second", "--seed"},
           .files = {"raw/SPLIT/RECORDING_td.h5", "raw/SPLIT/RECORDING_td.dat.h5",
                     "raw/SPLIT/RECORDING_bbox.npy", "raw/SPLIT/RECORDING_windows.txt",
                     "preprocessed/SPLIT/RECORDING/labels_v2/labels.npz",

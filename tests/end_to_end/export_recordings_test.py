@@ -225,7 +225,11 @@ class Recordings(Export):
                                         generator={"kind": "difference"})))
         run("convert", manifest, "--progress", "none")
         run("finalize", manifest.parent / "out")
-        self.export("dsec", source=manifest.parent / "out")
+        said, _ = self.export("dsec", source=manifest.parent / "out")
+        self.assertIn("3 samples are of images without times: their clock counts 1 frame a second", said)
+        self.assertEqual(len(self.described()["notes"]), 1)
+        said, _ = self.export("dsec", source=manifest.parent / "out")  # which is done
+        self.assertIn("images without times", said)
         recording, = (self.out / "dsec" / "train").iterdir()
         self.assertEqual(recording.name, "a%20b")
         windows = read_windows(recording / "windows.txt")
@@ -235,6 +239,21 @@ class Recordings(Export):
                           for key, sample in found.items()})
         self.assertGreater(len(windows), 1)
         self.assertFalse((recording / "object_detections").exists())
+
+    def test_every_tenth_frame_of_25_a_second(self):
+        root = self.out.parent / "frames"
+        for k in (30, 40, 50, 60):
+            small_job.save_image(root / "clip" / f"{k:04d}.png", np.random.default_rng(k))
+        manifest = self.out.parent / "manifest.json"
+        manifest.write_text(
+            json.dumps(program.manifest([{"dataset": "frames", "root": str(root), "pairs": program.pairs([1])}],
+                                        generator={"kind": "difference"})))
+        run("convert", manifest, "--progress", "none")
+        run("finalize", manifest.parent / "out")
+        said, _ = self.export("raw", "--frames-per-second", "25", source=manifest.parent / "out")
+        self.assertIn("25 frames a second", said)
+        windows = read_windows(self.out / "raw" / "train" / "clip_windows.txt")
+        self.assertEqual([window[:2] for window in windows], [(0, 40000), (40000, 80000), (80000, 120000)])
 
     def test_a_folder_of_images_is_one_sequence(self):
         root = self.out.parent / "clip"

@@ -83,6 +83,9 @@ class Exporter {
 
   /// What of whole samples is not exported, as far as `finish` alone can tell.
   virtual LeftOut whole_samples_left_out() const { return {}; }
+
+  /// What a user should know of what `finish` has made, a line each.
+  virtual std::vector<std::string> notes() const { return {}; }
 };
 
 /// For ExportFormat::make.
