@@ -68,7 +68,7 @@ TEST_F(RowDifferences, AreOfOutlinesThatLieElsewhere) {
                                     "got 47 bytes")));
   outline = example_.samples[0].labels.boxes[0].outline;
   outline.rings.pop_back();
-  EXPECT_THAT(found(expected_), ElementsAre(HasSubstr("expected 28 bytes in ")));
+  EXPECT_THAT(found(expected_), ElementsAre(HasSubstr("expected 29 bytes in ")));
   outline = {};
   EXPECT_THAT(found(expected_), ElementsAre(HasSubstr("expected 0 bytes in ")));
   stored_.boxes.outline.clear();
