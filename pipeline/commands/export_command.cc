@@ -115,8 +115,8 @@ void add_export_command(CLI::App& app, int& exit_code) {
       "JSON file that maps each class name to a number, or to null to leave the class out")
       ->option_text("FILE");
   take_one_of(add("--ignored", arguments->keep_ignored,
-                  "keep or drop boxes to ignore (DontCare). yolo keeps them as a class of their "
-                  "own (default: drop), coco as crowds (default: keep)"),
+                  "keep or drop boxes to ignore (DontCare). YOLO keeps them as a class of their "
+                  "own (default: drop), COCO as crowds (default: keep)"),
               kIgnored);
   add("--full-scale", options.full_scale, "volume value that becomes 255; default: 1")
       ->check(CLI::Range(1e-6, 1e6))

@@ -10,7 +10,10 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "manifests/values/outlines.h"
 
 namespace eventgan {
 namespace {
@@ -140,6 +143,9 @@ void append_box(const Box& box, const VolumeBox& mapped, BoxColumns& to) {
   to.track_id.push_back(box.track_id);
   const auto difficulty = static_cast<std::int8_t>(box.difficulty);
   put<std::int8_t>(to.difficulty, {&difficulty, difficulty < 0 ? 0u : 1u}, 1, row, -1);
+  const std::string text = outline_text(mapped.outline);
+  const std::vector<char> outline(text.begin(), text.end());
+  put<std::vector<char>>(to.outline, {&outline, outline.empty() ? 0u : 1u}, 1, row, {});
 }
 
 void append_person(const Person& person, const VolumePerson& mapped, PoseColumns& to) {
@@ -400,8 +406,13 @@ ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, in
   rows_of(tables.boxes.offsets, [&](std::size_t k) {
     const BoxColumns& boxes = tables.boxes;
     sample.annotation.boxes.push_back(annotated_box(boxes, k));
-    sample.labels.boxes.push_back(
-        {box_at(boxes.xyxy, k), box_at(boxes.xyxy_unclipped, k), boxes.ignore[k] != 0});
+    Outline outline;
+    if (!boxes.outline.empty()) {
+      const std::vector<char>& text = boxes.outline[k];
+      outline = read_outline({text.data(), text.size()}).value_or(Outline());
+    }
+    sample.labels.boxes.push_back({box_at(boxes.xyxy, k), box_at(boxes.xyxy_unclipped, k),
+                                   boxes.ignore[k] != 0, std::move(outline)});
   });
   const std::size_t joints = header.label_schema.joint_names.size();
   rows_of(tables.poses.offsets, [&](std::size_t k) {

@@ -118,6 +118,9 @@ void write_image_pair(const OutgoingSample& sample, const std::string& folder, d
 /// Counts a sample that has values above the full scale.
 void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut& left_out);
 
+/// What of a box's outline lies within what the volume shows of the image; empty without one.
+Outline shown_outline(const ShardSample& sample, const VolumeBox& box, ImageSize volume);
+
 /// A person's box: as annotated, else around its chosen joints and its head; cut to what the volume
 /// shows of the image. None if nothing is left.
 std::optional<Rectangle> person_box(const ShardSample& sample, std::size_t person,
