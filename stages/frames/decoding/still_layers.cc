@@ -13,7 +13,7 @@ namespace eventgan {
 namespace {
 
 constexpr int kRoom_px = 2;    // around a mask: what its edge and sampling reach
-constexpr int kMargin_px = 1;  // of an object's own light, which its outline leaves out
+constexpr int kMargin_px = 3;  // what drawn outlines leave out of an object
 constexpr double kSlack_px = 2;
 
 cv::Rect whole(const cv::Mat& image) { return {0, 0, image.cols, image.rows}; }
@@ -35,9 +35,13 @@ GreyImage mask_within(const Outline& outline, const cv::Rect& area) {
   return mask_of(moved, {area.height, area.width});
 }
 
-/// Gives each `wanted` pixel of `picture` that of `known` which is its mirror image at the nearest
-/// known pixel, or this one if there is none. All have one size; wanted ones are not known.
-void continue_into(cv::Mat& picture, const cv::Mat& known, const cv::Mat& wanted) {
+// What is wanted of a pixel: to be like something, or to be what is mirrored there, if anything is.
+constexpr std::uint8_t kAnything = 1, kMirrored = 2;
+
+/// Gives each `wanted` pixel of `picture` the `known` one which is its mirror image at the nearest
+/// known pixel; if that is not known either, one half-way to the nearest, or this itself. Where
+/// that is not wanted, `wanted` becomes 0. All have one size; what is wanted is not known.
+void continue_into(cv::Mat& picture, const cv::Mat& known, cv::Mat& wanted) {
   cv::Mat distance, labels;
   cv::distanceTransform(known == 0, distance, labels, cv::DIST_L2, cv::DIST_MASK_5,
                         cv::DIST_LABEL_PIXEL);
@@ -51,17 +55,31 @@ void continue_into(cv::Mat& picture, const cv::Mat& known, const cv::Mat& wanted
     }
   }
   if (places.empty()) return;
+  const auto is_known = [&](cv::Point at) {
+    return whole(known).contains(at) && known.at<std::uint8_t>(at) != 0;
+  };
   const auto bytes = static_cast<std::size_t>(picture.channels());
   for (int y = 0; y < wanted.rows; ++y) {
     for (int x = 0; x < wanted.cols; ++x) {
-      if (wanted.at<std::uint8_t>(y, x) == 0) continue;
+      std::uint8_t& want = wanted.at<std::uint8_t>(y, x);
+      if (want == 0) continue;
       const cv::Point nearest = places[static_cast<std::size_t>(labels.at<int>(y, x))];
-      cv::Point from = 2 * nearest - cv::Point(x, y);
-      if (!whole(known).contains(from) || known.at<std::uint8_t>(from) == 0) from = nearest;
+      cv::Point step = nearest - cv::Point(x, y);
+      if (want == kMirrored && !is_known(nearest + step)) {
+        want = 0;
+        continue;
+      }
+      while (!is_known(nearest + step)) step = {step.x / 2, step.y / 2};  // ends at the nearest
+      const cv::Point from = nearest + step;
       std::copy_n(picture.ptr(from.y) + bytes * static_cast<std::size_t>(from.x), bytes,
                   picture.ptr(y) + bytes * static_cast<std::size_t>(x));
     }
   }
+}
+
+cv::Rect grown(const cv::Rect& area, int room, const cv::Mat& image) {
+  return cv::Rect(area.x - room, area.y - room, area.width + 2 * room, area.height + 2 * room) &
+         whole(image);
 }
 
 bool is_identity(const AffineMap& map) {
@@ -133,11 +151,19 @@ void StillLayers::fill_background(const cv::Mat& owner) {
   cv::Mat stays(owner.size(), CV_8UC1, cv::Scalar(0));
   for (std::size_t i = 0; i < layers_.size(); ++i) {
     const Layer& layer = layers_[i];
-    (layer.reach_px > 0 ? hole : stays)(layer.area)
-        .setTo(255, owner(layer.area) == static_cast<double>(i + 1));
+    const double code = static_cast<double>(i + 1);
+    if (layer.reach_px == 0) {
+      stays(layer.area).setTo(1, owner(layer.area) == code);
+      continue;
+    }
+    // Around what hardly moves hardly anything comes to light, drawn well or not.
+    const int margin = std::clamp(static_cast<int>(layer.reach_px / 2), 1, kMargin_px);
+    const cv::Rect around = grown(layer.area, margin, owner);
+    cv::Mat left;
+    cv::dilate(owner(around) == code, left,
+               cv::getStructuringElement(cv::MORPH_RECT, {2 * margin + 1, 2 * margin + 1}));
+    hole(around).setTo(kAnything, left);
   }
-  const int side = 2 * kMargin_px + 1;
-  cv::dilate(hole, hole, cv::getStructuringElement(cv::MORPH_RECT, {side, side}));
   hole.setTo(0, stays);
   cv::Mat wanted = hole.clone();
   for (const Layer& layer : layers_) {
@@ -147,12 +173,10 @@ void StillLayers::fill_background(const cv::Mat& owner) {
   }
   cv::Rect area = cv::boundingRect(hole);
   if (area.empty()) return;
-  area = cv::Rect(area.x - kRoom_px, area.y - kRoom_px, area.width + 2 * kRoom_px,
-                  area.height + 2 * kRoom_px) &
-         whole(hole);
+  area = grown(area, 1 + kRoom_px, hole);
   background_ = background_.clone();
-  cv::Mat part = background_(area);
-  continue_into(part, hole(area) == 0, wanted(area));
+  cv::Mat part = background_(area), wanted_part = wanted(area);
+  continue_into(part, hole(area) == 0, wanted_part);
 }
 
 /// Where nearer objects hide it; a layer of which nothing can be seen gets no cover.
@@ -165,21 +189,20 @@ void StillLayers::fill_layer(std::size_t number, const cv::Mat& image, const cv:
     reach_px = std::max(reach_px, layers_[i].reach_px);
   }
   reach_px += layer.reach_px + kSlack_px;
-  const int room = static_cast<int>(std::ceil(reach_px));
-  const cv::Rect around = cv::Rect(layer.area.x - room, layer.area.y - room,
-                                   layer.area.width + 2 * room, layer.area.height + 2 * room) &
-                          whole(owner);
+  const cv::Rect around = grown(layer.area, static_cast<int>(std::ceil(reach_px)), owner);
   if (cv::countNonZero(owner(around) > code) > 0) {
     cv::Mat mask(around.size(), CV_8UC1, cv::Scalar(0));
-    const cv::Rect inner(layer.area.tl() - around.tl(), layer.area.size());
-    layer.mask.copyTo(mask(inner));
+    layer.mask.copyTo(mask(cv::Rect(layer.area.tl() - around.tl(), layer.area.size())));
     cv::Mat far;
     cv::distanceTransform(mask == 0, far, cv::DIST_L2, cv::DIST_MASK_5);
-    const cv::Mat hidden = (owner(around) > code) & (far <= reach_px);
+    cv::Mat hidden(around.size(), CV_8UC1, cv::Scalar(0));
+    hidden.setTo(kMirrored, far <= reach_px);
+    hidden.setTo(kAnything, mask);
+    hidden.setTo(0, owner(around) <= code);
     layer.area = around;
-    layer.mask = mask | hidden;
     layer.colour = image(around).clone();
     continue_into(layer.colour, owner(around) == code, hidden);
+    layer.mask = mask | hidden;
   }
   cv::GaussianBlur(layer.mask != 0, layer.cover, {3, 3}, 0, 0, cv::BORDER_REPLICATE);
 }
