@@ -66,11 +66,9 @@ struct ShardSample {
   VolumeStatistics statistics;
   /// [row, column] of the volume's tiles: 1 generated, 0 left at zero. Empty: all is generated.
   std::vector<std::uint8_t> tiles;
-  float scale = 1;  ///< value = stored code x scale for uint8; 1 for floats
-  /// Empty boxes and persons if the annotation could not be read; boxes of a shard that is read
-  /// have no outlines, `labels` has them.
-  Annotation annotation;
-  VolumeLabels labels;  ///< as many entries as `annotation`
+  float scale = 1;        ///< value = stored code x scale for uint8; 1 for floats
+  Annotation annotation;  ///< empty boxes and persons if the annotation could not be read
+  VolumeLabels labels;    ///< as many entries as `annotation`
 };
 
 /// A sample that a shard keeps a slot for but no volume.

@@ -346,6 +346,26 @@ Box annotated_box(const BoxColumns& from, std::size_t row) {
   return box;
 }
 
+/// Empty if there is none, or no outline's text.
+Outline outline_at(const BoxColumns& from, std::size_t row) {
+  if (from.outline.empty()) return {};
+  const std::vector<char>& text = from.outline[row];
+  return read_outline({text.data(), text.size()}).value_or(Outline());
+}
+
+/// An outline in the volume back in the source, as edges map; empty if the map is not known.
+Outline to_source(Outline outline, const std::array<double, 6>& source_to_volume) {
+  const double scale_x = source_to_volume[0], scale_y = source_to_volume[4];
+  if (!(scale_x > 0 && scale_y > 0)) return {};
+  for (auto& ring : outline.rings) {
+    for (Point& corner : ring) {
+      corner = {(corner.x - 0.5 - source_to_volume[2]) / scale_x + 0.5,
+                (corner.y - 0.5 - source_to_volume[5]) / scale_y + 0.5};
+    }
+  }
+  return outline;
+}
+
 Person annotated_person(const PoseColumns& from, std::size_t joints, std::size_t row) {
   Person person;
   for (std::size_t j = row * joints; j < (row + 1) * joints; ++j) {
@@ -415,13 +435,10 @@ ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, in
     const BoxColumns& boxes = tables.boxes;
     sample.annotation.boxes.push_back(annotated_box(boxes, k));
     if (!boxes.motion.empty()) sample.pair.objects.push_back(motion_if_any(boxes.motion, k));
-    Outline outline;
-    if (!boxes.outline.empty()) {
-      const std::vector<char>& text = boxes.outline[k];
-      outline = read_outline({text.data(), text.size()}).value_or(Outline());
-    }
     sample.labels.boxes.push_back({box_at(boxes.xyxy, k), box_at(boxes.xyxy_unclipped, k),
-                                   boxes.ignore[k] != 0, std::move(outline)});
+                                   boxes.ignore[k] != 0, outline_at(boxes, k)});
+    sample.annotation.boxes.back().outline =
+        to_source(sample.labels.boxes.back().outline, sample.source_to_volume);
   });
   const std::size_t joints = header.label_schema.joint_names.size();
   rows_of(tables.poses.offsets, [&](std::size_t k) {

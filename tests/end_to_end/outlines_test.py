@@ -267,6 +267,26 @@ class Outlines(program.InFolder):
             for box, outline in zip(labels["boxes"], sample["boxes"]["outline"]):
                 self.assertEqual(box["outline"], json.loads(outline) if outline else None)
 
+    def test_retry_keeps_the_outlines_of_the_other_samples(self):
+        whole = self.convert("letterbox", "whole")
+        image = self.folder / "images" / "000003.png"
+        good = image.read_bytes()
+        image.write_bytes(good[:len(good) // 2])
+        source = {"dataset": "frames", "root": "images", "labels": {"format": "coco", "path": "labels.json"},
+                  "pairs": pairs([1])}
+        job = manifest([source], image={"preset": "mpii", "width": 40, "height": 40, "fit": "letterbox"},
+                       generator={"kind": "difference"}, output={"directory": "out", "samples_per_shard": 4},
+                       errors={"policy": "quarantine", "max_count": 3, "max_fraction": 1})
+        run("convert", self.write_manifest(job), "--progress", "none")
+        self.assertEqual(len(eventgan.Shards(self.folder / "out")), 2)
+        image.write_bytes(good)
+        run("retry", self.folder / "out", "--progress", "none")
+        run("verify", "--deep", self.folder / "out")
+        again = eventgan.Shards(self.folder / "out")
+        self.assertEqual(len(again), len(whole))
+        for one, other in zip(again, whole):
+            self.assertEqual(list(one["boxes"]["outline"]), list(other["boxes"]["outline"]))
+
     def test_stills_and_preview(self):
         shards = self.convert("letterbox", pairs={"from": "stills", "motion": {
             "translation_px": [2, 4], "rotation_deg": 1, "scale": 0.02}})

@@ -56,17 +56,25 @@ def mask(outline: bytes, size: tuple[int, int]) -> np.ndarray:
     ValueError
         It is no outline.
     """
-    height, width = size
-    turns = np.zeros(height * (width + 1))  # how much more often rings wind around a pixel than around its left one
-    for ring in rings(outline):
+    found, covered = rings(outline), np.zeros(size, bool)
+    if not found:
+        return covered
+    # What no ring reaches is not looked at.
+    corners = np.concatenate(found)
+    left, top = np.clip(np.floor(corners.min(0)), 0, size[::-1]).astype(np.int64)
+    right, bottom = np.clip(np.ceil(corners.max(0)), 0, size[::-1]).astype(np.int64)
+    width = right - left + 1
+    turns = np.zeros((bottom - top) * width)  # how much more often rings wind around a pixel than around its left one
+    for ring in found:
         ahead = np.roll(ring, -1, axis=0)
         upwards = ring[:, 1] > ahead[:, 1]  # clockwise, that is where a part begins
         high, low = np.where(upwards[:, None], ahead, ring), np.where(upwards[:, None], ring, ahead)
-        first, end = (np.clip(np.ceil(y - 0.5), 0, height).astype(np.int64) for y in (high[:, 1], low[:, 1]))
+        first, end = (np.clip(np.ceil(y - 0.5), top, bottom).astype(np.int64) for y in (high[:, 1], low[:, 1]))
         count = np.maximum(end - first, 0)  # of the rows whose centres an edge crosses
         edge = np.repeat(np.arange(len(ring)), count)
         row = first[edge] + np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
         (x, y), (run, rise) = high[edge].T, (low - high)[edge].T
-        column = np.clip(np.ceil(x + (row + 0.5 - y) / rise * run - 0.5), 0, width).astype(np.int64)
-        turns += np.bincount(row * (width + 1) + column, np.where(upwards, 1, -1)[edge], len(turns))
-    return turns.reshape(height, width + 1).cumsum(1)[:, :width] != 0
+        column = np.clip(np.ceil(x + (row + 0.5 - y) / rise * run - 0.5), left, right).astype(np.int64)
+        turns += np.bincount((row - top) * width + column - left, np.where(upwards, 1, -1)[edge], len(turns))
+    covered[top:bottom, left:right] = turns.reshape(-1, width).cumsum(1)[:, :-1] != 0
+    return covered

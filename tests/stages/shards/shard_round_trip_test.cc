@@ -184,6 +184,7 @@ TEST(ShardRoundTrip, AShardWithoutOutlinesHasNoColumnOfThem) {
   const ShardReader reader(folder / example.header.name);
   EXPECT_THAT(reader.header().features, ::testing::Not(::testing::Contains("outlines")));
   EXPECT_TRUE(reader.sample(0).labels.boxes[0].outline.empty());
+  EXPECT_TRUE(reader.sample(0).annotation.boxes[0].outline.empty());
 }
 
 TEST(ShardRoundTrip, MoreRowsThanAChunkOfAColumn) {
