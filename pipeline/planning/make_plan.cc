@@ -1,6 +1,6 @@
 #include "pipeline/planning/make_plan.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
@@ -428,6 +428,21 @@ void settle_sizes(const JobManifest& manifest,
 
 constexpr char kLimitField[] = "limit";  // of a trial's fingerprint
 
+/// Says what of a source cannot be read. Throws InputError where it is more than the job's error
+/// policy allows.
+void tell_unreadable(const JobManifest& manifest, const SourceSpec& source, const Dataset& dataset,
+                     std::vector<std::string>& warnings) {
+  const auto [reasons, of] = dataset.unreadable();
+  if (reasons.empty()) return;
+  if (beyond_limits(manifest.errors, std::ssize(reasons), of)) {
+    throw InputError(fmt::format(
+        "expected recordings that can be read, as \"errors\" in the manifest allows, got {} of {} "
+        "that cannot, in {}:\n{}",
+        reasons.size(), of, source.root, fmt::join(reasons, "\n")));
+  }
+  for (const std::string& reason : reasons) warnings.push_back("left out: " + reason);
+}
+
 void open_datasets(const JobManifest& manifest, const PlanningOptions& options,
                    std::vector<std::unique_ptr<Dataset>>& datasets) {
   Phase phase(options.show_phase, {"sources", /*has_bytes=*/false, "opening"},
@@ -472,6 +487,7 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
     job.plan.sources.push_back(std::move(planned.summary));
     job.unpaired_by_gap.push_back(std::move(planned.unpaired_by_gap));
     std::ranges::move(dataset.warnings(), std::back_inserter(job.warnings));
+    tell_unreadable(manifest, manifest.sources[i], dataset, job.warnings);
     for (auto& [what, meaning] : dataset.label_meanings()) {
       meanings["labels " + std::to_string(i) + " " + what] = meaning;
     }
