@@ -20,7 +20,7 @@ from .outlines import mask
 
 FORMAT, FORMAT_VERSION = "eventgan-shard", "1.0"
 FEATURES = frozenset(("tiles", "times", "origin", "motion", "threshold", "projection", "difficulty", "outlines",
-                      "person_boxes", "joints3d", "camera", "joint_aliases"))
+                      "object_motion", "person_boxes", "joints3d", "camera", "joint_aliases"))
 PLAN = "plan.json"
 DESCRIPTION, DESCRIPTION_FORMAT, DESCRIPTION_VERSION = "dataset.json", "eventgan-dataset", "1.0"
 VIEW = "dataset.h5"
