@@ -43,9 +43,10 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
       ElementsAre("/events/tiles", "/events/statistics/generated_fraction", "/pairs/prev_time_s",
                   "/pairs/next_time_s", "/pairs/subject", "/pairs/action", "/pairs/camera",
                   "/pairs/drive", "/pairs/motion", "/pairs/threshold", "/labels/projection",
-                  "/labels/projection_source", "/labels/boxes/difficulty", "/labels/poses/box",
-                  "/labels/poses/box_source", "/labels/poses/joints3d_mm", "/labels/poses/camera",
-                  "/labels/poses/camera_source", "/labels/poses/camera_distortion"));
+                  "/labels/projection_source", "/labels/boxes/difficulty", "/labels/boxes/motion",
+                  "/labels/poses/box", "/labels/poses/box_source", "/labels/poses/joints3d_mm",
+                  "/labels/poses/camera", "/labels/poses/camera_source",
+                  "/labels/poses/camera_distortion"));
 }
 
 TEST(ShardOverview, HasItsColumnsAndNoOthers) {
