@@ -434,12 +434,16 @@ ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, in
   rows_of(tables.boxes.offsets, [&](std::size_t k) {
     const BoxColumns& boxes = tables.boxes;
     sample.annotation.boxes.push_back(annotated_box(boxes, k));
-    if (!boxes.motion.empty()) sample.pair.objects.push_back(motion_if_any(boxes.motion, k));
     sample.labels.boxes.push_back({box_at(boxes.xyxy, k), box_at(boxes.xyxy_unclipped, k),
                                    boxes.ignore[k] != 0, outline_at(boxes, k)});
     sample.annotation.boxes.back().outline =
         to_source(sample.labels.boxes.back().outline, sample.source_to_volume);
+    if (const auto motion = motion_if_any(boxes.motion, k)) {
+      sample.pair.objects.resize(sample.annotation.boxes.size());
+      sample.pair.objects.back() = motion;
+    }
   });
+  if (!sample.pair.objects.empty()) sample.pair.objects.resize(sample.annotation.boxes.size());
   const std::size_t joints = header.label_schema.joint_names.size();
   rows_of(tables.poses.offsets, [&](std::size_t k) {
     sample.annotation.persons.push_back(annotated_person(tables.poses, joints, k));

@@ -184,6 +184,7 @@ ExampleShard example_shard(StoredType type, int deflate_level) {
   cut.pair.previous.video_frame = 10;
   cut.pair.next.video_frame = 12;
   add_box(cut, 0, {10, -3, 17, 6}, {5, 0, 8, 3});
+  cut.pair.objects = {ImageMotion{0.5, -2.25, 1.5, 0.984375}};
   add(shard, cut, volume(3, size));
 
   ShardSample person = sample(4);  // of a still

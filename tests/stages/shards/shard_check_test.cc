@@ -277,9 +277,9 @@ void replace(hid_t file, const char* name, const Value& value) {
 
 using Names = std::vector<std::string>;
 
-const Names kFeatures{"tiles",        "times",      "origin",     "motion",
-                      "threshold",    "projection", "difficulty", "outlines",
-                      "person_boxes", "joints3d",   "camera",     "joint_aliases"};
+const Names kFeatures{"tiles",      "times",      "origin",       "motion",        "threshold",
+                      "projection", "difficulty", "outlines",     "object_motion", "person_boxes",
+                      "joints3d",   "camera",     "joint_aliases"};
 
 TEST_F(ShardCheck, FeaturesAreThoseOfTheColumns) {
   write(testing::example_shard());

@@ -44,9 +44,9 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
                   "/pairs/next_time_s", "/pairs/subject", "/pairs/action", "/pairs/camera",
                   "/pairs/drive", "/pairs/motion", "/pairs/threshold", "/labels/projection",
                   "/labels/projection_source", "/labels/boxes/difficulty", "/labels/boxes/outline",
-                  "/labels/poses/box", "/labels/poses/box_source", "/labels/poses/joints3d_mm",
-                  "/labels/poses/camera", "/labels/poses/camera_source",
-                  "/labels/poses/camera_distortion"));
+                  "/labels/boxes/motion", "/labels/poses/box", "/labels/poses/box_source",
+                  "/labels/poses/joints3d_mm", "/labels/poses/camera",
+                  "/labels/poses/camera_source", "/labels/poses/camera_distortion"));
 }
 
 TEST(ShardOverview, HasItsColumnsAndNoOthers) {
