@@ -84,16 +84,27 @@ TEST(FuzzCorpusSeeds, AreReadWhereTheyAreSound) {
   EXPECT_EQ(parse_mot_labels(labels("mot/two"), {}, "two").size(), 2u);
   EXPECT_EQ(parse_mot_sequence(labels("mot/seqinfo"), "seqinfo").frames_per_second, 30);
   EXPECT_EQ(parse_csv_labels(labels("csv/three"), "three").size(), 3u);
-  const CocoIndex coco = index_coco(InputFile(corpus / "coco" / "persons"), "persons");
-  EXPECT_EQ(coco.annotations.size(), 1u);
-  Annotation annotation;
-  add_coco_annotation(
-      labels("coco/persons").substr(coco.annotations[0].offset, coco.annotations[0].length), 9,
-      {30, 40}, coco, coco_schema(coco, "persons"), "persons", annotation);
-  EXPECT_EQ(annotation.persons.size(), 1u);
+  const std::pair<const char*, int> entries[] = {// and how many rings each has
+                                                 {"persons", 0},
+                                                 {"polygons", 2},
+                                                 {"runs", 1},
+                                                 {"text", 1}};
+  for (const auto& [name, rings] : entries) {
+    const CocoIndex coco = index_coco(InputFile(corpus / "coco" / name), name);
+    ASSERT_EQ(coco.annotations.size(), 1u) << name;
+    const ByteRange range = coco.annotations[0];
+    Annotation annotation;
+    add_coco_annotation(
+        labels((std::string("coco/") + name).c_str()).substr(range.offset, range.length), 9,
+        {30, 40}, coco, coco_schema(coco, name), name, annotation);
+    EXPECT_EQ(annotation.persons.size(), name == std::string("persons") ? 1u : 0u);
+    EXPECT_EQ(std::ssize(annotation.boxes.at(0).outline.rings), rings) << name;
+  }
   EXPECT_EQ(parse_yolo_yaml(labels("yolo/data"), "data").names.joint_names.size(), 17u);
-  EXPECT_FALSE(is_fault(parse_yolo_text(labels("yolo/boxes"), parse_yolo_classes("a\nb", "classes"),
-                                        {30, 40}, "boxes")));
+  for (const char* name : {"yolo/boxes", "yolo/mixed"}) {
+    EXPECT_FALSE(is_fault(
+        parse_yolo_text(labels(name), parse_yolo_classes("a\nb", "classes"), {30, 40}, name)));
+  }
   for (const char* name : {"plain", "lz4", "zstd"}) {
     const StoredParts parts = open_aedat4(corpus / "aedat4" / name);
     EXPECT_EQ(parts.events->count(), 4) << name;

@@ -80,11 +80,24 @@ void check_labels(const ImageLabels& labels) {
   }
 }
 
+/// Rings that lie somewhere, of three corners or more.
+void check_outline(const Outline& outline) {
+  for (const std::vector<Point>& ring : outline.rings) {
+    if (ring.size() < 3) std::abort();
+    for (const Point& corner : ring) {
+      if (!(std::abs(corner.x) <= 2 * kFarthest_px && std::abs(corner.y) <= 2 * kFarthest_px)) {
+        std::abort();
+      }
+    }
+  }
+}
+
 /// Numbers of classes that are there, boxes that lie somewhere, and as many joints as there are.
 void check_annotation(const Annotation& annotation, const LabelSchema& schema) {
   for (const Box& box : annotation.boxes) {
     if (box.class_id < 0 || box.class_id >= std::ssize(schema.class_names)) std::abort();
     if (!(box.xyxy.left < box.xyxy.right && box.xyxy.top < box.xyxy.bottom)) std::abort();
+    check_outline(box.outline);
   }
   for (const Person& person : annotation.persons) {
     if (person.joints.size() != schema.joint_names.size()) std::abort();

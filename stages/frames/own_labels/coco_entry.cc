@@ -11,6 +11,7 @@
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/detail/strict_json.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/outlines.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
 
@@ -70,6 +71,62 @@ Rectangle read_bbox(const StrictValue& value) {
   const double top = sides[1].number(-kFarthest_px, kFarthest_px);
   return {left, top, left + sides[2].number(0, kFarthest_px),
           top + sides[3].number(0, kFarthest_px)};
+}
+
+/// x, y of each corner.
+std::vector<Point> read_polygon(const StrictValue& value) {
+  const std::vector<StrictValue> numbers = value.elements();
+  std::vector<Point> corners;
+  if (numbers.size() % 2 != 0) {
+    value.fault("x and y of each corner", std::to_string(numbers.size()) + " numbers");
+    return corners;
+  }
+  for (std::size_t i = 0; i < numbers.size(); i += 2) {
+    corners.push_back({numbers[i].number(-kFarthest_px, kFarthest_px),
+                       numbers[i + 1].number(-kFarthest_px, kFarthest_px)});
+  }
+  return corners;
+}
+
+/// {"size": [height, width], "counts": run lengths or their text}.
+Outline read_run_lengths(StrictObject object, ImageSize image) {
+  constexpr int kLargest = 1'000'000;
+  const StrictValue size = object.at("size");
+  const StrictValue counts = object.at("counts");
+  const std::vector<StrictValue> sides = size.elements();
+  if (sides.size() != 2) {
+    size.fault("height and width");
+    return {};
+  }
+  const ImageSize told{sides[0].integer(0, kLargest), sides[1].integer(0, kLargest)};
+  if (told != image) {
+    size.fault(to_string(image) + ", the image's size", to_string(told));
+    return {};
+  }
+  std::optional<std::vector<std::uint32_t>> runs;
+  if (counts.is_text()) {
+    runs = run_lengths(counts.text());
+  } else {
+    runs.emplace();
+    for (const StrictValue& run : counts.elements()) {
+      constexpr std::int64_t kMost = std::numeric_limits<std::uint32_t>::max();
+      runs->push_back(static_cast<std::uint32_t>(run.integer<std::int64_t>(0, kMost)));
+    }
+  }
+  const auto mask = runs ? mask_of(*runs, image) : std::nullopt;
+  if (mask) return outline_of(*mask);
+  counts.fault("run lengths of " + std::to_string(image.pixel_count()) + " pixels", "others");
+  return {};
+}
+
+/// None of a box without `segmentation`, or with an empty one.
+Outline read_segmentation(StrictObject& object, ImageSize image) {
+  const auto segmentation = find_given(object, "segmentation");
+  if (!segmentation) return {};
+  if (!segmentation->is_array()) return read_run_lengths(segmentation->object(), image);
+  std::vector<std::vector<Point>> parts;
+  for (const StrictValue& part : segmentation->elements()) parts.push_back(read_polygon(part));
+  return outline_of_parts(std::move(parts));
 }
 
 /// COCO has 0 or 1; many tools write false or true.
@@ -150,7 +207,10 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
       has_names = !known->keypoints.empty();
     }
   }
-  box.xyxy = read_bbox(object.at("bbox"));
+  box.outline = read_segmentation(object, image);
+  const auto sides = find_given(object, "bbox");
+  box.xyxy = !sides && !box.outline.empty() ? bounds(box.outline)
+                                            : read_bbox(sides ? *sides : object.at("bbox"));
   if (const auto crowd = find_given(object, "iscrowd")) box.ignore = read_flag(*crowd);
   if (const auto area = find_given(object, "area")) area->number(0, kFarthest_px * kFarthest_px);
   Person person;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "manifests/documents/detail/json_text.h"
+#include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
@@ -169,7 +170,16 @@ class YoloLine {
                      in_quotes(columns_[0]));
     }
     box.class_id = static_cast<int>(*number);
-    box.xyxy = is_outline ? around_outline() : centred();
+    if (is_outline) {
+      std::vector<Point> corners;
+      for (std::size_t i = 1; i < columns_.size(); i += 2) {
+        corners.push_back({share(i) * image_.width, share(i + 1) * image_.height});
+      }
+      box.xyxy = bounds(Outline{{corners}});
+      box.outline = outline_of_parts({std::move(corners)});
+    } else {
+      box.xyxy = centred();
+    }
     if (!add_box(box, image_, place, annotation) || joints == 0) return;
     Person person;
     person.box = box.xyxy;
@@ -187,18 +197,6 @@ class YoloLine {
     const double half_width = share(3) * image_.width / 2;
     const double half_height = share(4) * image_.height / 2;
     return {x - half_width, y - half_height, x + half_width, y + half_height};
-  }
-
-  /// The upright rectangle around an outline, whose points are behind the class.
-  Rectangle around_outline() const {
-    double left = share(1), top = share(2), right = left, bottom = top;
-    for (std::size_t i = 3; i < columns_.size(); i += 2) {
-      left = std::min(left, share(i));
-      top = std::min(top, share(i + 1));
-      right = std::max(right, share(i));
-      bottom = std::max(bottom, share(i + 1));
-    }
-    return {left * image_.width, top * image_.height, right * image_.width, bottom * image_.height};
   }
 
   double number_at(std::size_t column) const {
