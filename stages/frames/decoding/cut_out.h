@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "manifests/values/labels.h"
@@ -45,7 +46,12 @@ struct OutlineCounts {
   std::size_t given = 0;  ///< the labels' own
   std::size_t cut = 0;
   std::size_t ellipses = 0;  ///< in place of a cut
+
+  OutlineCounts& operator+=(const OutlineCounts& other);
 };
+
+/// "120 of labels, 300 cut out of their boxes, 12 ellipses".
+std::string to_text(const OutlineCounts& counts);
 
 /// Gives the boxes that have no outline that of cut_out, but for regions to be ignored and boxes
 /// beyond the image. Thread safe.
