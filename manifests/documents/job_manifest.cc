@@ -19,6 +19,18 @@ constexpr std::int64_t kMostPairs = 1'000'000'000;
 constexpr std::int64_t kMostEvents = 1'000'000'000;
 constexpr int kLargestSensor = 8192;
 
+void list_object_motion(Fields& fields, ObjectMotionSpec& spec) {
+  fields.find("translation_px", spec.translation_px, pairs_of(0, 100),
+              "Least and most length of an object's shift, in any direction.");
+  fields.find("rotation_deg", spec.rotation_deg, numbers(0, 45),
+              "Most, either way, about the centre of its box.");
+  fields.find("scale", spec.scale, numbers(0, 0.5), "Most, larger or smaller.");
+  fields.find(
+      "rests", spec.rests, numbers(0, 1),
+      "Share of the objects that have no motion of their own where the image moves, such as "
+      "parked cars. Where it does not, every object moves.");
+}
+
 void list_motion(Fields& fields, StillsSpec& spec) {
   fields.find("translation_px", spec.translation_px, pairs_of(0, 100),
               "Least and most length of the shift, in any direction.");
@@ -27,13 +39,23 @@ void list_motion(Fields& fields, StillsSpec& spec) {
               "Most, larger or smaller: 0.03 is 0.97 to 1.03.");
   fields.find("frames", spec.frames, integers(1, 6),
               "The gap of the pair, which the generator's training knows as so many frames.");
+  fields.find(
+      "objects", spec.objects, objects(list_object_motion),
+      "gives each object with an outline a motion of its own, before the image's is added: "
+      "nearer objects (whose boxes reach lower) cover farther ones, and what they uncover is "
+      "filled from around it. Without it everything moves as the image does.");
+  fields.find("rests", spec.rests, numbers(0, 1),
+              "Share of the pairs whose image does not move, as before a camera at rest; of those "
+              "alone that have an object that does. Default: 0.5 with objects, else 0.");
 }
 
 void list_pairs(Fields& fields, PairSpec& spec) {
   bool of_stills = spec.stills.has_value();
-  fields.kind("from", of_stills, words(kPairOriginWords),
-              "sequence: two frames of one sequence. stills: an image, and itself under a small "
-              "motion that the seed draws; what moves is everything, as before a moving camera.");
+  fields.kind(
+      "from", of_stills, words(kPairOriginWords),
+      "sequence: two frames of one sequence. stills: an image, and itself under a small "
+      "motion that the seed draws; what moves is everything, as before a moving camera, and "
+      "with motion.objects each object on its own.");
   Fields::Only stills = fields.only_for({"stills"}), sequences = fields.only_for({"sequence"});
   stills.find("motion", spec.stills, objects(list_motion),
               "the motion from the one image to the other, about the image's centre, in pixels of "

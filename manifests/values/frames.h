@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -64,7 +65,8 @@ struct FrameOrigin {
   bool operator==(const FrameOrigin&) const = default;
 };
 
-/// A motion of a whole image, as a moving camera sees it, about the image's centre c:
+/// A motion of a whole image, as a moving camera sees it, or of an object, about the centre c of
+/// the image or of the object's box:
 ///   x' = c + scale R (x - c) + (x_px, y_px),  R = [cos a, -sin a; sin a, cos a], a = angle_deg.
 struct ImageMotion {
   double x_px = 0;
@@ -87,6 +89,10 @@ struct FramePair {
   /// Of a still: how a point moves from the previous image to the next. Both frames are the
   /// labelled image then; the one that is not at `label_position` is it under this motion.
   std::optional<ImageMotion> motion = std::nullopt;
+  /// Of a still whose objects move on their own: for each box of its annotation, the object's
+  /// motion before `motion` is added, about the box's centre; none of a box that does not: what
+  /// lies in it moves as the image does. Empty: no box does.
+  std::vector<std::optional<ImageMotion>> objects = {};
 
   /// NaN if either time is unknown.
   double gap_s() const { return next.time_s - previous.time_s; }
@@ -99,6 +105,14 @@ struct FramePair {
     const bool fits = stride > 0 && frames % stride == 0 && next.video_frame % stride == 0;
     return fits ? stride : 1;
   }
+};
+
+/// What is seen between two frames, in the size of the generator's input.
+struct FramesBetween {
+  /// The frame at u in [0, 1] of the time from the first frame (0) to the second (1). Null: nobody
+  /// knows. Thread safe.
+  std::function<GreyImage(double u)> at = {};
+  double displacement_px = 0;  ///< no point of a frame moves farther from the first to the second
 };
 
 }  // namespace eventgan

@@ -10,7 +10,7 @@ namespace eventgan {
 /// What makes the volumes: the EventGAN network, a model to compare it with, or a camera.
 enum class GeneratorKind {
   kNetwork,
-  kEsim,        ///< a random affine motion of the previous frame (stages/events/simulation)
+  kEsim,        ///< a random affine motion of the previous frame, or a still's own motion
   kDifference,  ///< log intensity on a line from the previous frame to the next
   kEvents       ///< none: the camera's own events, of datasets that have them
 };
@@ -30,6 +30,8 @@ struct GeneratorRow {
   bool needs_frames = true;
   /// `sensor` may have the settings of a simulated one (SensorSpec).
   bool has_sensor_settings = false;
+  /// It looks at what is seen between two frames, where that is known: of stills (FramesBetween).
+  bool sees_between = false;
 };
 
 /// Every kind, in the order in which messages list them.
@@ -45,7 +47,8 @@ inline constexpr std::array kGenerators{
                  .value = GeneratorKind::kEsim,
                  .title = "ESIM, a random motion of one frame",
                  .keys = {"sensor", "duration_s", "max_displacement_px"},
-                 .has_sensor_settings = true},
+                 .has_sensor_settings = true,
+                 .sees_between = true},
     GeneratorRow{.word = "difference",
                  .value = GeneratorKind::kDifference,
                  .title = "log difference of two frames",

@@ -59,6 +59,15 @@ enum class PairSide { kBefore, kAfter, kAround };
 /// One pair a labelled frame, its gap drawn by the seed; or one pair for each gap.
 enum class PairChoice { kOne, kAll };
 
+/// How the objects of a still move on their own, each before the image's motion is added: drawn as
+/// that is, about the centre of the object's box.
+struct ObjectMotionSpec {
+  std::array<double, 2> translation_px{0, 8};
+  double rotation_deg = 3;
+  double scale = 0.04;
+  double rests = 0.2;  ///< share of the objects that have none, where the image moves; 0..1
+};
+
 /// Pairs of stills: an image, and itself under a small motion about its centre. The seed draws the
 /// motion of each image: a shift in any direction, an angle and a scale factor, each uniformly.
 struct StillsSpec {
@@ -66,6 +75,10 @@ struct StillsSpec {
   double rotation_deg = 2;                     ///< most, either way, 0..45
   double scale = 0.03;                         ///< most, larger or smaller: 1 ± scale, 0..0.5
   int frames = 1;                              ///< the pair's gap_frames, 1..6
+  /// Of objects with an outline; none: they move as the image does.
+  std::optional<ObjectMotionSpec> objects = std::nullopt;
+  /// Share of the pairs whose image does not move, 0..1; none: 0.5 with `objects`, else 0.
+  std::optional<double> rests = std::nullopt;
 };
 
 struct PairSpec {

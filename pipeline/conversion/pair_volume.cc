@@ -14,7 +14,8 @@ GeneratedPart generate_volume(const Generator& generator, const GeneratorSpec& s
                               const VolumeLabels& labels, std::span<float> volume) {
   GeneratedPart part;
   part.threshold = pair_threshold(spec, key);
-  const GeneratorInput input{pair.input, pair.content, part.threshold};
+  const GeneratorInput input{pair.input, pair.content, part.threshold,
+                             pair.between.at ? &pair.between : nullptr};
   if (spec.scope.scope == Scope::kWhole) {
     part.notes = generator.generate(input, volume);
   } else {

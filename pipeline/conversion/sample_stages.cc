@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "manifests/values/still_motion.h"
 #include "pipeline/conversion/pair_volume.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/events/event_volume.h"
@@ -69,7 +70,8 @@ SampleStages::SampleStages(const JobManifest& manifest,
       datasets_(datasets),
       generator_(generator),
       in_flight_(static_cast<std::size_t>(in_flight)),
-      reader_(manifest.directory, manifest.image, in_flight),
+      reader_(manifest.directory, manifest.image, in_flight,
+              generator_row(manifest.generator.kind).sees_between),
       codec_(manifest.output.dtype, manifest.output.deflate_level) {
   for (std::size_t i = 0; i < manifest.sources.size(); ++i) {
     source_keys_.push_back(source_key(manifest.sources, i));
@@ -86,19 +88,22 @@ void SampleStages::read(SampleMessage& message) const try {
   message.sample.origin = frame_origin(kind, planned.sequence);
   message.sample.pair = planned.pair;
   message.sample.source_to_volume.fill(std::numeric_limits<double>::quiet_NaN());
+  Outcome<Annotation> annotation = datasets_[source]->annotation(planned.label_key);
+  const std::vector<Box> boxes = is_fault(annotation) ? std::vector<Box>() : annotation->boxes;
+  settle_motion(manifest_.sources[source].pairs, key_of(message), boxes, message.sample.pair);
   if (!planned.fault.empty()) {
     message.fail(planned.fault);
   } else if (has_events(kind)) {
     read_events(message, *datasets_[source]);
   } else {
-    read_frames(message);
+    read_frames(message, boxes);
   }
-  read_labels(message, *datasets_[source]);
+  read_labels(message, *datasets_[source], std::move(annotation));
 } catch (const std::bad_alloc&) {
   name_sample(message, "read");
 }
 
-void SampleStages::read_frames(SampleMessage& message) const {
+void SampleStages::read_frames(SampleMessage& message, const std::vector<Box>& boxes) const {
   const auto slot = static_cast<std::size_t>(message.slot);
   const SourceSpec& source = manifest_.sources[static_cast<std::size_t>(message.shard->source)];
   const ImageOrientation orientation = orientation_of(source.dataset);
@@ -107,7 +112,8 @@ void SampleStages::read_frames(SampleMessage& message) const {
        i <= slot + in_flight_ && i < samples.size(); ++i) {
     reader_.expect(samples[i].pair, orientation);
   }
-  Outcome<PreparedPair> prepared = reader_.read(message.planned().pair, orientation, source.every);
+  Outcome<PreparedPair> prepared =
+      reader_.read(message.sample.pair, orientation, source.every, boxes);
   if (is_fault(prepared)) {
     message.fail(prepared.fault().reason);
   } else {
@@ -154,9 +160,9 @@ void SampleStages::take_placement(SampleMessage& message) const {
                "--overwrite)");
 }
 
-void SampleStages::read_labels(SampleMessage& message, const Dataset& dataset) const {
+void SampleStages::read_labels(SampleMessage& message, const Dataset& dataset,
+                               Outcome<Annotation> annotation) const {
   const PlannedSample& planned = message.planned();
-  Outcome<Annotation> annotation = dataset.annotation(planned.label_key);
   if (is_fault(annotation)) {
     if (!message.failed()) message.fail(annotation.fault().reason);
     return;

@@ -75,11 +75,12 @@ class SampleStages {
   void finish(SampleMessage& message) const;
 
  private:
-  void read_frames(SampleMessage& message) const;
+  void read_frames(SampleMessage& message, const std::vector<Box>& boxes) const;
   void read_events(SampleMessage& message, const Dataset& dataset) const;
   /// Keeps where the source lies in the volume; fails if that is not what was planned.
   void take_placement(SampleMessage& message) const;
-  void read_labels(SampleMessage& message, const Dataset& dataset) const;
+  void read_labels(SampleMessage& message, const Dataset& dataset,
+                   Outcome<Annotation> annotation) const;
   /// Of views into the manifest and the message.
   PairKey key_of(const SampleMessage& message) const;
   /// A volume that went through `finish`, as large as that, to be overwritten; else a new one. A

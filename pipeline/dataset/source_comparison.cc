@@ -18,6 +18,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/pair_key.h"
 #include "manifests/values/placement.h"
+#include "manifests/values/still_motion.h"
 #include "manifests/values/text.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/runtime/errors.h"
@@ -133,16 +134,23 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
     return {"expected the planned sample " + planned.sample_id + ", got another"};
   }
   // A missing frame that was added since the plan was frozen: its frames were not known then.
-  const FramePair& pair = planned.fault.empty() ? planned.pair : stored.pair;
+  FramePair pair = planned.fault.empty() ? planned.pair : stored.pair;
   if (stored.pair.previous != pair.previous || stored.pair.next != pair.next) {
     return {"expected the frames of the plan, " + pair.previous.path + " and " + pair.next.path +
             ", got " + stored.pair.previous.path + " and " + stored.pair.next.path};
   }
-  if (stored.pair.motion != pair.motion) {
-    return {"expected the motion of the plan, got another"};
-  }
   const std::string place = dataset.label_place(planned.label_key);
   Outcome<Annotation> read = read_annotation(dataset, planned.label_key);
+  const std::string of_source = source_key(manifest_.sources, source);
+  const PairKey key{manifest_.seed, to_string(kind), planned.sample_id, of_source};
+  const auto planned_motion = pair.motion;
+  if (!is_fault(read)) {
+    settle_motion(manifest_.sources[source].pairs, key, read->boxes, pair);
+  }
+  // Labels that could not be read when a sample was quarantined decided nothing.
+  if (stored.pair.motion != pair.motion && (stored.valid || stored.pair.motion != planned_motion)) {
+    return {"expected the motion of the plan, got another"};
+  }
   if (!stored.valid) {
     // What could not be read then may have been mended meanwhile; what was kept must be right.
     if (is_fault(read) || stored.annotation.original.empty() ||
@@ -199,8 +207,6 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   }
   expected.source_size = placement.source;
   expected.source_to_volume = map;
-  const std::string of_source = source_key(manifest_.sources, source);
-  const PairKey key{manifest_.seed, to_string(kind), planned.sample_id, of_source};
   if (const auto threshold = pair_threshold(manifest_.generator, key)) {
     expected.threshold = threshold->mean;
   }

@@ -54,9 +54,25 @@ struct SimulatedPair {
   const GeneratorSpec& spec;
   SensorSpec sensor;  ///< the pair's
   CounterRandom random;
+  const FramesBetween* between;  ///< null: not known
 };
 
+/// From one image to the next no point moves more than 1 px.
+std::vector<GreyImage> images_between(const FramesBetween& between) {
+  constexpr double kRoundingPx = 1e-9;
+  const int steps = std::max(1, static_cast<int>(std::ceil(between.displacement_px - kRoundingPx)));
+  std::vector<GreyImage> images;
+  for (int step = 0; step <= steps; ++step) {
+    images.push_back(between.at(static_cast<double>(step) / steps));
+  }
+  return images;
+}
+
 std::vector<Event> esim_events(const SimulatedPair& pair) {
+  if (pair.between != nullptr) {
+    return simulate_images(images_between(*pair.between), pair.sensor, pair.spec.duration_s,
+                           pair.random.keyed("sensor"), EventOrder::kPixel);
+  }
   return simulate_affine(pair.previous, pair.spec.max_displacement_px, pair.sensor,
                          pair.spec.duration_s, pair.random, EventOrder::kPixel);
 }
@@ -98,8 +114,9 @@ class SimulatedGenerator final : public Generator {
     const GreyImage previous = grey_image(pair.frames.first(pixels), pair.size);
     const GreyImage next = grey_image(pair.frames.last(pixels), pair.size);
     const CounterRandom random = random_.keyed(content_key(previous, next));
-    pixel_event_volume(model_.events({previous, next, spec_, sensor_of(pair), random}),
-                       {bins_, pair.size}, volume);
+    pixel_event_volume(
+        model_.events({previous, next, spec_, sensor_of(pair), random, pair.between}),
+        {bins_, pair.size}, volume);
     return {};
   }
 

@@ -8,7 +8,6 @@
 #include <iterator>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -17,6 +16,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/pair_key.h"
 #include "manifests/values/placement.h"
+#include "manifests/values/still_motion.h"
 #include "manifests/values/text.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/trace.h"
@@ -97,18 +97,6 @@ Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const Pa
   return result;
 }
 
-/// The seed draws each number on its own, so that the limits of one do not change the others.
-ImageMotion draw_motion(const StillsSpec& spec, const CounterRandom& random) {
-  const auto between = [&](std::uint64_t counter, double least, double most) {
-    return least + (most - least) * random.uniform(counter);
-  };
-  const double length_px = between(0, spec.translation_px[0], spec.translation_px[1]);
-  const double direction = between(1, 0, 2 * std::numbers::pi);
-  return {length_px * std::cos(direction), length_px * std::sin(direction),
-          between(2, -spec.rotation_deg, spec.rotation_deg),
-          between(3, 1 - spec.scale, 1 + spec.scale)};
-}
-
 /// A still has no time before or after itself.
 void forget_moved_time(FramePair& pair) {
   FrameRef& moved = pair.label_position == 1 ? pair.previous : pair.next;
@@ -133,7 +121,7 @@ PairChoiceResult choose_one(const Dataset& dataset, const LabelledFrame& frame,
   result.samples.push_back(std::move(choices[random.below(0, choices.size())]));
   if (source.pairs.stills) {
     FramePair& pair = result.samples.back().pair;
-    pair.motion = draw_motion(*source.pairs.stills, random.keyed("motion"));
+    pair.motion = draw_motion(*source.pairs.stills, random);
     forget_moved_time(pair);
   }
   return result;

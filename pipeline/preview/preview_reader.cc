@@ -77,7 +77,9 @@ std::vector<std::uint8_t> frame_image(const Outcome<ColourFrame>& decoded, const
   }
   try {
     const Placement placement = place(sample.source_size, image, sample.pair);
-    return place_colour(is_moved(frame, sample.pair) ? move_still(colour, sample.pair) : colour,
+    return place_colour(is_moved(frame, sample.pair)
+                            ? move_still(colour, sample.pair, sample.annotation.boxes)
+                            : colour,
                         placement);
   } catch (const std::exception& error) {  // a still whose motion no plan has drawn
     warnings.push_back(error.what() + (", in " + frame.path) + " (" + sample.sample_id + ")");

@@ -36,7 +36,7 @@ void clear_unwanted(const TileMask& wanted, std::span<float> volume) {
 }
 
 void check_generator_spans(const GeneratorInput& pair, std::span<const float> volume, int bins) {
-  const auto& [frames, size, threshold] = pair;
+  const auto& [frames, size, threshold, between] = pair;
   const std::size_t plane = size.pixel_count();
   if (size.height >= 1 && size.width >= 1 && frames.size() == 2 * plane &&
       volume.size() == 2 * bins * plane) {

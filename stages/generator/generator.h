@@ -26,6 +26,8 @@ struct GeneratorInput {
   ImageSize size;
   /// Of the sensor: for a simulator, or a network that has thresholds(). None: the generator's own.
   std::optional<ContrastThreshold> threshold = std::nullopt;
+  /// For a simulator of what is seen between the frames; null: nobody knows that.
+  const FramesBetween* between = nullptr;
 };
 
 /// What an engine noticed while it made a volume.

@@ -125,7 +125,8 @@ void append_events(const ShardSample& sample, EventColumns& to) {
   to.flags.push_back(statistics.flags);
 }
 
-void append_box(const Box& box, const VolumeBox& mapped, BoxColumns& to) {
+void append_box(const Box& box, const VolumeBox& mapped, const std::optional<ImageMotion>& motion,
+                BoxColumns& to) {
   const std::size_t row = to.class_id.size();
   push(to.xyxy, mapped.clipped);
   push(to.xyxy_unclipped, mapped.unclipped);
@@ -140,6 +141,7 @@ void append_box(const Box& box, const VolumeBox& mapped, BoxColumns& to) {
   to.track_id.push_back(box.track_id);
   const auto difficulty = static_cast<std::int8_t>(box.difficulty);
   put<std::int8_t>(to.difficulty, {&difficulty, difficulty < 0 ? 0u : 1u}, 1, row, -1);
+  put(to.motion, motion, row);
 }
 
 void append_person(const Person& person, const VolumePerson& mapped, PoseColumns& to) {
@@ -221,7 +223,9 @@ void append_row(const ShardHeader& header, const ShardSample& sample, ShardTable
   tables.valid.push_back(sample.valid);
   if (labelled) {
     for (std::size_t i = 0; i < sample.labels.boxes.size(); ++i) {
-      append_box(sample.annotation.boxes[i], sample.labels.boxes[i], tables.boxes);
+      const auto& motions = sample.pair.objects;
+      append_box(sample.annotation.boxes[i], sample.labels.boxes[i],
+                 i < motions.size() ? motions[i] : std::nullopt, tables.boxes);
     }
     for (std::size_t i = 0; i < sample.labels.persons.size(); ++i) {
       append_person(sample.annotation.persons[i], sample.labels.persons[i], tables.poses);
@@ -282,6 +286,12 @@ std::optional<LensDistortion> distortion_if_any(const std::vector<double>& colum
   return LensDistortion{number[0], number[1], number[2], number[3], number[4]};
 }
 
+std::optional<ImageMotion> motion_if_any(const std::vector<double>& column, std::size_t row) {
+  const double* number = row_if_any(column, 4, row);
+  if (number == nullptr) return std::nullopt;
+  return ImageMotion{number[0], number[1], number[2], number[3]};
+}
+
 FramePair pair_at(const PairColumns& from, std::size_t row) {
   const auto time_s = [row](const std::vector<double>& column) {
     return column.empty() ? kNan : column[row];
@@ -294,9 +304,7 @@ FramePair pair_at(const PairColumns& from, std::size_t row) {
   pair.gap_frames = from.gap_frames[row];
   pair.label_index = from.label_index[row];
   pair.label_position = from.label_position[row];
-  if (const double* motion = row_if_any(from.motion, 4, row)) {
-    pair.motion = {motion[0], motion[1], motion[2], motion[3]};
-  }
+  pair.motion = motion_if_any(from.motion, row);
   return pair;
 }
 
@@ -400,6 +408,7 @@ ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, in
   rows_of(tables.boxes.offsets, [&](std::size_t k) {
     const BoxColumns& boxes = tables.boxes;
     sample.annotation.boxes.push_back(annotated_box(boxes, k));
+    if (!boxes.motion.empty()) sample.pair.objects.push_back(motion_if_any(boxes.motion, k));
     sample.labels.boxes.push_back(
         {box_at(boxes.xyxy, k), box_at(boxes.xyxy_unclipped, k), boxes.ignore[k] != 0});
   });

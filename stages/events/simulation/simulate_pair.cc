@@ -1,7 +1,6 @@
 #include "stages/events/simulation/simulate_pair.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <span>
 #include <stdexcept>
@@ -61,20 +60,28 @@ std::vector<Event> simulate_affine(const GreyImage& image, double max_displaceme
   return ordered(pixel_events(sensor, image.size, row, times_s, random.keyed("sensor")), order);
 }
 
+std::vector<Event> simulate_images(const std::vector<GreyImage>& images, const SensorSpec& sensor,
+                                   double duration_s, CounterRandom random, EventOrder order) {
+  const ImageSize size = images.at(0).size;
+  const int steps = static_cast<int>(images.size()) - 1;
+  std::vector<double> times_s;
+  for (const GreyImage& image : images) {
+    if (image.size != size) throw std::invalid_argument("expected frames of one size");
+    times_s.push_back(step_time_s(static_cast<int>(times_s.size()), steps, 0, duration_s));
+  }
+  const auto row = [&](std::size_t image, int y, std::span<float> intensity) {
+    const std::size_t start = static_cast<std::size_t>(y) * intensity.size();
+    std::ranges::transform(std::span(images[image].pixels).subspan(start, intensity.size()),
+                           intensity.begin(),
+                           [](std::uint8_t u) { return static_cast<float>(u) / 255.0f; });
+  };
+  return ordered(pixel_events(sensor, size, row, times_s, random), order);
+}
+
 std::vector<Event> simulate_difference(const GreyImage& previous, const GreyImage& next,
                                        const SensorSpec& sensor, double duration_s,
                                        CounterRandom random, EventOrder order) {
-  if (previous.size != next.size) {
-    throw std::invalid_argument("expected two frames of one size");
-  }
-  const std::array images = {linear_intensity(previous), linear_intensity(next)};
-  const auto row = [&](std::size_t image, int y, std::span<float> intensity) {
-    const std::size_t start = static_cast<std::size_t>(y) * intensity.size();
-    std::copy_n(images[image].begin() + static_cast<std::ptrdiff_t>(start), intensity.size(),
-                intensity.begin());
-  };
-  return ordered(pixel_events(sensor, previous.size, row, std::array{0.0, duration_s}, random),
-                 order);
+  return simulate_images({previous, next}, sensor, duration_s, random, order);
 }
 
 }  // namespace eventgan

@@ -33,6 +33,11 @@ std::vector<Event> simulate_affine(const GreyImage& image, double max_displaceme
                                    const SensorSpec& sensor, double duration_s,
                                    CounterRandom random, EventOrder order = EventOrder::kTime);
 
+/// Of images, two or more of one size, that are seen one after the other, evenly spaced in time.
+std::vector<Event> simulate_images(const std::vector<GreyImage>& images, const SensorSpec& sensor,
+                                   double duration_s, CounterRandom random,
+                                   EventOrder order = EventOrder::kTime);
+
 /// The earlier works in the paper: each pixel's log intensity moves on a line from its value in the
 /// previous frame to that in the next, whatever moved in between: floor(|L1 - L0| / C) events a
 /// pixel, evenly spaced. Throws std::invalid_argument if the frames differ in size.

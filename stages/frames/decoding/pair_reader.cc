@@ -109,9 +109,11 @@ SampleFault fault_in(const FrameRef& frame, const std::string& reason) {
 
 }  // namespace
 
-PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_under_way)
+PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_under_way,
+                       bool tells_between)
     : base_(std::move(base)),
       spec_(std::move(spec)),
+      tells_between_(tells_between),
       images_(std::make_unique<SharedImages>(2 * pairs_under_way + kLongestGap + kMargin)),
       files_(std::make_unique<FilesAhead>()),
       stills_(base_, pairs_under_way + kMargin),
@@ -151,19 +153,19 @@ Outcome<std::array<SharedFrame, 2>> PairReader::frames(const FramePair& pair,
   return both;
 }
 
-Outcome<std::array<PreparedFrame, 2>> PairReader::still(const FramePair& pair,
-                                                        ImageOrientation orientation,
-                                                        std::int64_t stride) const {
+Outcome<PreparedPair> PairReader::still(const FramePair& pair, ImageOrientation orientation,
+                                        std::int64_t stride, const std::vector<Box>& boxes) const {
   try {
-    if (pair.next.video_frame < 0) {
-      const ColourFrame image =
-          decode_image(files_->take(base_ / pair.next.path), orientation, spec_.range);
-      return prepare_still({image.size, image.bgr.data()}, pair, spec_);
-    }
-    const Outcome<ColourFrame> image = stills_.decode(pair.next, stride);
-    if (is_fault(image)) return image.fault();
-    const ColourFrame& colour = *image;
-    return prepare_still({colour.size, colour.bgr.data()}, pair, spec_);
+    const bool is_image = pair.next.video_frame < 0;
+    Outcome<ColourFrame> decoded =
+        is_image ? decode_image(files_->take(base_ / pair.next.path), orientation, spec_.range)
+                 : stills_.decode(pair.next, stride);
+    if (is_fault(decoded)) return decoded.fault();
+    ColourFrame& image = *decoded;
+    const auto [previous, next] = prepare_still({image.size, image.bgr.data()}, pair, spec_, boxes);
+    PreparedPair prepared = prepare_pair(previous, next);
+    if (tells_between_) prepared.between = frames_between(std::move(image), pair, spec_, boxes);
+    return prepared;
   } catch (const std::runtime_error& error) {
     return fault_in(pair.next, error.what());
   }
@@ -178,13 +180,9 @@ void PairReader::expect(const FramePair& pair, ImageOrientation orientation) con
 }
 
 Outcome<PreparedPair> PairReader::read(const FramePair& pair, ImageOrientation orientation,
-                                       std::int64_t still_stride) const {
-  if (pair.motion) {
-    const auto outcome = still(pair, orientation, still_stride);
-    if (is_fault(outcome)) return outcome.fault();
-    const auto& [previous, next] = *outcome;
-    return prepare_pair(previous, next);
-  }
+                                       std::int64_t still_stride,
+                                       const std::vector<Box>& boxes) const {
+  if (pair.motion) return still(pair, orientation, still_stride, boxes);
   const auto outcome = frames(pair, orientation);
   if (is_fault(outcome)) return outcome.fault();
   const auto& [previous, next] = *outcome;

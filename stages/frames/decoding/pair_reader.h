@@ -17,6 +17,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/frames.h"
 #include "manifests/values/job.h"
+#include "manifests/values/labels.h"
 #include "manifests/values/placement.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/decoding/prepared_frame.h"
@@ -96,14 +97,19 @@ class PairReader {
   /// pairs_under_way + 6 prepared frames and a margin are kept of each video (of two videos at
   /// most): with that no video is decoded twice. Of images, whose pairs may skip frames, two for
   /// each pair under way are kept, besides those 6 and the margin.
-  PairReader(std::filesystem::path base, ImageSpec spec, int pairs_under_way = 16);
+  /// `tells_between`: a still's pair knows what is seen between its frames
+  /// (PreparedPair::between), which keeps its image in memory.
+  PairReader(std::filesystem::path base, ImageSpec spec, int pairs_under_way = 16,
+             bool tells_between = false);
 
   /// A fault if a file is missing, empty, truncated, not an image, or mirrored, if the sizes
   /// differ, or if too little can be seen of a still after its motion. `still_stride`: of the video
-  /// that a still is in, each so many of whose frames are taken (SourceSpec::every).
+  /// that a still is in, each so many of whose frames are taken (SourceSpec::every). `boxes`: those
+  /// that FramePair::objects is of.
   Outcome<PreparedPair> read(const FramePair& pair,
                              ImageOrientation orientation = ImageOrientation::kStored,
-                             std::int64_t still_stride = 1) const;
+                             std::int64_t still_stride = 1,
+                             const std::vector<Box>& boxes = {}) const;
 
   /// Has the system load the images of a pair that will be read soon, so that reading it does not
   /// wait for the disk. (Videos are read in order; the system looks ahead in these by itself.)
@@ -114,11 +120,12 @@ class PairReader {
   Outcome<std::array<SharedFrame, 2>> frames(const FramePair& pair,
                                              ImageOrientation orientation) const;
   SharedFrame frame(const FrameRef& ref, ImageOrientation orientation) const;
-  Outcome<std::array<PreparedFrame, 2>> still(const FramePair& pair, ImageOrientation orientation,
-                                              std::int64_t stride) const;
+  Outcome<PreparedPair> still(const FramePair& pair, ImageOrientation orientation,
+                              std::int64_t stride, const std::vector<Box>& boxes) const;
 
   std::filesystem::path base_;
   ImageSpec spec_;
+  bool tells_between_;
   std::unique_ptr<SharedImages> images_;
   std::unique_ptr<FilesAhead> files_;
   FrameDecoder stills_;

@@ -2,11 +2,17 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <exception>
+#include <memory>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
+
+#include "manifests/values/outlines.h"
+#include "manifests/values/still_motion.h"
+#include "stages/frames/decoding/detail/still_layers.h"
 
 namespace eventgan {
 
@@ -74,19 +80,95 @@ cv::Mat scaled_grey(const Resizable& whole, const Placement& placement, const Im
   return blurred;
 }
 
-/// See move_still.
-cv::Mat moved(const cv::Mat& image, const FramePair& pair) {
-  const ImageSize size{image.rows, image.cols};
-  if (std::max(size.height, size.width) > kMostStillSide) {
-    throw std::invalid_argument("expected a still of at most " + std::to_string(kMostStillSide) +
-                                " pixels a side, got " + to_string(size));
+/// A still that moves from the previous frame of its pair to the next.
+class MovingStill {
+ public:
+  /// `image` is shared.
+  MovingStill(const cv::Mat& image, const FramePair& pair, const std::vector<Box>& boxes)
+      : size_{image.rows, image.cols},
+        image_(image),
+        pair_(pair),
+        boxes_(boxes),
+        layers_(checked(image), objects()) {}
+
+  /// The frame at u, 0 previous to 1 next; it may be the image itself. Thread safe.
+  cv::Mat at(double u) const {
+    if (u == pair_.label_position) return image_;
+    std::vector<AffineMap> objects(pair_.objects.size());
+    for (std::size_t k = 0; k < objects.size(); ++k) {
+      if (pair_.objects[k]) objects[k] = object_map(k, u);
+    }
+    return layers_.frame(image_map(u), objects);
   }
-  std::array<double, 6> map = moved_to_labelled(size, pair);
-  cv::Mat result;
-  cv::warpAffine(image, result, cv::Mat(2, 3, CV_64F, map.data()), image.size(),
-                 cv::INTER_CUBIC | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
-  return result;
-}
+
+  double moved_end() const { return 1 - pair_.label_position; }
+
+  /// No point of the image or of an object moves farther than that, pixels of the image.
+  double displacement_px() const {
+    const double right = size_.width - 0.5, bottom = size_.height - 0.5;
+    double most = farthest(image_map(moved_end()), {-0.5, -0.5, right, bottom});
+    for (std::size_t k = 0; k < pair_.objects.size(); ++k) {
+      if (!pair_.objects[k] || k >= boxes_.size()) continue;
+      most = std::max(most, farthest(object_map(k, moved_end()), boxes_[k].xyxy));
+    }
+    return most;
+  }
+
+ private:
+  static const cv::Mat& checked(const cv::Mat& image) {
+    if (std::max(image.rows, image.cols) <= kMostStillSide) return image;
+    throw std::invalid_argument("expected a still of at most " + std::to_string(kMostStillSide) +
+                                " pixels a side, got " +
+                                to_string(ImageSize{image.rows, image.cols}));
+  }
+
+  AffineMap image_map(double u) const {
+    return u == moved_end() ? moved_to_labelled(size_, pair_) : image_to_labelled(size_, pair_, u);
+  }
+
+  /// An object that rests moves exactly as the image does.
+  AffineMap object_map(std::size_t k, double u) const {
+    const ImageMotion& motion = *pair_.objects[k];
+    return motion == ImageMotion() ? image_map(u)
+                                   : object_to_labelled(size_, pair_, motion, boxes_.at(k), u);
+  }
+
+  /// How far the map moves a corner at most: of an affine one no point between them moves farther.
+  static double farthest(const AffineMap& map, const Rectangle& around) {
+    double most = 0;
+    for (const Point corner : {Point{around.left, around.top},
+                               {around.right, around.top},
+                               {around.left, around.bottom},
+                               {around.right, around.bottom}}) {
+      const Point moved = apply(map, corner);
+      most = std::max(most, std::hypot(moved.x - corner.x, moved.y - corner.y));
+    }
+    return most;
+  }
+
+  /// What moves on its own, and what may hide it. The one place that asks for outlines.
+  std::vector<StillObject> objects() const {
+    std::vector<StillObject> objects;
+    for (std::size_t k = 0; k < std::min(pair_.objects.size(), boxes_.size()); ++k) {
+      if (!pair_.objects[k] || boxes_[k].outline.empty()) continue;
+      double reach_px = 0;
+      if (*pair_.objects[k] != ImageMotion()) {
+        for (const double u : {0.0, 0.5, 1.0}) {  // over the background, from where it lies in it
+          const AffineMap over = compose(image_map(u), inverse(object_map(k, u)));
+          reach_px = std::max(reach_px, farthest(over, bounds(boxes_[k].outline)));
+        }
+      }
+      objects.push_back({k, boxes_[k].outline, boxes_[k].xyxy.bottom, reach_px});
+    }
+    return objects;
+  }
+
+  ImageSize size_;
+  cv::Mat image_;
+  FramePair pair_;
+  std::vector<Box> boxes_;
+  StillLayers layers_;
+};
 
 std::vector<std::uint8_t> cut(const cv::Mat& grey, const VisiblePart& part) {
   std::vector<std::uint8_t> pixels;
@@ -133,22 +215,54 @@ PreparedFrame prepare_frame(const ImageView& frame, const ImageSpec& spec) {
 }
 
 std::array<PreparedFrame, 2> prepare_still(const ColourView& image, const FramePair& pair,
-                                           const ImageSpec& spec) {
+                                           const ImageSpec& spec, const std::vector<Box>& boxes) {
   return unless_refused([&] {
     const Placement placement = place(image.size, spec, pair);
     const Resizable still = grey_if_first(image, spec);
+    const MovingStill moving(still.image, pair, boxes);
     std::array<PreparedFrame, 2> frames = {
-        prepare({moved(still.image, pair), still.channels}, placement, spec),
+        prepare({moving.at(moving.moved_end()), still.channels}, placement, spec),
         prepare(still, placement, spec)};
     if (pair.label_position == 0) std::swap(frames[0], frames[1]);
     return frames;
   });
 }
 
-ColourFrame move_still(const ColourFrame& image, const FramePair& pair) {
+ColourFrame move_still(const ColourFrame& image, const FramePair& pair,
+                       const std::vector<Box>& boxes) {
   return unless_refused([&] {
-    const cv::Mat result = moved(matrix_of({image.size, image.bgr.data()}), pair);
+    const MovingStill moving(matrix_of({image.size, image.bgr.data()}), pair, boxes);
+    const cv::Mat result = moving.at(moving.moved_end());
     return ColourFrame{image.size, {result.datastart, result.dataend}};
+  });
+}
+
+FramesBetween frames_between(ColourFrame image, const FramePair& pair, const ImageSpec& spec,
+                             const std::vector<Box>& boxes) {
+  return unless_refused([&] {
+    struct Kept {
+      ColourFrame image;
+      Placement placement;
+      Channels channels;
+      MovingStill moving;
+      Kept(ColourFrame frame, const FramePair& pair, const ImageSpec& spec,
+           const std::vector<Box>& boxes)
+          : image(std::move(frame)),
+            placement(place(image.size, spec, pair)),
+            channels(grey_if_first({image.size, image.bgr.data()}, spec).channels),
+            moving(grey_if_first({image.size, image.bgr.data()}, spec).image, pair, boxes) {}
+    };
+    const auto kept = std::make_shared<const Kept>(std::move(image), pair, spec, boxes);
+    const Placement& placement = kept->placement;
+    return FramesBetween{
+        [kept, spec](double u) {
+          return unless_refused([&] {
+            PreparedFrame frame =
+                prepare({kept->moving.at(u), kept->channels}, kept->placement, spec);
+            return GreyImage{visible_part(kept->placement).size, std::move(frame.grey)};
+          });
+        },
+        kept->moving.displacement_px() * std::max(placement.scale_x(), placement.scale_y())};
   });
 }
 

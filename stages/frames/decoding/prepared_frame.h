@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/frames.h"
 #include "manifests/values/job.h"
+#include "manifests/values/labels.h"
 #include "manifests/values/placement.h"
 #include "stages/base/images/image_file.h"
 
@@ -46,6 +48,7 @@ struct PreparedPair {
   int content_x = 0;  ///< where `input`'s top left pixel lies in the volume
   int content_y = 0;
   Placement placement;
+  FramesBetween between = {};  ///< of a still, where a reader was asked to keep it
 };
 
 /// An image [y, x] or [y, x, channel] uint8, C order, 0..255, owned by somebody else.
@@ -76,13 +79,23 @@ inline constexpr int kMostStillSide = 32766;
 /// moved. Throws as above, also if too little would be left or a side is beyond kMostStillSide.
 /// Thread safe.
 std::array<PreparedFrame, 2> prepare_still(const ColourView& image, const FramePair& pair,
-                                           const ImageSpec& spec);
+                                           const ImageSpec& spec,
+                                           const std::vector<Box>& boxes = {});
 
 /// The moved frame of a still's pair, of the image's size: each pixel is the image where
 /// moved_to_labelled leads from it, bicubic (Keys with a = -0.75, places rounded to 1/32 px);
-/// places beyond the image take its nearest pixel, for `place` to cut away. Throws
-/// std::runtime_error as prepare_still. Thread safe.
-ColourFrame move_still(const ColourFrame& image, const FramePair& pair);
+/// places beyond the image take its nearest pixel, for `place` to cut away. Objects that move on
+/// their own (FramePair::objects, of `boxes`) lie over it where object_to_labelled leads, the
+/// farther ones first, and what they uncover is filled (detail/still_layers.h); those of boxes
+/// without an outline do not. Throws std::runtime_error as prepare_still. Thread safe.
+ColourFrame move_still(const ColourFrame& image, const FramePair& pair,
+                       const std::vector<Box>& boxes = {});
+
+/// What prepare_still makes the two ends of: at label_position it is that image, at the other end
+/// the moved one, and between them image and objects move steadily
+/// (manifests/values/still_motion.h). Throws as prepare_still.
+FramesBetween frames_between(ColourFrame image, const FramePair& pair, const ImageSpec& spec,
+                             const std::vector<Box>& boxes);
 
 /// The generator's input of 8-bit grey: x = (u/255 - 0.5) * 2 in [-1, 1], in single precision.
 /// `input` must have the size of `grey`. Thread safe.

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "manifests/values/counter_random.h"
+#include "manifests/values/frames.h"
+#include "manifests/values/job.h"
+#include "manifests/values/labels.h"
+#include "manifests/values/pair_key.h"
+
+namespace eventgan {
+
+/// An affine map of points, row-major [2][3], pixel centres being integers:
+/// x' = m0 x + m1 y + m2, y' = m3 x + m4 y + m5.
+using AffineMap = std::array<double, 6>;
+
+/// The motion about `centre` as a map; at u of its time, where shift and angle are u times as large
+/// and the scale is its u-th power. u = 0: nothing moves.
+AffineMap map_of(const ImageMotion& motion, Point centre, double u = 1);
+
+/// second(first(x)).
+AffineMap compose(const AffineMap& second, const AffineMap& first);
+
+/// Throws std::invalid_argument if it has none.
+AffineMap inverse(const AffineMap& map);
+
+Point apply(const AffineMap& map, Point point);
+
+/// Of a still's pair, which has a motion: where a point of the frame at u of the time from the
+/// previous frame (0) to the next (1) lies in the labelled image. A point of an object moves as
+/// next = image's motion(object's motion(previous)), both about centres in the labelled image.
+/// Where u is label_position, it is where it lies.
+AffineMap image_to_labelled(ImageSize source, const FramePair& pair, double u);
+AffineMap object_to_labelled(ImageSize source, const FramePair& pair, const ImageMotion& object,
+                             const Box& box, double u);
+
+/// The image's motion of a still's pair; none at all (the identity) of as many as `spec` lets rest.
+/// The seed draws each number on its own, so that the limits of one do not change the others.
+ImageMotion draw_motion(const StillsSpec& spec, const CounterRandom& pair);
+
+/// Gives a planned still what its labels decide: FramePair::objects, of boxes that have an outline
+/// and are not to be ignored; and to an image that was to rest, if no object moves before it, the
+/// motion that it would have had, since a sensor would see nothing. Pure; does nothing to other
+/// pairs.
+void settle_motion(const PairSpec& spec, const PairKey& key, const std::vector<Box>& boxes,
+                   FramePair& pair);
+
+}  // namespace eventgan

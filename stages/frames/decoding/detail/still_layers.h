@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "manifests/values/labels.h"
+#include "manifests/values/still_motion.h"
+
+namespace eventgan {
+
+/// What is to move on its own in a photograph.
+struct StillObject {
+  std::size_t box;  ///< its number among the annotation's
+  Outline outline;
+  double lower_edge;  ///< of its box: the greater, the nearer it is
+  double
+      reach_px;  ///< how far it moves over the background at most; 0: not, but it may hide others
+};
+
+/// A photograph taken apart: a background, and before it the objects that do not move as it does,
+/// farther ones first. What an object hides is filled as far as it can come to light: the
+/// background from around the object, and a farther object that a nearer one hides from itself, as
+/// mirrored at the object's edge.
+class StillLayers {
+ public:
+  /// `image`: [y, x] uint8 of one channel or three; shared, and left as it is.
+  StillLayers(const cv::Mat& image, std::vector<StillObject> objects);
+
+  /// The image as it is once the background and every object (by box; those of other boxes are not
+  /// looked at) have moved; the maps lead from the frame that is wanted to the image. What moves is
+  /// sampled bicubically (Keys with a = -0.75, places rounded to 1/32 px); places beyond the image
+  /// take its nearest pixel, and so does an object that reaches the image's border. An object's
+  /// edge is about a pixel soft. Thread safe.
+  cv::Mat frame(const AffineMap& background, const std::vector<AffineMap>& objects) const;
+
+ private:
+  /// An object; what is outside `area` does not belong to it.
+  struct Layer {
+    std::size_t box;
+    cv::Rect area;
+    cv::Mat mask;    ///< [y, x] uint8 of `area`: not 0 where its outline is
+    cv::Mat colour;  ///< of `area`
+    cv::Mat cover;   ///< [y, x] uint8 of `area`: how much of what is behind it cannot be seen
+    double reach_px;
+  };
+
+  void fill_background(const cv::Mat& owner);
+  void fill_layer(std::size_t layer, const cv::Mat& image, const cv::Mat& owner);
+  cv::Rect seen_in(const Layer& layer, const AffineMap& map) const;
+
+  cv::Mat background_;         ///< filled where objects move away
+  std::vector<Layer> layers_;  ///< farther ones first
+};
+
+}  // namespace eventgan
