@@ -27,7 +27,9 @@ int run(const OutlineArguments& arguments) {
   if (arguments.out.empty()) throw UsageError("--out: expected a folder, got nothing");
   const StopSignal signal(stopping_line("finishing the current images"));
   const JobManifest manifest = read_job_manifest(arguments.manifest);
-  OutlineMasksOptions options{.out = arguments.out, .threads = arguments.threads};
+  OutlineMasksOptions options;
+  options.out = arguments.out;
+  options.threads = arguments.threads;
   options.make_progress = [&](std::int64_t total) {
     return show_progress(arguments.progress, total, {"images", /*has_bytes=*/false});
   };

@@ -37,13 +37,13 @@ struct OutlinedSource {
 };
 
 struct MaskWork {
-  const OutlinedSource* source;
-  LabelledFrame frame;
-  fs::path mask;
-  std::string fault;     ///< none: it is made or there
-  bool is_done = false;  ///< or at fault
+  const OutlinedSource* source = nullptr;
+  LabelledFrame frame = {};
+  fs::path mask = {};
+  std::string fault = {};  ///< none: it is made or there
+  bool is_done = false;    ///< or at fault
   bool is_kept = false;
-  OutlineCounts outlines;
+  OutlineCounts outlines = {};
 };
 
 /// Where in the folder of masks a frame's is.
@@ -72,11 +72,6 @@ std::vector<OutlinedSource> open_sources(const JobManifest& manifest, const fs::
       source.folder /= others == 0 ? name : name + "-" + std::to_string(others + 1);
     }
     SourceSpec spec = *source.spec;
-    // The masks that this is to make, or to go on with, are not its own input.
-    if (spec.outlines && fs::weakly_canonical(resolve(manifest, *spec.outlines)) ==
-                             fs::weakly_canonical(fs::absolute(source.folder))) {
-      spec.outlines.reset();
-    }
     source.dataset = open_dataset(spec, manifest.directory);
   }
   return sources;
@@ -230,7 +225,7 @@ std::string to_text(const OutlineMasksReport& report) {
   text += "\n";
   for (const auto& [root, outlines] : report.sources) {
     text += fmt::format("for the source of {} in the manifest:  \"outlines\": {}\n",
-                        escape_controls(root), dump_json(outlines));
+                        escape_controls(root), dump_json(nlohmann::json(outlines)));
   }
   return text;
 }
