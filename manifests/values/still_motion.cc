@@ -34,7 +34,7 @@ AffineMap inverse(const AffineMap& map) {
   return {a, b, -a * map[2] - b * map[5], c, d, -c * map[2] - d * map[5]};
 }
 
-Point apply(const AffineMap& map, Point point) {
+Point mapped(const AffineMap& map, Point point) {
   return {map[0] * point.x + map[1] * point.y + map[2],
           map[3] * point.x + map[4] * point.y + map[5]};
 }

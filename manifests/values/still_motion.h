@@ -26,7 +26,7 @@ AffineMap compose(const AffineMap& second, const AffineMap& first);
 /// Throws std::invalid_argument if it has none.
 AffineMap inverse(const AffineMap& map);
 
-Point apply(const AffineMap& map, Point point);
+Point mapped(const AffineMap& map, Point point);
 
 /// Of a still's pair, which has a motion: where a point of the frame at u of the time from the
 /// previous frame (0) to the next (1) lies in the labelled image. A point of an object moves as

@@ -155,8 +155,9 @@ void describe_columns(hid_t location, const ShardHeader& header,
   write_attribute(open_object(location, "pairs/source_to_volume"), "meaning",
                   std::string("M with [x', y'] = M [x, y, 1], from a point in pixels of the source "
                               "image to one in the volume; pixel centres are whole numbers"));
-  if (checked(H5Lexists(location, "pairs/motion", H5P_DEFAULT), "look for", "motion") > 0) {
-    write_attribute(open_object(location, "pairs/motion"), "columns",
+  for (const char* motion : {"pairs/motion", "labels/boxes/motion"}) {
+    if (checked(H5Lexists(location, motion, H5P_DEFAULT), "look for", motion) == 0) continue;
+    write_attribute(open_object(location, motion), "columns",
                     std::vector<std::string>{"x_px", "y_px", "angle_deg", "scale"});
   }
 }

@@ -140,7 +140,7 @@ class MovingStill {
                                {around.right, around.top},
                                {around.left, around.bottom},
                                {around.right, around.bottom}}) {
-      const Point moved = apply(map, corner);
+      const Point moved = mapped(map, corner);
       most = std::max(most, std::hypot(moved.x - corner.x, moved.y - corner.y));
     }
     return most;

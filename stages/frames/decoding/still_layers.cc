@@ -212,7 +212,7 @@ cv::Rect StillLayers::seen_in(const Layer& layer, const AffineMap& map) const {
   const double right = background_.cols - 1, bottom = background_.rows - 1;
   double beyond = 0;  // how far the frame looks over the image's border, where objects go on
   for (const Point corner : {Point{0, 0}, {right, 0}, {0, bottom}, {right, bottom}}) {
-    const Point at = apply(map, corner);
+    const Point at = mapped(map, corner);
     beyond = std::max({beyond, -at.x, -at.y, at.x - right, at.y - bottom});
   }
   const cv::Rect& area = layer.area;
@@ -228,7 +228,7 @@ cv::Rect StillLayers::seen_in(const Layer& layer, const AffineMap& map) const {
                              {source.right, source.top},
                              {source.left, source.bottom},
                              {source.right, source.bottom}}) {
-    const Point at = apply(back, corner);
+    const Point at = mapped(back, corner);
     seen = {std::min(seen.left, at.x), std::min(seen.top, at.y), std::max(seen.right, at.x),
             std::max(seen.bottom, at.y)};
   }

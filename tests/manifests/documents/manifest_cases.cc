@@ -319,8 +319,23 @@ std::vector<ManifestCase> source_cases() {
       {"pairs of stills in every detail",
        {{"/sources/0/pairs",
          R"({"from": "stills", "side": "after", "min_pairs": 2, "motion": {
-             "translation_px": [0, 100], "rotation_deg": 45, "scale": 0.5, "frames": 6}})"}},
+             "translation_px": [0, 100], "rotation_deg": 45, "scale": 0.5, "frames": 6, "rests": 1,
+             "objects": {"translation_px": [0, 100], "rotation_deg": 45, "scale": 0.5, "rests": 1}}})"}},
        {}},
+      {"objects that move as usual",
+       {{"/sources/0/pairs", R"({"from": "stills", "motion": {"objects": {}}})"}},
+       {}},
+      {"objects that move out of range",
+       {{"/sources/0/pairs", R"({"from": "stills", "motion": {"rests": 1.5, "objects": {
+          "translation_px": [-1, 101], "rotation_deg": 46, "scale": 0.6, "rests": -0.1, "frames": 1}}})"}},
+       {"$.sources[0].pairs.motion.objects.translation_px[0]: expected a number 0..100, got -1",
+        "$.sources[0].pairs.motion.objects.translation_px[1]: expected a number 0..100, got 101",
+        "$.sources[0].pairs.motion.objects.rotation_deg: expected a number 0..45, got 46",
+        "$.sources[0].pairs.motion.objects.scale: expected a number 0..0.5, got 0.6",
+        "$.sources[0].pairs.motion.objects.rests: expected a number 0..1, got -0.1",
+        "$.sources[0].pairs.motion.objects.frames: expected one of the keys translation_px, "
+        "rotation_deg, scale, rests, got an unknown key",
+        "$.sources[0].pairs.motion.rests: expected a number 0..1, got 1.5"}},
       {"stills with what sequences have",
        {{"/sources/0/pairs",
          R"({"from": "stills", "side": "around", "gaps": [2], "choose": "all", "max_gap_s": 1})"}},
@@ -346,7 +361,7 @@ std::vector<ManifestCase> source_cases() {
         "$.sources[1].pairs.motion.scale: expected a number 0..0.5, got 0.6",
         "$.sources[1].pairs.motion.frames: expected an integer 1..6, got 7",
         "$.sources[1].pairs.motion.blur: expected one of the keys translation_px, rotation_deg, "
-        "scale, frames, got an unknown key",
+        "scale, frames, objects, rests, got an unknown key",
         "$.sources[2].pairs.motion.translation_px: expected an array of 2, got an array of 3"}},
       {"a range the wrong way round",
        {{"/sources/0/pairs", R"({"from": "stills", "motion": {"translation_px": [8, 2]}})"}},

@@ -72,6 +72,12 @@ TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
   EXPECT_EQ(stated((motion + "rotation_deg").c_str()), stills.rotation_deg);
   EXPECT_EQ(stated((motion + "scale").c_str()), stills.scale);
   EXPECT_EQ(stated((motion + "frames").c_str()), stills.frames);
+  const ObjectMotionSpec objects;
+  const std::string of_objects = motion + "objects/properties/";
+  EXPECT_EQ(stated((of_objects + "translation_px").c_str()), json(objects.translation_px));
+  EXPECT_EQ(stated((of_objects + "rotation_deg").c_str()), objects.rotation_deg);
+  EXPECT_EQ(stated((of_objects + "scale").c_str()), objects.scale);
+  EXPECT_EQ(stated((of_objects + "rests").c_str()), objects.rests);
   EXPECT_EQ(stated("/properties/image/properties/fit"), to_string(manifest.image.fit));
   const GeneratorSpec& generator = manifest.generator;
   EXPECT_EQ(stated("/properties/generator/properties/kind"), to_string(generator.kind));

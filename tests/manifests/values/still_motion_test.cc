@@ -1,0 +1,196 @@
+#include "manifests/values/still_motion.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace eventgan {
+namespace {
+
+constexpr double kNear = 1e-9;
+
+void expect_near(Point a, Point b) {
+  EXPECT_NEAR(a.x, b.x, kNear);
+  EXPECT_NEAR(a.y, b.y, kNear);
+}
+
+TEST(StillMotion, IsItsEquationAndStartsAtRest) {
+  const ImageMotion motion{4, -2, 30, 1.21};
+  const Point centre{10, 20};
+  // 10 right of the centre: turned by 30 degrees towards y, 1.21 as far away, and shifted.
+  const double angle = std::numbers::pi / 6;
+  expect_near(mapped(map_of(motion, centre), {20, 20}),
+              {14 + 12.1 * std::cos(angle), 18 + 12.1 * std::sin(angle)});
+  expect_near(mapped(map_of(motion, centre, 0.5), {20, 20}),
+              {12 + 11 * std::cos(angle / 2), 19 + 11 * std::sin(angle / 2)});
+  expect_near(mapped(map_of(motion, centre, 0), {3, 7}), {3, 7});
+}
+
+TEST(StillMotion, MapsAreComposedAndInverted) {
+  const AffineMap a = map_of({4, -2, 30, 1.2}, {10, 20}), b = map_of({1, 1, -70, 0.5}, {0, 3});
+  for (const Point p : {Point{0, 0}, {100, -3}, {7, 55}}) {
+    expect_near(mapped(compose(a, b), p), mapped(a, mapped(b, p)));
+    expect_near(mapped(inverse(a), mapped(a, p)), p);
+  }
+  EXPECT_THROW(inverse({1, 2, 0, 2, 4, 0}), std::invalid_argument);
+}
+
+TEST(StillMotion, LeadsToTheLabelledImage) {
+  const ImageSize size{60, 80};
+  const Point middle{39.5, 29.5}, of_box{19.5, 24.5};
+  const Box box{.class_id = 0, .xyxy = {10, 20, 30, 30}};
+  FramePair pair;
+  pair.motion = ImageMotion{4, -2, 10, 1.1};
+  const ImageMotion object{-3, 5, -20, 0.9};
+  const auto seen_at = [&](Point previous, double u, bool is_object) {
+    if (is_object) previous = mapped(map_of(object, of_box, u), previous);
+    return mapped(map_of(*pair.motion, middle, u), previous);
+  };
+  for (const double position : {0.0, 1.0}) {
+    pair.label_position = position;
+    for (const double u : {0.0, 0.3, 1.0}) {
+      const Point p{17, 33};  // of the previous frame
+      expect_near(mapped(image_to_labelled(size, pair, u), seen_at(p, u, false)),
+                  seen_at(p, position, false));
+      expect_near(mapped(object_to_labelled(size, pair, object, box, u), seen_at(p, u, true)),
+                  seen_at(p, position, true));
+    }
+  }
+}
+
+Box outlined(Rectangle box = {1, 1, 3, 3}) {
+  return {.class_id = 0, .xyxy = box, .outline = {{{{1, 1}, {3, 1}, {3, 3}}}}};
+}
+
+class SettleMotion : public ::testing::Test {
+ protected:
+  SettleMotion() { spec_.stills = StillsSpec{.objects = ObjectMotionSpec()}; }
+
+  /// The pair of sample number i, as it is planned and with these boxes.
+  FramePair settled(int i, const std::vector<Box>& boxes) {
+    const std::string id = std::to_string(i);
+    const PairKey key{7, "frames", id};
+    FramePair pair;
+    pair.motion = draw_motion(*spec_.stills, key.pair());
+    settle_motion(spec_, key, boxes, pair);
+    return pair;
+  }
+
+  static bool rests(const std::optional<ImageMotion>& motion) { return motion == ImageMotion(); }
+
+  PairSpec spec_;
+};
+
+TEST_F(SettleMotion, ObjectsAreDrawnWithinTheirLimitsAndFillThem) {
+  std::array<double, 2> lengths{99, 0}, angles{99, -99}, scales{99, 0};
+  int images_at_rest = 0, resting = 0, moving = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const FramePair pair = settled(i, {outlined(), outlined()});
+    const bool image_rests = rests(pair.motion);
+    images_at_rest += image_rests;
+    ASSERT_EQ(pair.objects.size(), 2u);
+    EXPECT_TRUE(pair.objects[0] != pair.objects[1] || rests(pair.objects[0]));
+    for (const auto& motion : pair.objects) {
+      if (rests(motion)) {
+        EXPECT_FALSE(image_rests) << "a sensor would see nothing";
+        ++resting;
+        continue;
+      }
+      moving += !image_rests;
+      const auto take = [](std::array<double, 2>& range, double value) {
+        range = {std::min(range[0], value), std::max(range[1], value)};
+      };
+      take(lengths, std::hypot(motion->x_px, motion->y_px));
+      take(angles, motion->angle_deg);
+      take(scales, motion->scale);
+    }
+  }
+  const auto expect_fills = [](const std::array<double, 2>& range, double least, double most) {
+    EXPECT_GE(range[0], least - kNear);
+    EXPECT_LE(range[1], most + kNear);
+    EXPECT_GT(range[1] - range[0], 0.98 * (most - least));
+  };
+  expect_fills(lengths, 0, 8);
+  expect_fills(angles, -3, 3);
+  expect_fills(scales, 0.96, 1.04);
+  EXPECT_NEAR(images_at_rest, 500, 64);  // four standard deviations, here and below
+  EXPECT_NEAR(resting, 0.2 * (resting + moving), 4 * std::sqrt(0.16 * (resting + moving)));
+}
+
+TEST_F(SettleMotion, OnlyWhatHasAnOutlineAndCountsMovesOnItsOwn) {
+  Box ignored = outlined();
+  ignored.ignore = true;
+  const Box plain{.class_id = 0, .xyxy = {1, 1, 3, 3}};
+  const std::vector<Box> boxes{plain, outlined(), ignored};
+  for (int i = 0; i < 50; ++i) {
+    const FramePair pair = settled(i, boxes);
+    ASSERT_EQ(pair.objects.size(), 3u);
+    EXPECT_FALSE(pair.objects[0]);
+    EXPECT_TRUE(pair.objects[1]);
+    EXPECT_FALSE(pair.objects[2]);
+    // Its number decides, whatever the others are.
+    EXPECT_EQ(settled(i, {outlined(), outlined(), outlined()}).objects[1], pair.objects[1]);
+  }
+}
+
+TEST_F(SettleMotion, AnImageBeforeWhichNothingMovesDoesNotRest) {
+  StillsSpec always = *spec_.stills;
+  always.rests = 0;
+  const StillsSpec usual = *spec_.stills;
+  std::set<bool> planned_at_rest;
+  for (int i = 0; i < 50; ++i) {
+    const std::string id = std::to_string(i);
+    const ImageMotion moving = draw_motion(always, PairKey{7, "frames", id}.pair());
+    planned_at_rest.insert(rests(draw_motion(usual, PairKey{7, "frames", id}.pair())));
+    for (const std::vector<Box>& boxes : {std::vector<Box>(), std::vector<Box>(1)}) {
+      const FramePair pair = settled(i, boxes);
+      EXPECT_EQ(pair.motion, moving);
+      EXPECT_TRUE(pair.objects.empty());
+    }
+    // To rest or not changes no other draw.
+    const FramePair pair = settled(i, {outlined()});
+    EXPECT_TRUE(rests(pair.motion) || pair.motion == moving);
+  }
+  EXPECT_EQ(planned_at_rest.size(), 2u);
+}
+
+TEST_F(SettleMotion, SharesAreThoseOfTheManifest) {
+  spec_.stills->rests = 1;
+  spec_.stills->objects->rests = 1;
+  for (int i = 0; i < 20; ++i) {
+    const FramePair pair = settled(i, {outlined()});
+    EXPECT_TRUE(rests(pair.motion));
+    EXPECT_FALSE(rests(pair.objects.at(0)));
+  }
+  spec_.stills->rests = 0;
+  for (int i = 0; i < 20; ++i) {
+    const FramePair pair = settled(i, {outlined()});
+    EXPECT_FALSE(rests(pair.motion));
+    EXPECT_TRUE(rests(pair.objects.at(0)));
+  }
+  spec_.stills->objects.reset();
+  spec_.stills->rests.reset();
+  for (int i = 0; i < 20; ++i) {
+    const FramePair pair = settled(i, {outlined()});
+    EXPECT_FALSE(rests(pair.motion));
+    EXPECT_TRUE(pair.objects.empty());
+  }
+}
+
+TEST_F(SettleMotion, PairsOfSequencesStayAsTheyAre) {
+  spec_.stills.reset();
+  FramePair pair;
+  settle_motion(spec_, {7, "frames", "1"}, {outlined()}, pair);
+  EXPECT_FALSE(pair.motion);
+  EXPECT_TRUE(pair.objects.empty());
+}
+
+}  // namespace
+}  // namespace eventgan
