@@ -48,6 +48,7 @@ struct OutlineCounts {
   std::size_t ellipses = 0;  ///< in place of a cut
 
   OutlineCounts& operator+=(const OutlineCounts& other);
+  bool operator==(const OutlineCounts&) const = default;
 };
 
 /// "120 of labels, 300 cut out of their boxes, 12 ellipses".
