@@ -94,7 +94,8 @@ void list_labels(Fields& fields, LabelSpec& spec) {
       "format", spec.format, words(kLabelFormatWords),
       "coco: JSON, instances or person keypoints. yolo: a folder of text files, data.yaml or "
       "classes.txt. voc: a folder of Pascal VOC's XML files. mot: gt.txt, or a folder of "
-      "sequences with it. csv: a table image,class,left,top,right,bottom[,track].");
+      "sequences with it. csv: a table image,class,left,top,right,bottom[,track]. masks: a folder "
+      "of PNGs in which each pixel has the number of its object (Penn-Fudan, DAVIS, MOTS).");
   fields.at("path", spec.path, paths(), "The file or folder.");
   fields.only_for({LabelFormat::kVoc, LabelFormat::kMot})
       .find("edges_from", spec.edges_from, integers(0, 1),
@@ -183,6 +184,13 @@ void list_source(Fields& fields, SourceSpec& spec) {
             "the frame rate. Default: a video's own times; none for images.");
   some.find("labels", spec.labels, objects(list_labels),
             "labels of your own for the images or videos (manifests/guides/own_data.md).");
+  Fields::Only of_frames = fields.only_for(
+      words_where(kDatasets, [](const DatasetRow& row) { return !row.has_events; }));
+  of_frames.find(
+      "outlines", spec.outlines, paths(),
+      "a folder of index masks, PATH.png of the image PATH.jpg below root: number k of a "
+      "mask is the outline of the k-th box of the image's labels "
+      "(manifests/guides/own_data.md).");
   list_recording(some, spec.recording);
   list_selection(fields, spec.selection);
   some.find("window_s", spec.window.duration_s, numbers(1e-6, 1e3),
@@ -194,9 +202,9 @@ void list_source(Fields& fields, SourceSpec& spec) {
   fields.sets("window_s", {"window_events"});
   some.find("label_at", spec.window.label, words(kLabelPlaceWords),
             "where in its window the label's time lies.");
-  fields.only_for(words_where(kDatasets, [](const DatasetRow& row) { return !row.has_events; }))
-      .at("pairs", spec.pairs, objects(list_pairs),
-          "which pairs of frames become samples. Of other datasets these are windows of events.");
+  of_frames.at("pairs", spec.pairs, objects(list_pairs),
+               "which pairs of frames become samples. Of other datasets these are windows of "
+               "events.");
 }
 
 // Below 16 pixels a side the network's four halvings leave less than one pixel of the image at

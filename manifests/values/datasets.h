@@ -34,7 +34,7 @@ struct WindowSpec {
 };
 
 /// How labels of one's own are written (manifests/guides/own_data.md).
-enum class LabelFormat { kMot, kCoco, kYolo, kVoc, kCsv };
+enum class LabelFormat { kMot, kCoco, kYolo, kVoc, kCsv, kMasks };
 
 /// A format of labels. What finds and reads them is in its own file
 /// (stages/frames/own_labels/own_labels.h).
@@ -45,11 +45,13 @@ struct LabelFormatRow {
 };
 
 /// Every format, in the order in which messages list them, and in which `init` looks for them.
-inline constexpr std::array kLabelFormats{LabelFormatRow{"mot", LabelFormat::kMot, "MOT"},
-                                          LabelFormatRow{"coco", LabelFormat::kCoco, "COCO"},
-                                          LabelFormatRow{"yolo", LabelFormat::kYolo, "YOLO"},
-                                          LabelFormatRow{"voc", LabelFormat::kVoc, "Pascal VOC"},
-                                          LabelFormatRow{"csv", LabelFormat::kCsv, "CSV"}};
+inline constexpr std::array kLabelFormats{
+    LabelFormatRow{"mot", LabelFormat::kMot, "MOT"},
+    LabelFormatRow{"coco", LabelFormat::kCoco, "COCO"},
+    LabelFormatRow{"yolo", LabelFormat::kYolo, "YOLO"},
+    LabelFormatRow{"voc", LabelFormat::kVoc, "Pascal VOC"},
+    LabelFormatRow{"csv", LabelFormat::kCsv, "CSV"},
+    LabelFormatRow{"masks", LabelFormat::kMasks, "index masks"}};
 
 /// What a manifest may say of a kind of dataset. What finds and reads it is in its own file
 /// (stages/frames/dataset_kinds.h).

@@ -146,6 +146,7 @@ struct SourceSpec {
   std::optional<Human36mLayout> layout;     ///< human36m only, and required there
   std::optional<double> frames_per_second;  ///< frames: for gap_s where the files do not tell
   std::optional<LabelSpec> labels;          ///< frames
+  std::optional<std::string> outlines = {};  ///< of frames: folder of index masks
   SelectionSpec selection;
   PairSpec pairs;
   RecordingOptions recording;  ///< recording

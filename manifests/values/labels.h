@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -119,6 +120,8 @@ struct Annotation {
   std::optional<std::array<double, 12>> projection = {};
   /// Why boxes of it are not in `boxes`: "expected X, got Y, in PATH:LINE" each.
   std::vector<std::string> left_out = {};
+  /// Where each of these stands among all boxes that the annotation has, counted from 0.
+  std::vector<std::size_t> left_out_at = {};
   bool operator==(const Annotation&) const = default;
 };
 

@@ -43,7 +43,7 @@ struct SourceDraft {
 
   bool has_range() const { return range.has_value(); }
 
-  const FoundSource& found;
+  FoundSource found;
   const DraftHabits& habits;
   std::vector<int> gaps = {};
   std::string preset = {};  ///< of its dataset; empty of events
@@ -283,6 +283,9 @@ std::vector<std::string> findings_of(const SourceDraft& draft, const Survey& sur
     lines.push_back(fmt::format("labels: {}, in {}",
                                 row_of(kLabelFormats, found.labels->format).title,
                                 found.labels->path.string()));
+    if (found.labels->outlines) {
+      lines.push_back("outlines: index masks, in " + found.labels->outlines->string());
+    }
   }
   for (const std::string& unread : found.unread) lines.push_back("warning: " + unread);
   lines.insert(lines.end(), found.remarks.begin(), found.remarks.end());
@@ -315,6 +318,23 @@ std::unique_ptr<Dataset> open_source(SourceSpec spec, const fs::path& folder,
   } catch (const InputError&) {  // it lacks something else
   }
   throw;
+}
+
+/// Why masks that lie beside boxes are not those of their objects, as far as some images tell;
+/// empty if they are.
+std::string outlines_fault(const SourceSpec& spec, const fs::path& folder) try {
+  constexpr std::size_t kMost = 8;
+  const auto dataset = open_dataset(spec, folder);
+  const auto& frames = dataset->labelled_frames();
+  for (const std::size_t i : spread(kMost, frames.size())) {
+    const Outcome<Annotation> read = dataset->annotation(frames[i].label_key);
+    const bool is_of_mask =
+        is_fault(read) && read.fault().reason.find(*spec.outlines) != std::string::npos;
+    if (is_of_mask) return read.fault().reason;
+  }
+  return "";
+} catch (const InputError& error) {
+  return error.what();
 }
 
 /// Whether each recording has frames: then an interval between two of them is a window.
@@ -394,6 +414,7 @@ class Draft {
     if (found.labels) {
       keys += fmt::format("      \"labels\": {{ \"format\": \"{}\", \"path\": {} }},\n",
                           to_string(found.labels->format), written(found.labels->path));
+      if (found.labels->outlines) keys += key("outlines", *found.labels->outlines);
     }
     if (found.columns != EventFields()) {
       keys += fmt::format("      \"columns\": {{ \"t\": {} }},\n", quoted(found.columns.t));
@@ -526,8 +547,19 @@ ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const Draf
   made.has_samples = true;
   for (const FoundSource& found : sources) {
     SourceDraft source(found);
-    const JobManifest alone = parse_job_manifest(draft.text({source}), place.folder,
-                                                 "the manifest for " + found.root.string());
+    const auto read_draft = [&] {
+      return parse_job_manifest(draft.text({source}), place.folder,
+                                "the manifest for " + found.root.string());
+    };
+    JobManifest alone = read_draft();
+    if (alone.sources.front().outlines) {
+      const std::string fault = outlines_fault(alone.sources.front(), place.folder);
+      if (!fault.empty()) {
+        source.found.remarks.push_back("masks left out, since they do not fit the boxes: " + fault);
+        source.found.labels->outlines.reset();
+        alone = read_draft();
+      }
+    }
     const SourceSpec& spec = alone.sources.front();
     source.preset = alone.image.preset;
     const auto dataset = open_source(spec, place.folder, source);

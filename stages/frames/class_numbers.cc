@@ -6,15 +6,17 @@
 #include <set>
 #include <utility>
 
+#include "stages/frames/wrapped_dataset.h"
+
 namespace eventgan {
 namespace {
 
 /// A dataset with other numbers for its classes.
-class RenumberedDataset final : public Dataset {
+class RenumberedDataset final : public WrappedDataset {
  public:
   /// `names` has all the dataset's.
   RenumberedDataset(std::unique_ptr<Dataset> dataset, ClassNames names)
-      : dataset_(std::move(dataset)), schema_(dataset_->label_schema()) {
+      : WrappedDataset(std::move(dataset)), schema_(dataset_->label_schema()) {
     for (const std::string& name : schema_.class_names) {
       numbers_.push_back(static_cast<int>(std::ranges::find(names, name) - names.begin()));
     }
@@ -31,33 +33,7 @@ class RenumberedDataset final : public Dataset {
     return read;
   }
 
-  const std::vector<LabelledFrame>& labelled_frames() const override {
-    return dataset_->labelled_frames();
-  }
-  PairedFrame paired_frame(const LabelledFrame& frame, int steps) const override {
-    return dataset_->paired_frame(frame, steps);
-  }
-  ImageSize sensor_size(const std::string& label_key) const override {
-    return dataset_->sensor_size(label_key);
-  }
-  Outcome<EventWindow> events(const std::string& label_key) const override {
-    return dataset_->events(label_key);
-  }
-  ImageSizes* image_sizes() const override { return dataset_->image_sizes(); }
-  std::string label_place(const std::string& label_key) const override {
-    return dataset_->label_place(label_key);
-  }
-  std::vector<std::string> annotation_files() const override {
-    return dataset_->annotation_files();
-  }
-  std::map<std::string, std::string> label_meanings() const override {
-    return dataset_->label_meanings();
-  }
-  std::vector<std::string> notes() const override { return dataset_->notes(); }
-  std::vector<std::string> warnings() const override { return dataset_->warnings(); }
-
  private:
-  std::unique_ptr<Dataset> dataset_;
   LabelSchema schema_;
   std::vector<int> numbers_;  ///< by the dataset's own
 };

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/frames/dataset_kinds.h"
+#include "stages/frames/index_mask.h"
 
 namespace eventgan {
 
@@ -39,7 +41,7 @@ std::unique_ptr<Dataset> open_dataset(const SourceSpec& spec, const std::filesys
                        "\", in " + escape_controls(dataset->label_place(frame.label_key)));
     }
   }
-  return dataset;
+  return spec.outlines ? with_outlines(std::move(dataset), spec, base) : std::move(dataset);
 }
 
 FrameOrigin frame_origin(DatasetKind dataset, const std::string& sequence) {

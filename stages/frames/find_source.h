@@ -14,6 +14,7 @@ namespace eventgan {
 struct FoundLabels {
   LabelFormat format = LabelFormat::kCoco;
   std::filesystem::path path;
+  std::optional<std::filesystem::path> outlines = {};  ///< index masks beside labels of boxes
 };
 
 /// A dataset that was found by looking at a folder. Paths are absolute and normal.

@@ -8,6 +8,7 @@
 
 #include "stages/base/archives/cdf_matrix.h"
 #include "stages/frames/events/recording_labels.h"
+#include "stages/frames/index_mask.h"
 #include "stages/frames/mpii/detail/mat_json.h"
 #include "stages/frames/own_labels/detail/coco_entry.h"
 #include "stages/frames/own_labels/detail/csv_labels.h"
@@ -30,15 +31,14 @@ using Reader = void (*)(std::span<const std::uint8_t>, const std::filesystem::pa
 
 class FuzzCorpus : public ::testing::TestWithParam<Reader> {};
 
-INSTANTIATE_TEST_SUITE_P(Readers, FuzzCorpus,
-                         ::testing::Values(testing::read_checkpoint_input,
-                                           testing::read_zip_pickle_input,
-                                           testing::read_safetensors_input, testing::read_mat_input,
-                                           testing::read_cdf_input, testing::read_voc_input,
-                                           testing::read_mot_input, testing::read_csv_input,
-                                           testing::read_coco_input, testing::read_yolo_input,
-                                           testing::read_table_input, testing::read_aedat4_input,
-                                           testing::read_prophesee_input));
+INSTANTIATE_TEST_SUITE_P(
+    Readers, FuzzCorpus,
+    ::testing::Values(testing::read_checkpoint_input, testing::read_zip_pickle_input,
+                      testing::read_safetensors_input, testing::read_mat_input,
+                      testing::read_cdf_input, testing::read_voc_input, testing::read_mot_input,
+                      testing::read_csv_input, testing::read_coco_input, testing::read_yolo_input,
+                      testing::read_mask_input, testing::read_table_input,
+                      testing::read_aedat4_input, testing::read_prophesee_input));
 
 TEST_P(FuzzCorpus, IsReadOrRefused) {
   const testing::TemporaryFolder folder;
@@ -104,6 +104,12 @@ TEST(FuzzCorpusSeeds, AreReadWhereTheyAreSound) {
   for (const char* name : {"yolo/boxes", "yolo/mixed"}) {
     EXPECT_FALSE(is_fault(
         parse_yolo_text(labels(name), parse_yolo_classes("a\nb", "classes"), {30, 40}, name)));
+  }
+  const std::pair<const char*, int> masks[] = {{"grey", 2}, {"palette", 2}, {"wide", 3}};
+  for (const auto& [name, objects] : masks) {
+    const auto mask = IndexMask::read(corpus / "mask" / name, name);
+    ASSERT_FALSE(is_fault(mask)) << mask.fault().reason;
+    EXPECT_EQ(std::ssize(mask->indices()), objects) << name;
   }
   for (const char* name : {"plain", "lz4", "zstd"}) {
     const StoredParts parts = open_aedat4(corpus / "aedat4" / name);

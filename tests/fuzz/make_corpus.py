@@ -225,6 +225,17 @@ def coco(annotation, category=None):
                        "categories": [{"id": 3, "name": "person", **(category or {})}]}).encode()
 
 
+def index_png(bits, rows, palette=False):
+    """A PNG of numbers, grey or of a palette, 8 or 16 bits each."""
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    header = struct.pack(">IIBBBBB", len(rows[0]), len(rows), bits, 3 if palette else 0, 0, 0, 0)
+    packed = b"".join(b"\0" + struct.pack(f">{len(row)}{'H' if bits == 16 else 'B'}", *row) for row in rows)
+    colours = chunk(b"PLTE", bytes(3 * 256)) if palette else b""
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + colours + chunk(b"IDAT", zlib.compress(packed))
+            + chunk(b"IEND", b""))
+
+
 class Aedat4:
     """Recordings in AEDAT 4.0. Its FlatBuffers have their length in front; of a field there is None, its bytes, or, for
     a string or vector, the bytes with a count in front, as one in a tuple."""
@@ -405,6 +416,11 @@ def main(folder):
         "coco/nan": coco({"area": float("nan")}),
         "coco/orphan": coco({"image_id": 8}),
         "coco/deep": b'{"info": ' + b"[" * 4000,
+        "mask/grey": index_png(8, [[0, 1, 1, 0], [2, 1, 0, 0], [2, 2, 0, 255]]),
+        "mask/palette": index_png(8, [[0, 1, 1, 0], [2, 1, 255, 0], [1, 2, 2, 0]], palette=True),
+        "mask/wide": index_png(16, [[0, 1001, 1001, 0], [2002, 0, 10000, 10000]]),
+        "mask/white": index_png(8, [[0, 255], [255, 0]]),
+        "mask/cut": index_png(8, [[0, 1, 2, 3]])[:-9],
         "yolo/data": b"path: ../x\nnames:\n  0: person\n  1: 'a b'\nkpt_shape: [17, 3]\nflip_idx: [0, 2, 1]\n",
         "yolo/aliases": b"a: &a [x, y]\nb: &b [*a, *a]\nnames: *a\n",
         "yolo/boxes": b"0 0.5 0.5 0.25 1e-1\r\n1 0.1 0.2 0.2 0.4\n",

@@ -7,8 +7,10 @@
 #include <stdexcept>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/outlines.h"
 #include "stages/base/archives/cdf_matrix.h"
 #include "stages/frames/events/recording_labels.h"
+#include "stages/frames/index_mask.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/mpii/detail/mat_json.h"
 #include "stages/frames/own_labels/detail/coco_entry.h"
@@ -242,6 +244,24 @@ void read_yolo_input(std::span<const std::uint8_t> input, const std::filesystem:
     const auto annotation = parse_yolo_text(text, schema, {480, 640}, "input");
     if (!is_fault(annotation)) check_annotation(*annotation, schema.names);
   }
+}
+
+void read_mask_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {
+  std::ofstream(scratch, std::ios::binary) << text_of(input);
+  const Outcome<IndexMask> mask = IndexMask::read(scratch, "input");
+  if (is_fault(mask)) return;
+  std::size_t pixels = 0;
+  for (const int index : mask->indices()) {
+    const Outline outline = mask->outline(index);
+    check_outline(outline);
+    const GreyImage drawn = mask_of(outline, mask->size());
+    pixels += static_cast<std::size_t>(std::ranges::count(drawn.pixels, 1));
+  }
+  if (pixels > mask->size().pixel_count()) std::abort();
+  Annotation annotation;
+  annotation.boxes.resize(2, Box{.xyxy = {0, 0, 4, 3}});
+  annotation.left_out_at = {1};
+  give_outlines(scratch, "input", mask->size(), "labels", annotation);
 }
 
 void read_aedat4_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {

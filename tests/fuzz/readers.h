@@ -53,6 +53,7 @@ void read_voc_input(std::span<const std::uint8_t> input, const std::filesystem::
 void read_mot_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
 void read_csv_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
 void read_coco_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
+void read_mask_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
 void read_yolo_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
 /// What reading a recording in AEDAT 4.0 may take: of what is unpacked, at most 256 MiB and as much
 /// again while that grows, its events and its XML, and what the unpackers keep.

@@ -29,6 +29,8 @@ int jpeg_orientation(std::FILE* file);
 /// does not match, or a pixel is a colour that its palette does not have.
 ColourFrame decode_png(std::FILE* file);
 ImageSize png_size(std::FILE* file);
+/// As strict; throws of colours without a palette, too. An index beyond the palette is one as well.
+IndexImage decode_index_png(std::FILE* file);
 /// By its chunk eXIf, wherever it stands.
 int png_orientation(std::FILE* file);
 

@@ -151,6 +151,19 @@ ColourFrame decode_image_file(const std::filesystem::path& file, ImageOrientatio
   return decode_image(open_image_file(file), orientation, range);
 }
 
+IndexImage decode_index_image(const InputFile& file) {
+  const Format* const format = format_of(file);
+  if (format == nullptr || format->decode != decode_png) {
+    throw std::runtime_error("expected a PNG, got a file of another kind");
+  }
+  const InputFile::Stream stream = file.stream(kPixelsBlock);
+  try {
+    return decode_index_png(stream.get());
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(std::string("expected a whole PNG of indices, got ") + error.what());
+  }
+}
+
 bool count_wide_values(const InputFile& file, std::span<std::int64_t> histogram) {
   bool is_wide = false;
   const auto count = [&](const Format& format, std::FILE* stream) {

@@ -24,6 +24,14 @@ struct ColourView {
   const std::uint8_t* bgr = nullptr;
 };
 
+/// An image whose values are numbers, as of objects: [y, x] uint16, C order.
+struct IndexImage {
+  ImageSize size;
+  std::vector<std::uint16_t> indices;
+  int bits = 8;              ///< of a pixel in the file: 1, 2, 4, 8 or 16
+  bool has_palette = false;  ///< the numbers are those of colours
+};
+
 /// A header may announce any size; images beyond this many pixels are refused before memory is
 /// taken for them.
 inline constexpr std::size_t kMaxImagePixels = std::size_t{1} << 26;
@@ -61,6 +69,10 @@ ColourFrame decode_image(const InputFile& file, ImageOrientation orientation,
 ColourFrame decode_image_file(const std::filesystem::path& file,
                               ImageOrientation orientation = ImageOrientation::kStored,
                               const std::optional<ValueRange>& range = {});
+
+/// Decodes a PNG that is grey or has a palette, without looking up any colour. Throws as
+/// decode_image, and so of colours. Thread safe.
+IndexImage decode_index_image(const InputFile& file);
 
 /// Counts the values of an image of 16 bits: `histogram` has 65,536 counts. False, and nothing is
 /// counted, if it has fewer bits. Throws as decode_image. Thread safe for different histograms.

@@ -359,7 +359,8 @@ class PngFile {
         set_conversions();
       }
     });
-    const std::vector<png_bytep> rows = read_rows(frame, has_palette ? 3 : 1);
+    const std::size_t width = static_cast<std::size_t>(frame.size.width);
+    const auto rows = read_rows(frame.bgr.data(), frame.size, 3, has_palette ? width : 3 * width);
     if (has_palette) look_up_colours(frame, rows);
     return frame;
   }
@@ -372,23 +373,49 @@ class PngFile {
       if constexpr (std::endian::native == std::endian::little) png_set_swap(png_);
       set_conversions();
     });
-    read_rows(frame, 1);
+    const std::size_t row_bytes = 6 * static_cast<std::size_t>(frame.size.width);
+    read_rows(frame.bgr.data(), frame.size, 6, row_bytes);
     return frame;
   }
 
+  IndexImage read_indices() {
+    IndexImage image{read_header(), {}};
+    image.bits = png_get_bit_depth(png_, info_);
+    const int kind = png_get_color_type(png_, info_);
+    image.has_palette = kind == PNG_COLOR_TYPE_PALETTE;
+    if (!image.has_palette && (kind & PNG_COLOR_MASK_COLOR) != 0) {
+      throw std::runtime_error("colours, which are neither grey nor a palette's");
+    }
+    image.indices.resize(image.size.pixel_count());
+    const bool is_wide = image.bits == 16;
+    run_guarded(escape_, [&] {
+      png_set_packing(png_);  // a byte for each index
+      png_set_strip_alpha(png_);
+      if constexpr (std::endian::native == std::endian::little) png_set_swap(png_);
+      png_set_interlace_handling(png_);
+    });
+    const auto width = static_cast<std::size_t>(image.size.width);
+    const auto rows = read_rows(image.indices.data(), image.size, 2, (is_wide ? 2 : 1) * width);
+    for (std::size_t y = 0; !is_wide && y < rows.size(); ++y) {
+      // Each byte is at the row's start still, before the place of its own number.
+      for (std::size_t x = width; x-- > 0;) image.indices[y * width + x] = rows[y][x];
+    }
+    return image;
+  }
+
  private:
-  /// Reads the pixels, each row to the place of the frame's, of which it fills `part`th.
-  template <class Frame>
-  std::vector<png_bytep> read_rows(Frame& frame, std::size_t part) {
-    auto* const pixels = reinterpret_cast<png_bytep>(frame.bgr.data());
-    const std::size_t row_bytes =
-        3 * sizeof(frame.bgr[0]) * static_cast<std::size_t>(frame.size.width);
+  /// Reads the pixels, `row_bytes` of each row to its place among pixels of so many bytes.
+  std::vector<png_bytep> read_rows(void* pixels, ImageSize size, std::size_t pixel_bytes,
+                                   std::size_t row_bytes) {
     std::vector<png_bytep> rows;
-    rows.reserve(static_cast<std::size_t>(frame.size.height));
-    for (int y = 0; y < frame.size.height; ++y) rows.push_back(pixels + y * row_bytes);
+    rows.reserve(static_cast<std::size_t>(size.height));
+    const std::size_t between = pixel_bytes * static_cast<std::size_t>(size.width);
+    for (int y = 0; y < size.height; ++y) {
+      rows.push_back(static_cast<png_bytep>(pixels) + static_cast<std::size_t>(y) * between);
+    }
     run_guarded(escape_, [&] {
       png_read_update_info(png_, info_);
-      if (png_get_rowbytes(png_, info_) != row_bytes / part) {
+      if (png_get_rowbytes(png_, info_) != row_bytes) {
         escape_.leave("unexpected kind of pixels");
       }
       png_read_image(png_, rows.data());
@@ -444,6 +471,12 @@ ColourFrame decode_png(std::FILE* file) {
   Buffer stored = stored_png(file);
   std::rewind(file);
   return PngFile(file, std::move(stored)).read();
+}
+
+IndexImage decode_index_png(std::FILE* file) {
+  Buffer stored = stored_png(file);
+  std::rewind(file);
+  return PngFile(file, std::move(stored)).read_indices();
 }
 
 std::optional<WideFrame> decode_wide_png(std::FILE* file) { return PngFile(file).read_wide(); }

@@ -28,6 +28,7 @@ struct EntryFields {
   std::array<double, 2> size{};  // width, height
   std::array<double, 4> box{};
   std::size_t box_sides = 0;
+  bool is_crowd = false;
   std::optional<std::string> file_name, name;
   std::vector<std::string> keypoints;
 };
@@ -52,7 +53,10 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
   std::set<std::int64_t> classes;  // the categories of annotations
 
   bool null() override { return take_value("null"); }
-  bool boolean(bool) override { return take_value("true or false"); }
+  bool boolean(bool value) override {
+    note_crowd(value);
+    return take_value("true or false");
+  }
   bool number_integer(std::int64_t value) override { return take_integer(value); }
   bool number_unsigned(std::uint64_t value) override {
     constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
@@ -194,8 +198,13 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
     }
   }
 
+  void note_crowd(bool value) {
+    if (depth_ == kInEntry && is_annotation() && key_ == "iscrowd") fields_.is_crowd = value;
+  }
+
   bool take_integer(std::int64_t value) {
     take_number(static_cast<double>(value));
+    note_crowd(value == 1);
     if (depth_ == kInEntry && is_annotation() && key_ == "category_id") {
       if (classes.empty() || value != last_class_) classes.insert(last_class_ = value);
       return true;
@@ -230,6 +239,7 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
     if (is_annotation()) {
       need(fields_.image_id, "image_id");
       annotations.push_back({*fields_.image_id, range});
+      index.crowds += fields_.is_crowd;
       constexpr std::size_t kMostBoxes = 1000;
       const auto& [left, top, width, height] = fields_.box;
       if (fields_.box_sides == fields_.box.size() && boxes.size() < kMostBoxes) {

@@ -31,6 +31,7 @@ class CocoLabels : public OwnLabels {
     find_images();
     note_without_label(written_);
     warn_of_corners();
+    warn_of_crowds();
   }
 
   Outcome<Annotation> annotation(const std::string& label_key) const override try {
@@ -76,6 +77,17 @@ class CocoLabels : public OwnLabels {
         "{} of {} compared boxes reach beyond their image: \"bbox\" may have the right and bottom "
         "edges in place of width and height, in {}",
         index_.boxes_beyond, index_.compared_boxes, written_));
+  }
+
+  /// CVAT and Datumaro write every mask as one.
+  void warn_of_crowds() {
+    constexpr std::size_t kFewest = 3;
+    const std::size_t all = index_.annotations.size();
+    if (index_.crowds < kFewest || 2 * index_.crowds <= all) return;
+    warnings_.push_back(fmt::format(
+        "{} of {} annotations have \"iscrowd\" 1, and so are regions to ignore: where these are "
+        "single objects, as CVAT's masks are, make it 0, in {}",
+        index_.crowds, all, written_));
   }
 
   std::string read(const ByteRange& range) const { return file_.read(range.offset, range.length); }

@@ -63,7 +63,8 @@ fs::path find_label_files(const FoundFrames& frames, const LabelFiles& names) {
     return frames.stems.contains(stem.substr(0, stem.rfind('_')));
   };
   const auto has_files = [&](const fs::path& folder) { return !files_in(folder).empty(); };
-  std::vector<fs::path> folders = {label_folder_of(frames.root, names), frames.root};
+  std::vector<fs::path> folders = {label_folder_of(frames.root, names)};
+  if (names.may_lie_beside) folders.push_back(frames.root);
   for (const fs::path& above : {frames.root, frames.root.parent_path()}) {
     for (const std::string_view name : names.label_folders) {
       folders.push_back(label_folder_in(above, name, [&](const fs::path& in, std::string_view of) {

@@ -203,7 +203,7 @@ FoundFrames frames_in(const fs::path& root, WholeFiles& files) {
   return frames;
 }
 
-/// The first of the formats; the others are remarks.
+/// The first of the formats; masks beside boxes are their outlines, the others are remarks.
 std::optional<FoundLabels> find_any(const FoundFrames& frames, std::vector<std::string>& remarks) {
   std::optional<FoundLabels> found;
   for (const LabelReader* const reader : kLabelReaders) {
@@ -211,6 +211,8 @@ std::optional<FoundLabels> find_any(const FoundFrames& frames, std::vector<std::
     if (!path) continue;
     if (!found) {
       found = FoundLabels{reader->format, *path};
+    } else if (reader->format == LabelFormat::kMasks) {
+      found->outlines = *path;
     } else {
       remarks.push_back("labels in another format (" + std::string(to_string(reader->format)) +
                         ") left out: " + path->string());

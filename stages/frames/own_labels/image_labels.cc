@@ -55,6 +55,7 @@ bool add_box(const Box& box, ImageSize image, const std::string& place, Annotati
     annotation.boxes.push_back(box);
     return true;
   }
+  annotation.left_out_at.push_back(annotation.boxes.size() + annotation.left_out.size());
   annotation.left_out.push_back(outside_text(box.xyxy, image) + ", in " + place);
   return false;
 }

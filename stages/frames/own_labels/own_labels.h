@@ -197,16 +197,27 @@ extern const LabelReader kYoloReader;
 /// read at opening, since classes are
 /// numbered by their names' order, as with MOT's and tables' labels; an image without boxes has a
 /// file without <object>. Edges count from LabelSpec::edges_from; else from 0 where a box of the
-/// source begins there, as none of VOC's own can, and from 1 where none does. A note tells.
+/// source begins there, as none of VOC's own can, and from 1 where none does. A note tells. Of a
+/// file in a folder beside SegmentationObject the mask there of its name, if there is one, has the
+/// outlines, number k that of the k-th <object> (give_outlines).
 extern const LabelReader kVocReader;
 
 /// A table (parse_csv_labels): `path` is the file; images are named as by COCO's file_name. The
 /// label_key is the image as the table writes it.
 extern const LabelReader kCsvReader;
 
+/// Index masks alone (IndexMask), as Penn-Fudan's masks, DAVIS' Annotations and MOTS' instances:
+/// found as YOLO's texts are, with the last folder "images", "JPEGImages", "img1", "imgs" or
+/// "image_02" replaced by "masks", "instances" or "Annotations". Each object is a box, the bounds
+/// of its outline, of the class "object". In folders of images, which are a sequence each, and in
+/// videos the number is the track. Masks of 16 bits whose numbers begin at 1000 are MOTS': 1000
+/// class + instance, where class 1 is car and 2 pedestrian; 10000 is a region to ignore.
+/// Annotation::original is {"mask": FILE, "objects": [NUMBER, ...]}.
+extern const LabelReader kMasksReader;
+
 /// Every format's, in the order of kLabelFormats.
-inline constexpr std::array kLabelReaders{&kMotReader, &kCocoReader, &kYoloReader, &kVocReader,
-                                          &kCsvReader};
+inline constexpr std::array kLabelReaders{&kMotReader, &kCocoReader, &kYoloReader,
+                                          &kVocReader, &kCsvReader,  &kMasksReader};
 static_assert(kLabelReaders.size() == kLabelFormats.size());
 
 const LabelReader& label_reader(LabelFormat format);

@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <pugixml.hpp>
+#include <set>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
 
+#include "stages/frames/index_mask.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/own_labels/detail/file_per_image.h"
@@ -175,6 +179,7 @@ class VocLabels : public FilePerImage {
     if (has_boxes) meanings_["edges_from"] = std::to_string(edges_from_);
     if (has_boxes && !spec.edges_from) note_edges(at_0);
     remarks.move_to(notes_);
+    find_masks();
   }
 
   Outcome<Annotation> annotation(const std::string& label_key) const override {
@@ -183,7 +188,12 @@ class VocLabels : public FilePerImage {
     auto& read = *labels;
     Outcome<ImageSize> size = image_size(label_key, read.size);
     if (is_fault(size)) return size.fault();
-    return numbered(std::move(read), schema_.class_names, *size, label_place(label_key));
+    auto annotation = numbered(std::move(read), schema_.class_names, *size, label_place(label_key));
+    const auto mask = mask_of_.find(label_key);
+    if (is_fault(annotation) || mask == mask_of_.end()) return annotation;
+    auto fault = give_outlines(mask->second.on_disk, mask->second.written, *size,
+                               label_place(label_key), *annotation);
+    return fault ? Outcome<Annotation>(*std::move(fault)) : annotation;
   }
 
  private:
@@ -191,6 +201,27 @@ class VocLabels : public FilePerImage {
     Outcome<std::string> text = root().read(label_key);
     if (is_fault(text)) return text.fault();
     return parse_voc_labels(*std::move(text), edges_from_, label_place(label_key));
+  }
+
+  void find_masks() {
+    std::map<std::string, std::set<std::string>> listed;  // by the folder of labels
+    for (const FrameLabel& label : labels()) {
+      if (label.key.empty()) continue;
+      const std::filesystem::path key(label.key);
+      const std::string folder = key.parent_path().generic_string();
+      const auto [masks, is_new] = listed.try_emplace(folder);
+      if (is_new) {
+        for (std::string& name : root().above(folder).files_in(kMasks)) {
+          masks->second.insert(std::move(name));
+        }
+      }
+      const std::string name = key.stem().string() + ".png";
+      if (!masks->second.contains(name)) continue;
+      const SourceRoot above = root().above(folder);
+      const std::string file = std::string(kMasks) + "/" + name;
+      annotation_files_.push_back(above.written(file));
+      mask_of_[label.key] = {above.on_disk(file), above.written(file)};
+    }
   }
 
   /// A pixel is not much, and nobody would find out otherwise.
@@ -206,7 +237,14 @@ class VocLabels : public FilePerImage {
                   " (if that is a slip: \"edges_from\": 1 in the manifest's labels)");
   }
 
+  static constexpr std::string_view kMasks = "SegmentationObject";
+  struct Mask {
+    std::filesystem::path on_disk;
+    std::string written;
+  };
+
   int edges_from_ = 0;  ///< until all files are read: edges as they are written
+  std::unordered_map<std::string, Mask> mask_of_;  ///< by label_key
 };
 
 std::optional<std::filesystem::path> find_voc(const FoundFrames& frames,

@@ -139,6 +139,27 @@ TEST_F(DraftManifest, NamesLabelsOfOnesOwn) {
   EXPECT_THAT(made.findings, Contains("labels: CSV, in " + (folder_ / "walk/boxes.csv").string()));
 }
 
+TEST_F(DraftManifest, NamesMasksThatFitTheBoxes) {
+  FoundSource source = images("walk/images", {{4, 5}, {4, 5}});
+  testing::write_file(folder_ / "walk/boxes.csv",
+                      "image,class,left,top,right,bottom\n0.png,car,0,0,2,2\n1.png,,,,,\n");
+  source.labels = {LabelFormat::kCsv, folder_ / "walk/boxes.csv", folder_ / "walk/masks"};
+  std::vector<int> pixels(20);
+  pixels[6] = 1;
+  testing::write_index_image(folder_ / "walk/masks/0.png", {4, 5}, pixels);
+  const ManifestDraft made = draft({source});
+  EXPECT_EQ(read(made).sources[0].outlines, "walk/masks");
+  EXPECT_THAT(made.findings,
+              Contains("outlines: index masks, in " + (folder_ / "walk/masks").string()));
+  pixels[6] = 2;
+  testing::write_index_image(folder_ / "walk/masks/0.png", {4, 5}, pixels);
+  const ManifestDraft without = draft({source});
+  EXPECT_FALSE(read(without).sources[0].outlines);
+  EXPECT_THAT(without.findings,
+              Contains(HasSubstr("masks left out, since they do not fit the boxes: expected "
+                                 "numbers of the 1 box in walk/boxes.csv#0.png, got 2, in ")));
+}
+
 TEST_F(DraftManifest, OfARecordingTakesItsEvents) {
   const ManifestDraft made = draft({recording("drive")});
   const JobManifest job = read(made);

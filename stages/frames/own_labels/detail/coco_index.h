@@ -37,6 +37,8 @@ struct CocoIndex {
   std::size_t compared_boxes = 0;  ///< some of the file's first boxes
   std::size_t boxes_beyond = 0;  ///< of them those that reach beyond their image's right or bottom
 
+  std::size_t crowds = 0;  ///< annotations with `iscrowd` 1 or true
+
   std::size_t image_count() const { return images.size() - 1; }
 };
 

@@ -19,6 +19,7 @@ struct LabelFiles {
   std::vector<std::string_view> label_folders;  ///< ... is one of these in its label's
   /// No label, though it has the extension.
   bool (*is_other)(std::string_view file) = [](std::string_view) { return false; };
+  bool may_lie_beside = true;  ///< in the folder of images itself; false: images may look alike
 };
 
 /// The folder of labels that stands for a folder of images, at its own path; empty if there is

@@ -134,6 +134,44 @@ TEST(PngImage, AnIndexBeyondThePaletteIsRefused) {
   }
 }
 
+TEST(PngImage, IndicesAreAsTheyAreStored) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.png";
+  const PngKind kinds[] = {
+      {"grey", PNG_COLOR_TYPE_GRAY, 1, 0},      {"grey", PNG_COLOR_TYPE_GRAY, 4, 1},
+      {"grey", PNG_COLOR_TYPE_GRAY, 8, 0},      {"grey", PNG_COLOR_TYPE_GRAY, 16, 0},
+      {"grey", PNG_COLOR_TYPE_GRAY, 16, 1},     {"palette", PNG_COLOR_TYPE_PALETTE, 2, 0},
+      {"palette", PNG_COLOR_TYPE_PALETTE, 8, 1}};
+  constexpr ImageSize kSize{5, 13};
+  for (const PngKind& kind : kinds) {
+    write_png(file, kSize, kind.kind, kind.bits, kind.interlace);
+    const IndexImage read = with_open(file, decode_index_png);
+    EXPECT_EQ(read.size, kSize);
+    EXPECT_EQ(read.bits, kind.bits);
+    EXPECT_EQ(read.has_palette, kind.kind == PNG_COLOR_TYPE_PALETTE);
+    ASSERT_EQ(read.indices.size(), 65u);
+    const int row_bytes = (13 * kind.bits + 7) / 8;
+    const auto byte = [&](int y, int at) { return 37 * (y * row_bytes + at + 1) % 256; };
+    for (int y = 0; y < 5; ++y) {
+      for (int x = 0; x < 13; ++x) {
+        const int bit = x * kind.bits;
+        const int expected = kind.bits == 16 ? 256 * byte(y, 2 * x) + byte(y, 2 * x + 1)
+                                             : byte(y, bit / 8) >> (8 - kind.bits - bit % 8) &
+                                                   ((1 << kind.bits) - 1);
+        EXPECT_EQ(read.indices[static_cast<std::size_t>(13 * y + x)], expected)
+            << kind.name << kind.bits << ": " << x << ", " << y;
+      }
+    }
+  }
+  write_png(file, kSize, PNG_COLOR_TYPE_RGB, 8, 0);
+  EXPECT_EQ(testing::why_refused(file, decode_index_png),
+            "colours, which are neither grey nor a palette's");
+  write_png(file, kSize, PNG_COLOR_TYPE_GRAY, 8, 0);
+  const std::string bytes = read_file(file);
+  write_file(file, bytes.substr(0, bytes.size() - 20));
+  EXPECT_NE(testing::why_refused(file, decode_index_png), "");
+}
+
 TEST(PngImage, DamageBesideThePixelsIsForgiven) {
   const TemporaryFolder folder;
   const auto file = folder / "image.png";

@@ -104,6 +104,28 @@ TEST_F(CocoOutlines, ABoxWithoutSidesIsAroundItsOutline) {
   EXPECT_THAT(neither.fault().reason, HasSubstr("(annotation 17): $.bbox: expected"));
 }
 
+TEST_F(CocoOutlines, MostlyCrowdsAreAWarning) {
+  const auto warnings = [&](const char* last) {
+    std::string annotations;
+    for (int id = 1; id <= 4; ++id) {
+      const char* const crowd = id == 1 ? "0" : id == 2 ? "true" : id == 3 ? "1" : last;
+      annotations += (id > 1 ? ", " : "") + std::string("{\"id\": ") + std::to_string(id) +
+                     R"(, "image_id": 7, "category_id": 3, "bbox": [1, 1, 2, 2], "iscrowd": )" +
+                     crowd + "}";
+    }
+    testing::write_file(folder_ / "instances.json",
+                        R"({"images": [{"id": 7, "file_name": "1.png", "height": 4, "width": 5}],
+                            "categories": [{"id": 3, "name": "person"}], "annotations": [)" +
+                            annotations + "]}");
+    SourceSpec spec;
+    spec.root = "images";
+    spec.labels = LabelSpec{LabelFormat::kCoco, "instances.json"};
+    return open_frames_dataset(spec, folder_.path())->warnings();
+  };
+  EXPECT_THAT(warnings("0"), IsEmpty());
+  EXPECT_THAT(warnings("1"), ElementsAre(HasSubstr("3 of 4 annotations have \"iscrowd\" 1")));
+}
+
 TEST_F(CocoOutlines, WithoutAreaThereIsNone) {
   for (const char* empty : {"[]", "[[]]", "null", "[[1, 1, 3, 3]]", "[[1, 1, 2, 2, 3, 3]]",
                             R"({"size": [4, 5], "counts": [20]})"}) {

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manifests/values/faults.h"
+#include "manifests/values/frames.h"
+#include "manifests/values/job.h"
+#include "manifests/values/labels.h"
+#include "stages/base/images/image_file.h"
+#include "stages/frames/dataset.h"
+
+namespace eventgan {
+
+/// A mask in which each pixel has the number of its object, as Pascal VOC, DAVIS and Penn-Fudan
+/// have them: a PNG, grey or with a palette, whose colours say nothing. 0 is background. In masks
+/// of 8 bits 255 is void, of no object; but in a grey one that has no other number, as masks of a
+/// single object have, it is object 1. A value; reading it from several threads is safe.
+class IndexMask {
+ public:
+  /// A fault names the file as `written`, and is one of a mask of over 1000 objects, too.
+  static Outcome<IndexMask> read(const std::filesystem::path& file, const std::string& written);
+
+  ImageSize size() const { return image_.size; }
+  int bits() const { return image_.bits; }
+  bool has_palette() const { return image_.has_palette; }
+  /// Those of objects, ascending.
+  const std::vector<int>& indices() const { return indices_; }
+  /// The edges of the object's pixels.
+  Outline outline(int index) const;
+
+ private:
+  explicit IndexMask(IndexImage image);
+
+  struct Extent {  ///< of an object's pixels: first and last row and column
+    int top, bottom, left, right;
+  };
+
+  IndexImage image_;
+  std::vector<int> indices_;
+  std::vector<Extent> extents_;  ///< one of each of indices_
+};
+
+/// Gives each box that has no outline that of its object: number k is of the k-th box that the
+/// annotation has, counted from 1, be it left out or not. A fault where the mask cannot be read, is
+/// of another size than the image, has a number that no box has, or pixels of one that lie all
+/// outside its box. The mask is read only if a box is without outline. `written` is its file, and
+/// `place` the label's, in messages.
+std::optional<SampleFault> give_outlines(const std::filesystem::path& file,
+                                         const std::string& written, ImageSize image,
+                                         const std::string& place, Annotation& annotation);
+
+/// A dataset whose boxes have outlines by the masks in SourceSpec::outlines, a folder: of an image
+/// at its path below the root, with the ending .png in place of its own, or right in the folder
+/// where no other labelled image has its name; of a video's frame 12 STEM/000012.png, with any
+/// number of zeros. An image without mask keeps its boxes as they are, and a note counts these.
+/// Throws InputError if there is no such folder, or none of the images has a mask.
+std::unique_ptr<Dataset> with_outlines(std::unique_ptr<Dataset> dataset, const SourceSpec& spec,
+                                       const std::filesystem::path& base);
+
+}  // namespace eventgan

@@ -1,0 +1,195 @@
+// Index masks as labels, and those of Pascal VOC beside its own.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "manifests/values/outlines.h"
+#include "stages/frames/find_source.h"
+#include "stages/frames/sequences/frames_dataset.h"
+#include "tests/testing/image_file.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using testing::IndexPng;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr ImageSize kMaskedImage{3, 5};
+
+class MaskLabels : public ::testing::Test {
+ protected:
+  void add(const std::string& image, const std::string& mask, const std::vector<int>& pixels,
+           IndexPng kind = IndexPng::kGrey8) {
+    testing::write_flat_image(folder_ / image, kMaskedImage, 9);
+    if (!mask.empty()) testing::write_index_image(folder_ / mask, kMaskedImage, pixels, kind);
+  }
+  std::unique_ptr<Dataset> open(const std::string& root, const std::string& path,
+                                LabelFormat format = LabelFormat::kMasks) const {
+    SourceSpec spec;
+    spec.root = root;
+    spec.labels = LabelSpec{format, path};
+    return open_frames_dataset(spec, folder_.path());
+  }
+  static Annotation annotation(const Dataset& dataset, std::size_t frame = 0) {
+    const auto read = dataset.annotation(dataset.labelled_frames().at(frame).label_key);
+    EXPECT_FALSE(is_fault(read)) << read.fault().reason;
+    return *read;
+  }
+  static std::string fault(const Dataset& dataset) {
+    const auto read = dataset.annotation(dataset.labelled_frames().at(0).label_key);
+    return is_fault(read) ? read.fault().reason : "no fault";
+  }
+
+  const std::vector<int> two_{0, 3, 3, 0, 0,  //
+                              0, 3, 0, 0, 8,  //
+                              0, 0, 0, 8, 8};
+  testing::TemporaryFolder folder_;
+};
+
+TEST_F(MaskLabels, AreABoxAnObject) {
+  add("images/FudanPed00001.png", "masks/FudanPed00001.png", two_);
+  add("images/FudanPed00002.png", "", {});
+  const auto dataset = open("images", "masks");
+  EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("object"));
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("masks/FudanPed00001.png"));
+  EXPECT_THAT(dataset->labelled_frames(), SizeIs(1));
+  EXPECT_THAT(dataset->notes(), ElementsAre(HasSubstr("no label for 1 of 2 frames in masks")));
+  const Annotation read = annotation(*dataset);
+  EXPECT_EQ(read.original, R"({"mask":"FudanPed00001.png","objects":[3,8]})");
+  ASSERT_THAT(read.boxes, SizeIs(2));
+  EXPECT_EQ(read.boxes[0].xyxy, (Rectangle{1, 0, 3, 2}));
+  EXPECT_EQ(read.boxes[1].xyxy, (Rectangle{3, 1, 5, 3}));
+  for (const Box& box : read.boxes) {
+    EXPECT_EQ(box.class_id, 0);
+    EXPECT_EQ(box.track_id, -1) << "one image has nothing to do with the next";
+    EXPECT_FALSE(box.ignore);
+  }
+  const GreyImage mask = mask_of(read.boxes[1].outline, kMaskedImage);
+  for (std::size_t i = 0; i < two_.size(); ++i) EXPECT_EQ(mask.pixels[i] != 0, two_[i] == 8) << i;
+}
+
+TEST_F(MaskLabels, OfDavisNumbersAreTracks) {
+  add("JPEGImages/480p/bear/00000.png", "Annotations/480p/bear/00000.png", two_,
+      IndexPng::kPalette);
+  add("JPEGImages/480p/bear/00001.png", "Annotations/480p/bear/00001.png", std::vector<int>(15),
+      IndexPng::kPalette);
+  const auto dataset = open("JPEGImages", "Annotations");
+  ASSERT_THAT(dataset->labelled_frames(), SizeIs(2));
+  const Annotation read = annotation(*dataset);
+  EXPECT_THAT(read.boxes, ElementsAre(::testing::Field(&Box::track_id, 3),
+                                      ::testing::Field(&Box::track_id, 8)));
+  EXPECT_THAT(annotation(*dataset, 1).boxes, IsEmpty());
+}
+
+TEST_F(MaskLabels, OfMotsHaveClasses) {
+  add("image_02/0000/000000.png", "instances/0000/000000.png",
+      {0, 1005, 1005, 0, 0, 0, 2001, 0, 0, 10000, 0, 0, 0, 10000, 10000}, IndexPng::kGrey16);
+  const auto dataset = open("image_02", "instances");
+  EXPECT_THAT(dataset->label_schema().class_names,
+              ElementsAre("car", "pedestrian", "ignore_region"));
+  EXPECT_EQ(dataset->label_meanings().at("masks"), "1000 class + instance");
+  const Annotation read = annotation(*dataset);
+  ASSERT_THAT(read.boxes, SizeIs(3));
+  EXPECT_EQ(read.boxes[0].class_id, 0);
+  EXPECT_EQ(read.boxes[0].track_id, 1005);
+  EXPECT_EQ(read.boxes[0].xyxy, (Rectangle{1, 0, 3, 1}));
+  EXPECT_EQ(read.boxes[1].class_id, 1);
+  EXPECT_EQ(read.boxes[1].track_id, 2001);
+  EXPECT_TRUE(read.boxes[2].ignore);
+  EXPECT_EQ(read.boxes[2].class_id, 2);
+  EXPECT_EQ(read.boxes[2].track_id, -1);
+  for (const int other : {7, 999, 3000, 9999, 10001}) {
+    testing::write_index_image(folder_ / "instances/0000/000000.png", kMaskedImage,
+                               {0, 1005, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, other},
+                               IndexPng::kGrey16);
+    EXPECT_EQ(fault(*dataset), "expected MOTS' numbers, 1000 to 2999 and 10000, got " +
+                                   std::to_string(other) + ", in instances/0000/000000.png");
+  }
+}
+
+TEST_F(MaskLabels, OfAnotherSizeAreAFault) {
+  add("images/1.png", "masks/1.png", two_);
+  testing::write_index_image(folder_ / "masks/1.png", {2, 2}, {0, 1, 1, 1});
+  EXPECT_EQ(fault(*open("images", "masks")),
+            "expected an image of 2x2, as masks/1.png says, got 5x3, in images/1.png");
+}
+
+class VocMasks : public MaskLabels {
+ protected:
+  VocMasks() {
+    std::string objects;
+    for (const char* box : {"<xmin>1</xmin><ymin>1</ymin><xmax>3</xmax><ymax>2</ymax>",
+                            "<xmin>4</xmin><ymin>1</ymin><xmax>5</xmax><ymax>3</ymax>"}) {
+      objects += std::string("<object><name>cat</name><bndbox>") + box + "</bndbox></object>";
+    }
+    for (const char* name : {"1", "2"}) {
+      add(std::string("VOC/JPEGImages/") + name + ".png", "", {});
+      testing::write_file(folder_ / "VOC/Annotations" / (std::string(name) + ".xml"),
+                          "<annotation>" + objects + "</annotation>");
+    }
+  }
+  void write_mask(const std::vector<int>& pixels) {
+    testing::write_index_image(folder_ / "VOC/SegmentationObject/1.png", kMaskedImage, pixels,
+                               IndexPng::kPalette);
+  }
+};
+
+TEST_F(VocMasks, AreFoundBesideTheAnnotations) {
+  write_mask({0, 1, 255, 255, 2, 0, 1, 255, 2, 2, 0, 0, 0, 0, 2});
+  for (const char* path : {"VOC/Annotations", "VOC"}) {
+    const auto dataset = open("VOC/JPEGImages", path, LabelFormat::kVoc);
+    EXPECT_THAT(dataset->annotation_files(),
+                ElementsAre("VOC/Annotations/1.xml", "VOC/Annotations/2.xml",
+                            "VOC/SegmentationObject/1.png"));
+    const Annotation read = annotation(*dataset);
+    EXPECT_EQ(bounds(read.boxes.at(0).outline), (Rectangle{1, 0, 2, 2}));
+    EXPECT_EQ(bounds(read.boxes.at(1).outline), (Rectangle{3, 0, 5, 3}));
+    EXPECT_EQ(read.boxes[0].xyxy, (Rectangle{0, 0, 3, 2}));
+    EXPECT_TRUE(annotation(*dataset, 1).boxes.at(0).outline.empty());
+  }
+}
+
+TEST_F(VocMasks, WithANumberOfNoObjectAreAFault) {
+  write_mask({0, 1, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  EXPECT_EQ(fault(*open("VOC/JPEGImages", "VOC", LabelFormat::kVoc)),
+            "expected numbers of the 2 boxes in VOC/Annotations/1.xml, got 3, in "
+            "VOC/SegmentationObject/1.png");
+}
+
+TEST_F(MaskLabels, AreFoundBesideImages) {
+  add("fudan/images/1.png", "fudan/masks/1.png", two_);
+  FoundSource found = find_sources(folder_ / "fudan").front();
+  ASSERT_TRUE(found.labels);
+  EXPECT_EQ(found.labels->format, LabelFormat::kMasks);
+  EXPECT_EQ(found.labels->path, folder_ / "fudan/masks");
+  EXPECT_EQ(found.root, folder_ / "fudan/images");
+
+  testing::write_file(folder_ / "fudan/boxes.csv",
+                      "image,class,left,top,right,bottom\n1.png,a,0,0,2,3\n");
+  found = find_sources(folder_ / "fudan").front();
+  ASSERT_TRUE(found.labels);
+  EXPECT_EQ(found.labels->format, LabelFormat::kCsv);
+  EXPECT_EQ(found.labels->outlines, folder_ / "fudan/masks");
+
+  add("davis/JPEGImages/bear/1.png", "davis/Annotations/bear/1.png", two_, IndexPng::kPalette);
+  found = find_sources(folder_ / "davis").front();
+  ASSERT_TRUE(found.labels);
+  EXPECT_EQ(found.labels->path, folder_ / "davis/Annotations");
+
+  // Grey ones there are of classes; and images beside images are no masks.
+  add("ade/images/1.png", "ade/annotations/1.png", two_);
+  EXPECT_FALSE(find_sources(folder_ / "ade").front().labels);
+  add("flat/1.png", "", {});
+  EXPECT_FALSE(find_sources(folder_ / "flat").front().labels);
+  add("colours/images/1.png", "", {});
+  testing::write_file(folder_ / "colours/masks/1.png", "no PNG");
+  EXPECT_FALSE(find_sources(folder_ / "colours").front().labels);
+}
+
+}  // namespace
+}  // namespace eventgan
