@@ -18,6 +18,7 @@ namespace {
 constexpr std::int64_t kMostPairs = 1'000'000'000;
 constexpr std::int64_t kMostEvents = 1'000'000'000;
 constexpr int kLargestSensor = 8192;
+constexpr int kMostStreams = 1'000'000;
 
 void list_object_motion(Fields& fields, ObjectMotionSpec& spec) {
   fields.find("translation_px", spec.translation_px, pairs_of(0, 100),
@@ -109,7 +110,10 @@ void list_columns(Fields& fields, EventFields& spec) {
   fields.find("x", spec.x, texts(), "Columns of the sensor, from its left; by default 1.");
   fields.find("y", spec.y, texts(), "Rows of the sensor, from its top; by default 2.");
   fields.find("p", spec.p, texts(), "Polarities, 1 and 0 or 1 and -1; by default 3.");
-  fields.find("unit", spec.tick_s, words(kTimeUnitWords), "What the times count.");
+  fields.find(
+      "unit", spec.tick_s, words(kTimeUnitWords),
+      "What the times count. Default: what the name's end says (_s, _ms, _us, _ns), else s "
+      "where they have decimals, ns where they are of the clock of the day in ns, else us.");
 }
 
 /// What a recording of events does not tell of itself.
@@ -119,7 +123,12 @@ void list_recording(Fields::Only some, RecordingOptions& options) {
   some.find("rectify", options.rectify, booleans(),
             "of DSEC's layout, moves events by its rectify_map.h5.");
   some.find("sensor", options.sensor, sizes(1, kLargestSensor),
-            "the camera's size in pixels, where the file does not tell it.");
+            "the camera's size in pixels. Default: what the file tells.");
+  some.find("stream", options.stream, integers(0, kMostStreams),
+            "of AEDAT4, the number of its stream of events. Default: the first.");
+  some.find("time_shift", options.time_shift, booleans(),
+            "of Prophesee's RAW, takes the camera's time at the recording's start off all times, "
+            "as Metavision's readers do. Labels made with these need it.");
   some.find("columns", options.columns, objects(list_columns),
             "of a table (.npy, .npz, .csv), the names of its columns, fields or arrays, and what "
             "its times count.");

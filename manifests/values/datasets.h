@@ -63,7 +63,7 @@ struct DatasetRow {
   /// what their demo does to any others; empty of events, which have no grey values.
   std::string_view preset;
   /// A source's keys that not every kind takes; the rest are empty.
-  std::array<std::string_view, 8> keys = {};
+  std::array<std::string_view, 10> keys = {};
   std::string_view required_key = {};  ///< one of `keys`; empty: none
   /// Its samples are windows of real events (GeneratorKind::kEvents), not pairs of frames.
   bool has_events = false;
@@ -111,8 +111,8 @@ inline constexpr std::array kDatasets{
                .value = DatasetKind::kRecording,
                .title = "recording of an event camera",
                .preset = "",
-               .keys = {"annotations", "camera", "rectify", "sensor", "columns", "window_s",
-                        "window_events", "label_at"},
+               .keys = {"annotations", "camera", "rectify", "sensor", "stream", "time_shift",
+                        "columns", "window_s", "window_events", "label_at"},
                .has_events = true},
     // A label of dhp19 is the mean pose of a window of so many events as its authors took.
     DatasetRow{.word = "dhp19",

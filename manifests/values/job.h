@@ -109,7 +109,8 @@ struct EventFields {
   std::string x = "x";
   std::string y = "y";
   std::string p = "p";
-  double tick_s = 1e-6;  ///< what `t` counts: 1, 1e-3, 1e-6 or 1e-9 s
+  /// What `t` counts: 1, 1e-3, 1e-6 or 1e-9 s; none: what its name and the times tell.
+  std::optional<double> tick_s = {};
   bool operator==(const EventFields&) const = default;
 };
 
@@ -117,7 +118,9 @@ struct EventFields {
 struct RecordingOptions {
   std::string camera = "left";           ///< "left" or "right", of two
   bool rectify = false;                  ///< events through a map of the lens
-  std::optional<ImageSize> sensor = {};  ///< where the file does not tell it
+  std::optional<ImageSize> sensor = {};  ///< none: what the file tells
+  std::optional<int> stream = {};        ///< of events, by its number; none: the first
+  bool time_shift = true;                ///< times count from the recording's start
   EventFields columns = {};
   bool operator==(const RecordingOptions&) const = default;
 };

@@ -13,17 +13,6 @@ namespace {
 
 using Ring = std::vector<Point>;
 
-/// Twice the area within a ring that runs clockwise as one sees it, minus that of another.
-double twice_area(const Ring& ring) {
-  double sum = 0;
-  for (std::size_t i = 0; i < ring.size(); ++i) {
-    const Point& a = ring[i];
-    const Point& b = ring[(i + 1) % ring.size()];
-    sum += a.x * b.y - b.x * a.y;
-  }
-  return sum;
-}
-
 /// Where an edge crosses the line through the centres of a row: left of which, and whether it
 /// begins (clockwise, upwards) or ends a part.
 struct Crossing {
@@ -112,6 +101,16 @@ class EdgeTracer {
 constexpr std::size_t kLeastCorners = 3;
 
 }  // namespace
+
+double twice_area(const Ring& ring) {
+  double sum = 0;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const Point& a = ring[i];
+    const Point& b = ring[(i + 1) % ring.size()];
+    sum += a.x * b.y - b.x * a.y;
+  }
+  return sum;
+}
 
 Outline outline_of_parts(std::vector<std::vector<Point>> parts) {
   Outline outline;

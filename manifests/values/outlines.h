@@ -11,6 +11,9 @@
 
 namespace eventgan {
 
+/// Twice the area within a ring that runs clockwise as one sees it, minus that of another.
+double twice_area(const std::vector<Point>& ring);
+
 /// An outline of parts that may overlap and have no holes, as COCO and YOLO write them: each ring
 /// is turned to run clockwise. Rings of fewer than three corners or without area are left out.
 Outline outline_of_parts(std::vector<std::vector<Point>> parts);

@@ -21,8 +21,8 @@ struct RecordingFormatRow {
   std::string_view summary;  ///< what lies there, as a part of a sentence
   /// Frames on the pixels of the events may be there: such recordings train and judge generators.
   bool has_frames;
-  /// Those of a manifest's keys "camera", "rectify", "sensor" and "columns" that count here; the
-  /// rest are empty.
+  /// Those of a manifest's keys "camera", "rectify", "sensor", "stream", "time_shift" and "columns"
+  /// that count here; the rest are empty.
   std::array<std::string_view, 3> keys = {};
   /// Of its files, in small letters: `init` looks at no others. Empty: only folders.
   std::array<std::string_view, 3> extensions = {};
@@ -53,6 +53,7 @@ inline constexpr std::array kRecordingFormats{
                        .title = "AEDAT4",
                        .summary = "of iniVation's DV; a DAVIS has frames",
                        .has_frames = true,
+                       .keys = {"sensor", "stream"},
                        .extensions = {".aedat4"}},
     RecordingFormatRow{
         .word = "dsec",
@@ -72,9 +73,9 @@ inline constexpr std::array kRecordingFormats{
     RecordingFormatRow{.word = "prophesee",
                        .value = RecordingFormat::kProphesee,
                        .title = "Prophesee",
-                       .summary = "RAW in EVT 2.0 or 3.0, or DAT",
+                       .summary = "RAW in EVT 2.0, 2.1 or 3.0, or DAT",
                        .has_frames = false,
-                       .keys = {"sensor"},
+                       .keys = {"sensor", "time_shift"},
                        .extensions = {".raw", ".dat"}},
     RecordingFormatRow{.word = "table",
                        .value = RecordingFormat::kTable,

@@ -115,8 +115,8 @@ void add_export_command(CLI::App& app, int& exit_code) {
       "JSON file that maps each class name to a number, or to null to leave the class out")
       ->option_text("FILE");
   take_one_of(add("--ignored", arguments->keep_ignored,
-                  "keep or drop boxes to ignore (DontCare). yolo keeps them as a class of their "
-                  "own (default: drop), coco as crowds (default: keep)"),
+                  "keep or drop boxes to ignore (DontCare). YOLO keeps them as a class of their "
+                  "own (default: drop), COCO as crowds (default: keep)"),
               kIgnored);
   add("--full-scale", options.full_scale, "volume value that becomes 255; default: 1")
       ->check(CLI::Range(1e-6, 1e6))
@@ -129,6 +129,10 @@ void add_export_command(CLI::App& app, int& exit_code) {
   take_one_of(add("--layout", options.event_file,
                   "lines of text, t x y p (default), or HDF5 as MVSEC has it"),
               kEventFiles);
+  add("--frames-per-second", options.frames_per_second,
+      "frames a second of images whose times are not known; default: 1")
+      ->check(CLI::Range(1e-3, 1e6))
+      ->option_text("NUMBER");
   add("--seed", options.seed, "random seed; default: 0")->option_text("NUMBER");
   add_threads_option(*command, options.threads);
   command->add_flag("--overwrite", options.overwrite, "Replace an earlier export in FOLDER");

@@ -91,6 +91,10 @@ int run_fit(const FitArguments& arguments) {
                           origin_text(fit, std::filesystem::path(arguments.weights).filename()));
   const std::string document = to_document(sensor);
   std::cout << to_text(fit);
+  if (!arguments.out.empty() && !sensor.threshold && !sensor.noise) {
+    throw InputError("--out: expected recordings that tell a threshold or the noise, got none: " +
+                     arguments.out + " is not written");
+  }
   if (arguments.out.empty()) {
     std::cout << document;
   } else {

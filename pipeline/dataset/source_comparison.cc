@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/outlines.h"
 #include "manifests/values/pair_key.h"
 #include "manifests/values/placement.h"
 #include "manifests/values/still_motion.h"
@@ -37,6 +38,22 @@ bool same(double a, double b) {
   return std::abs(a - b) <= 1e-9 + 1e-14 * std::abs(b) || (std::isnan(a) && std::isnan(b));
 }
 bool same(float a, float b) { return a == b || (std::isnan(a) && std::isnan(b)); }
+// Of bytes, those of outlines: last bits of 64 can lie between two numbers of 32.
+bool same(const std::vector<char>& a, const std::vector<char>& b) {
+  if (a == b) return true;
+  const auto first = read_outline({a.data(), a.size()});
+  const auto second = read_outline({b.data(), b.size()});
+  const auto same_corner = [](Point p, Point q) {
+    const auto near = [](double x, double y) {
+      return std::abs(x - y) <= 1e-9 + std::numeric_limits<float>::epsilon() * std::abs(y);
+    };
+    return near(p.x, q.x) && near(p.y, q.y);
+  };
+  return first && second &&
+         std::ranges::equal(first->rings, second->rings, [&](const auto& ring, const auto& other) {
+           return std::ranges::equal(ring, other, same_corner);
+         });
+}
 template <class Element>
 bool same(const Element& a, const Element& b) {
   return a == b;

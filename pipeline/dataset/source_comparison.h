@@ -58,7 +58,8 @@ class SourceComparison {
 /// What slot `slot` of `stored` holds that `expected`, the sample made again from its source (its
 /// `tiles` as stored), would not: every column of the format but those of `/events`, which the
 /// generator makes, is compared, so that a new one cannot be forgotten. Numbers of 64 bits may
-/// differ by 1e-9, since their last bits may depend on the compiler; all else is the same exactly.
+/// differ by 1e-9, and those of outlines by the last of their 32 bits, since the compiler decides
+/// on last bits; all else is the same exactly.
 /// A column that shards of today may have and this one has not is left out. Texts "expected X in
 /// COLUMN by PLACE, got Y" in which `place` names the annotation, one for each box,
 /// person or sample and column; where the annotation's bytes or the numbers of labels differ, that

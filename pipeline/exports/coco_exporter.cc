@@ -258,11 +258,13 @@ class CocoExporter : public Exporter {
                  CocoFile& file) const {
     const auto ids = ids_of(sample);
     const std::int64_t image = ids ? ids->image : place;
+    const ImageSize volume = sample.reader.header().volume.size;
     const auto take = [&](const ClassNumbers::Entry& entry, const VolumeBox& box) {
+      const Outline outline = shown_outline(sample.labels, box, volume);
       const auto add = [&](int category) {
         const auto index = static_cast<std::size_t>(&box - sample.labels.labels.boxes.data());
         const std::int64_t own = ids ? ids->annotations[index] : ++id;
-        file.add(coco_box({own, image, category}, box.clipped, box.ignore));
+        file.add(coco_box({own, image, category}, box.clipped, box.ignore, outline, volume));
       };
       if (entry.fate == ClassNumbers::Fate::kKept) {
         add(entry.number);

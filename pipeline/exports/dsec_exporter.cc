@@ -79,7 +79,7 @@ ExportFormat dsec_format() {
   return {.word = "dsec",
           .title = "the same events as recordings in DSEC's layout, with DSEC-Det's tracks",
           .need = LabelNeed::kNone,
-          .options = {"--classes", "--counts", "--seed"},
+          .options = {"--classes", "--counts", "--frames-per-second", "--seed"},
           .files = {"dsec/SPLIT/RECORDING/events/left/events.h5",
                     "dsec/SPLIT/RECORDING/images/timestamps.txt",
                     "dsec/SPLIT/RECORDING/object_detections/left/tracks.npy",

@@ -7,6 +7,7 @@ namespace eventgan {
 
 // The table of formats. Each row is in the file of its exporter.
 ExportFormat yolo_format();
+ExportFormat yolo_seg_format();
 ExportFormat coco_format();
 ExportFormat mpii_format();
 ExportFormat davis_format();
@@ -14,11 +15,12 @@ ExportFormat webdataset_format();
 ExportFormat events_format();
 ExportFormat dsec_format();
 ExportFormat rvt_format();
+ExportFormat raw_format();
 
 const std::vector<ExportFormat>& export_formats() {
   static const std::vector<ExportFormat> kFormats = {
-      yolo_format(),       coco_format(),   mpii_format(), davis_format(),
-      webdataset_format(), events_format(), dsec_format(), rvt_format()};
+      yolo_format(),       yolo_seg_format(), coco_format(), mpii_format(), davis_format(),
+      webdataset_format(), events_format(),   dsec_format(), rvt_format(),  raw_format()};
   return kFormats;
 }
 

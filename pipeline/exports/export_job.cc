@@ -65,7 +65,8 @@ class Description {
       }
     }
     for (const auto& [what, count] : exporter_.whole_samples_left_out()) left_out_[what] += count;
-    lines += "],\n\"left_out\": " + dump_json(nlohmann::ordered_json(left_out_)) + "}\n";
+    lines += "],\n\"left_out\": " + dump_json(nlohmann::ordered_json(left_out_)) +
+             ",\n\"notes\": " + dump_json(nlohmann::ordered_json(exporter_.notes())) + "}\n";
     file.write(lines);
     file.publish();
   }
@@ -84,10 +85,11 @@ bool has_use_for(LabelNeed need, const ExportSource& source) {
          (source.has_joints() && need != LabelNeed::kBoxes);
 }
 
-/// What an earlier run has counted.
-LeftOut read_left_out(const std::filesystem::path& description) {
+/// What an earlier run has counted and noted.
+void read_description(const std::filesystem::path& description, ExportReport& report) {
   const auto json = nlohmann::json::parse(read_text_file(description));
-  return json.at("left_out").get<LeftOut>();
+  report.left_out = json.at("left_out").get<LeftOut>();
+  report.notes = json.at("notes").get<std::vector<std::string>>();
 }
 
 }  // namespace
@@ -97,7 +99,7 @@ ExportReport run_export(const std::filesystem::path& folder, const ExportOptions
   const std::unique_ptr<Exporter> exporter = options.to->make(input, options);
   std::vector<const ExportShard*> shards;
   LeftOut sources_left_out;
-  ExportReport report{options.out.string(), 0, 0, {}, input.missing()};
+  ExportReport report{options.out.string(), 0, 0, {}, {}, input.missing()};
   for (const ExportShard& shard : input.shards()) {
     const ExportSource& source = input.source_of(shard);
     if (!has_use_for(options.to->need, source)) {
@@ -143,13 +145,14 @@ ExportReport run_export(const std::filesystem::path& folder, const ExportOptions
   for (const ExportShard& shard : input.shards()) all.push_back(&shard);
   ExportFolder::Step step(out, kExportDescription, input_hash(all));
   if (step.is_done()) {
-    report.left_out = read_left_out(out.path() / kExportDescription);
+    read_description(out.path() / kExportDescription, report);
   } else {
     Description description(work, *exporter, identity);
     description.left_out() = sources_left_out;
     description.write(shards, step.file(kExportDescription));
     step.finish();
     report.left_out = description.left_out();
+    report.notes = exporter->notes();
   }
   if (progress) progress->finish();
   return report;
@@ -162,6 +165,7 @@ std::string to_text(const ExportReport& report) {
   for (const auto& [what, count] : report.left_out) {
     text += fmt::format("left out: {} {}\n", count, what);
   }
+  for (const std::string& note : report.notes) text += "note: " + note + "\n";
   if (!report.missing.empty()) {
     text += "PARTIAL: without " + count_text(std::ssize(report.missing), "shard") +
             ", missing when the folder was finalized\n";
@@ -175,6 +179,7 @@ std::string to_json(const ExportReport& report) {
                                   {"samples", report.samples},
                                   {"quarantined", report.quarantined},
                                   {"left_out", report.left_out},
+                                  {"notes", report.notes},
                                   {"missing_shards", report.missing}}) +
          "\n";
 }

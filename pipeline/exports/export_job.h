@@ -56,6 +56,7 @@ struct ExportOptions {
   StoredType dtype = StoredType::kFloat16;  ///< or kFloat32
   EventCounts counts = EventCounts::kPoisson;
   EventFile event_file = EventFile::kText;
+  double frames_per_second = 1;  ///< of images whose times are not known, 1e-3..1e6
   std::uint64_t seed = 0;
   bool overwrite = false;
   int threads = 0;  ///< 0: all cores; changes no byte
@@ -68,6 +69,7 @@ struct ExportReport {
   std::int64_t samples = 0;                      ///< exported
   std::int64_t quarantined = 0;                  ///< left out
   std::map<std::string, std::int64_t> left_out;  ///< other things, by what they are and why
+  std::vector<std::string> notes;                ///< what a user should know of the files
   std::vector<std::string> missing;              ///< shards that finalize --partial went without
 };
 

@@ -113,6 +113,10 @@ void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut
   if (largest > full_scale) ++left_out["samples' values above the full scale (cut to it)"];
 }
 
+Outline shown_outline(const ShardSample& sample, const VolumeBox& box, ImageSize volume) {
+  return clip(box.outline, shown_area(sample, volume));
+}
+
 std::optional<Rectangle> person_box(const ShardSample& sample, std::size_t index,
                                     const JointChoice& choice, ImageSize volume) {
   const VolumePerson& person = sample.labels.persons.at(index);

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <deque>
 #include <limits>
@@ -17,7 +18,9 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
 #include "manifests/values/pair_key.h"
+#include "manifests/values/text.h"
 #include "pipeline/runtime/threads.h"
+#include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/files/sha256.h"
 #include "stages/exports/sampled_events.h"
 
@@ -31,7 +34,11 @@ constexpr std::int64_t kLongest_us = std::numeric_limits<std::uint32_t>::max(); 
 struct LaidSample {
   SampleWindow window;
   VolumeShape shape;
+  double label_position = 1;
   bool is_timed = false;  ///< by its frames' times, not their numbers
+  /// The pair's begin and end: seconds, or the frames' numbers.
+  std::array<double, 2> between{};
+  double frame = 1;  ///< from one frame to the next, in these numbers
 };
 
 /// The sequence that the sample is of; none if it is of none. Stills in one folder are of none
@@ -43,23 +50,47 @@ std::optional<std::string> sequence_of(const OutgoingSample& sample) {
   return std::nullopt;
 }
 
-/// The sample on its sequence's clock: by the times of its frames, or else by their numbers, a
-/// second each. None if neither tells when it is.
+/// The sample on its sequence's clock: by the times of its frames, or else by their numbers. None
+/// if neither tells when it is.
 std::optional<LaidSample> on_clock(const OutgoingSample& sample) {
-  constexpr double kLast_s = 1e12;
+  constexpr double kLast = 1e12;
   const FramePair& pair = sample.labels.pair;
   if (!sequence_of(sample)) return std::nullopt;
-  const bool is_timed = std::isfinite(pair.gap_s());
-  const double begin_s = is_timed ? pair.previous.time_s : static_cast<double>(pair.previous.index);
-  const double end_s = is_timed ? pair.next.time_s : static_cast<double>(pair.next.index);
-  if (!(begin_s >= 0 && end_s <= kLast_s)) return std::nullopt;
-  const SampleWindow window{.shard = &sample.shard,
-                            .slot = sample.slot,
-                            .begin_us = std::llround(begin_s * kMicroseconds),
-                            .end_us = std::llround(end_s * kMicroseconds)};
-  const std::int64_t length_us = window.end_us - window.begin_us;
-  if (length_us < 1 || length_us > kLongest_us) return std::nullopt;
-  return LaidSample{window, sample.reader.header().volume, is_timed};
+  LaidSample laid{.window = {.shard = &sample.shard, .slot = sample.slot},
+                  .shape = sample.reader.header().volume,
+                  .label_position = pair.label_position,
+                  .is_timed = std::isfinite(pair.gap_s())};
+  laid.between = laid.is_timed ? std::array{pair.previous.time_s, pair.next.time_s}
+                               : std::array{static_cast<double>(pair.previous.index),
+                                            static_cast<double>(pair.next.index)};
+  if (!(laid.between[0] >= 0 && laid.between[1] <= kLast && laid.between[0] < laid.between[1])) {
+    return std::nullopt;
+  }
+  laid.frame = (laid.between[1] - laid.between[0]) / std::max(pair.gap_frames, 1);
+  return laid;
+}
+
+void set_label_time(SampleWindow& window, double label_position) {
+  const auto length_us = static_cast<double>(window.end_us - window.begin_us);
+  window.label_us = window.begin_us + std::llround(label_position * length_us);
+}
+
+/// Gives the samples of a sequence their windows.
+void set_windows(std::vector<LaidSample>& samples, double frames_per_second) {
+  double frame = std::numeric_limits<double>::infinity();
+  for (const LaidSample& sample : samples) {
+    if (!sample.is_timed) frame = std::min(frame, sample.frame);
+  }
+  for (LaidSample& sample : samples) {
+    const double seconds = sample.is_timed ? 1 : 1 / (frame * frames_per_second);
+    const auto at_us = [&](double place) -> std::int64_t {
+      return std::llround(place * seconds * kMicroseconds);
+    };
+    sample.window.begin_us = at_us(sample.between[0]);
+    sample.window.end_us = std::clamp(at_us(sample.between[1]), sample.window.begin_us + 1,
+                                      sample.window.begin_us + kLongest_us);
+    set_label_time(sample.window, sample.label_position);
+  }
 }
 
 /// The window of a sample by itself.
@@ -70,11 +101,6 @@ SampleWindow window_alone(const OutgoingSample& sample) {
           .slot = sample.slot,
           .begin_us = 0,
           .end_us = static_cast<std::int64_t>(length_us)};
-}
-
-void set_label_time(SampleWindow& window, double label_position) {
-  const auto length_us = static_cast<double>(window.end_us - window.begin_us);
-  window.label_us = window.begin_us + std::llround(label_position * length_us);
 }
 
 /// The samples of one sequence as recordings, each in the one that ends last before it.
@@ -166,9 +192,10 @@ RecordingsExporter::RecordingsExporter(const ExportInput& input, const ExportOpt
 }
 
 std::string RecordingsExporter::settings() const {
-  return fmt::format("classes {}\ncounts {}\nseed {}\n", numbers_ ? numbers_->text() : "none",
+  return fmt::format("classes {}\ncounts {}\nframes_per_second {:g}\nseed {}\n",
+                     numbers_ ? numbers_->text() : "none",
                      options_.counts == EventCounts::kPoisson ? "poisson" : "rounded",
-                     options_.seed);
+                     options_.frames_per_second, options_.seed);
 }
 
 RecordedSample RecordingsExporter::recorded(const OutgoingSample& sample,
@@ -205,7 +232,7 @@ std::vector<RecordingGroup> RecordingsExporter::lay_recordings(
     std::map<std::string, RecordingGroup> loose;
     work.walk(of_split(work.input, shards, split), [&](const OutgoingSample& sample) {
       if (auto laid = on_clock(sample)) {
-        set_label_time(laid->window, sample.labels.pair.label_position);
+        untimed_ += laid->is_timed ? 0 : 1;
         laid->window.is_labelled = is_labelled(sample);
         auto& [source, samples] =
             sequences[sample.source.name_prefix + export_name(*sequence_of(sample))];
@@ -228,6 +255,7 @@ std::vector<RecordingGroup> RecordingsExporter::lay_recordings(
     }
     for (auto& [name, sequence] : sequences) {
       auto& [source, samples] = sequence;
+      set_windows(samples, options_.frames_per_second);
       groups.push_back({split + "+" + name, false, spread(std::move(samples), name, *source)});
     }
   }
@@ -237,7 +265,7 @@ std::vector<RecordingGroup> RecordingsExporter::lay_recordings(
 void RecordingsExporter::finish(const ExportWork& work,
                                 const std::vector<const ExportShard*>& shards) const {
   LastReaders readers(work.input);
-  unlabelled_ = 0;
+  unlabelled_ = untimed_ = 0;
   for (const RecordingGroup& group : lay_recordings(work, shards)) {
     ExportFolder::Step step(work.folder, group.step, hash_of(group));
     if (!step.is_done()) {
@@ -295,6 +323,15 @@ LeftOut RecordingsExporter::whole_samples_left_out() const {
   return {{"samples of recordings without boxes (in raw alone)", unlabelled_}};
 }
 
+std::vector<std::string> RecordingsExporter::notes() const {
+  if (untimed_ == 0) return {};
+  return {
+      fmt::format("{} are of images without times: their clock counts {:g} {} a second "
+                  "(--frames-per-second)",
+                  count_text(untimed_, "sample"), options_.frames_per_second,
+                  options_.frames_per_second == 1 ? "frame" : "frames")};
+}
+
 void number_tracks(std::vector<RecordedBox>& boxes, const OutgoingRecording& recording) {
   constexpr std::int64_t kMost = std::numeric_limits<std::uint32_t>::max();
   std::int64_t last = -1;
@@ -306,6 +343,34 @@ void number_tracks(std::vector<RecordedBox>& boxes, const OutgoingRecording& rec
     throw std::runtime_error(fmt::format("expected track numbers of at most {}, got {}, in {}",
                                          kMost, last, recording.name));
   }
+}
+
+std::string prophesee_boxes(const std::vector<RecordedBox>& boxes) {
+  constexpr char kFields[] =
+      "[('t', '<i8'), ('x', '<f4'), ('y', '<f4'), ('w', '<f4'), ('h', '<f4'), ('class_id', '<u4'), "
+      "('track_id', '<u4'), ('class_confidence', '<f4'), ('', '|V4')]";
+  constexpr std::size_t kBytes = 40;
+  std::string rows;
+  for (const RecordedBox& box : boxes) {
+    put(rows, box.t_us);
+    put(rows, static_cast<float>(box.box.left));
+    put(rows, static_cast<float>(box.box.top));
+    put(rows, static_cast<float>(box.box.right - box.box.left));
+    put(rows, static_cast<float>(box.box.bottom - box.box.top));
+    put(rows, static_cast<std::uint32_t>(box.class_number));
+    put(rows, static_cast<std::uint32_t>(box.track_id));
+    put(rows, 1.0f);
+    put(rows, std::uint32_t{0});
+  }
+  return npy_records(kFields, kBytes, rows);
+}
+
+std::string name_before_bbox(const OutgoingRecording& recording) {
+  std::string name = recording.name;
+  for (auto at = name.find("bbox"); at != name.npos; at = name.find("bbox", at)) {
+    name.replace(at, 1, "%62");
+  }
+  return name;
 }
 
 std::string window_line(const SampleWindow& window, const RecordedSample& sample,

@@ -18,44 +18,17 @@ namespace {
 
 constexpr ImageSize kGen1{240, 304};
 
-/// Prophesee's boxes as numpy has them: BBOX_DTYPE of RVT's utils/evaluation/prophesee.
-constexpr char kBoxFields[] =
-    "[('t', '<i8'), ('x', '<f4'), ('y', '<f4'), ('w', '<f4'), ('h', '<f4'), ('class_id', '<u4'), "
-    "('track_id', '<u4'), ('class_confidence', '<f4'), ('', '|V4')]";
-constexpr std::size_t kBoxBytes = 40;
-
-/// Left, top, width and height as float32.
-struct PlacedBox {
-  float x = 0, y = 0, width = 0, height = 0;
-
-  explicit PlacedBox(const Rectangle& box)
-      : x(static_cast<float>(box.left)),
-        y(static_cast<float>(box.top)),
-        width(static_cast<float>(box.right - box.left)),
-        height(static_cast<float>(box.bottom - box.top)) {}
-
-  /// Whether anything is left where RVT's loader looks, from 0 to one pixel less than the size: it
-  /// stops at a box of which nothing is (ObjectLabelBase.clamp_to_frame_, computed here as there).
-  bool is_in_frame_of_rvt(ImageSize size) const {
-    const auto length = [](float begin, float extent, int side) {
-      const auto last = static_cast<float>(side - 1);
-      return std::clamp(begin + extent, 0.0f, last) - std::clamp(begin, 0.0f, last);
-    };
-    return length(x, width, size.width) > 0 && length(y, height, size.height) > 0;
-  }
-};
-
-void put_box(std::string& rows, const RecordedBox& box) {
-  const PlacedBox placed(box.box);
-  put(rows, box.t_us);
-  put(rows, placed.x);
-  put(rows, placed.y);
-  put(rows, placed.width);
-  put(rows, placed.height);
-  put(rows, static_cast<std::uint32_t>(box.class_number));
-  put(rows, static_cast<std::uint32_t>(box.track_id));
-  put(rows, 1.0f);
-  put(rows, std::uint32_t{0});
+/// Whether anything is left of a box where RVT's loader looks, from 0 to one pixel less than the
+/// size: it stops at a box of which nothing is (ObjectLabelBase.clamp_to_frame_, computed here as
+/// there).
+bool is_in_frame_of_rvt(const Rectangle& box, ImageSize size) {
+  const auto length = [](double begin, double end, int side) {
+    const auto first = static_cast<float>(begin), extent = static_cast<float>(end - begin);
+    const auto last = static_cast<float>(side - 1);
+    return std::clamp(first + extent, 0.0f, last) - std::clamp(first, 0.0f, last);
+  };
+  return length(box.left, box.right, size.width) > 0 &&
+         length(box.top, box.bottom, size.height) > 0;
 }
 
 /// RVT has the negative polarity first.
@@ -81,7 +54,7 @@ class RvtExporter : public RecordingsExporter {
     RecordingsExporter::account(sample, left_out);
     const ImageSize size = sample.reader.header().volume.size;
     const auto take = [&](const auto&, const VolumeBox& box) {
-      if (!PlacedBox(box.clipped).is_in_frame_of_rvt(size)) {
+      if (!is_in_frame_of_rvt(box.clipped, size)) {
         ++left_out["boxes within the last pixel, where RVT's frame ends (in raw alone)"];
       }
     };
@@ -93,7 +66,7 @@ class RvtExporter : public RecordingsExporter {
     bool is_any_left = false;
     const ImageSize size = sample.reader.header().volume.size;
     const auto take = [&](const auto&, const VolumeBox& box) {
-      is_any_left |= PlacedBox(box.clipped).is_in_frame_of_rvt(size);
+      is_any_left |= is_in_frame_of_rvt(box.clipped, size);
     };
     for_each_box(sample, *numbers(), /*keep_ignored=*/false, take, [](const std::string&) {});
     return is_any_left;
@@ -101,7 +74,7 @@ class RvtExporter : public RecordingsExporter {
 
   void write_recording(const OutgoingRecording& recording, const ForEachSample& for_each,
                        ExportFolder::Step& step) const override {
-    const std::string below = recording.source->split + "/" + name_of(recording);
+    const std::string below = recording.source->split + "/" + name_before_bbox(recording);
     const std::int64_t clock_us = recording.begin_us();
     // Of Gen1's size RVT looks for this name.
     const char* ending = recording.shape.size == kGen1 ? "_td.dat.h5" : "_td.h5";
@@ -136,9 +109,7 @@ class RvtExporter : public RecordingsExporter {
     step.write("raw/" + below + "_windows.txt", windows);
     if (boxes.empty()) return;
     number_tracks(boxes, recording);
-    std::string rows;
-    for (const RecordedBox& box : boxes) put_box(rows, box);
-    step.write("raw/" + below + "_bbox.npy", npy_records(kBoxFields, kBoxBytes, rows));
+    step.write("raw/" + below + "_bbox.npy", prophesee_boxes(boxes));
     if (!volumes) return;
     volumes->commit();
     step.write(representation + "timestamps_us.npy", npy_file("<i8", {times_us.size()}, times_us));
@@ -150,35 +121,26 @@ class RvtExporter : public RecordingsExporter {
   static void write_labels(const OutgoingRecording& recording,
                            const std::vector<RecordedBox>& boxes, const std::string& labels,
                            const std::string& representation, ExportFolder::Step& step) {
-    std::string rows;
+    std::vector<RecordedBox> seen;
     std::vector<std::int64_t> times_us, label_index, representation_index;
     std::size_t sample = 0;
     for (const RecordedBox& box : boxes) {
-      if (!PlacedBox(box.box).is_in_frame_of_rvt(recording.shape.size)) continue;
+      if (!is_in_frame_of_rvt(box.box, recording.shape.size)) continue;
       if (times_us.empty() || times_us.back() != box.t_us) {
         while (recording.windows.at(sample).label_us - recording.begin_us() != box.t_us) ++sample;
         times_us.push_back(box.t_us);
-        label_index.push_back(static_cast<std::int64_t>(rows.size() / kBoxBytes));
+        label_index.push_back(std::ssize(seen));
         representation_index.push_back(static_cast<std::int64_t>(sample));
       }
-      put_box(rows, box);
+      seen.push_back(box);
     }
     const std::vector<std::size_t> frames{times_us.size()};
     step.write(labels + "labels.npz",
-               npz_file({{"labels", npy_records(kBoxFields, kBoxBytes, rows)},
+               npz_file({{"labels", prophesee_boxes(seen)},
                          {"objframe_idx_2_label_idx", npy_file("<i8", frames, label_index)}}));
     step.write(labels + "timestamps_us.npy", npy_file("<i8", frames, times_us));
     step.write(representation + "objframe_idx_2_repr_idx.npy",
                npy_file("<i8", frames, representation_index));
-  }
-
-  /// RVT cuts a file's name at its first "bbox".
-  static std::string name_of(const OutgoingRecording& recording) {
-    std::string name = recording.name;
-    for (auto at = name.find("bbox"); at != name.npos; at = name.find("bbox", at)) {
-      name.replace(at, 1, "%62");
-    }
-    return name;
   }
 };
 
@@ -188,7 +150,7 @@ ExportFormat rvt_format() {
   return {.word = "rvt",
           .title = "the same for RVT and eTraM, as events and as the event volumes",
           .need = LabelNeed::kBoxes,
-          .options = {"--classes", "--counts", "--seed"},
+          .options = {"--classes", "--counts", "--frames-per-second", "--seed"},
           .files = {"raw/SPLIT/RECORDING_td.h5", "raw/SPLIT/RECORDING_td.dat.h5",
                     "raw/SPLIT/RECORDING_bbox.npy", "raw/SPLIT/RECORDING_windows.txt",
                     "preprocessed/SPLIT/RECORDING/labels_v2/labels.npz",

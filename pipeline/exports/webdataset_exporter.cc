@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "manifests/documents/detail/json_text.h"
+#include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
 #include "pipeline/exports/detail/exporter.h"
 #include "pipeline/runtime/threads.h"
@@ -79,7 +80,9 @@ Json box_json(const Box& box, const VolumeBox& in_volume, const std::vector<std:
           {"ignore", in_volume.ignore},
           {"ignore_source", box.ignore},
           {"track_id", unless(unknown.track_id, box.track_id)},
-          {"difficulty", unless(unknown.difficulty, box.difficulty)}};
+          {"difficulty", unless(unknown.difficulty, box.difficulty)},
+          {"outline",
+           in_volume.outline.empty() ? Json() : Json::parse(outline_text(in_volume.outline))}};
 }
 
 Json person_json(const Person& person, const VolumePerson& in_volume) {

@@ -12,8 +12,12 @@
 namespace eventgan {
 namespace {
 
-/// images/SPLIT/NAME.{png,npy}, labels/SPLIT/NAME.txt, SPLIT.txt, data.yaml; of persons the same
-/// below pose.
+/// What a line of a label file is: detection and segmentation do not go into one dataset.
+enum class Lines { kBoxes, kOutlines };
+
+/// images/SPLIT/NAME.{png,npy}, labels/SPLIT/NAME.txt, SPLIT.txt, data.yaml; beside boxes the same
+/// of persons below pose.
+template <Lines lines>
 class YoloExporter : public Exporter {
  public:
   YoloExporter(const ExportInput& input, const ExportOptions& options)
@@ -36,10 +40,20 @@ class YoloExporter : public Exporter {
     }
     if (keep_ignored_) names_.push_back("ignored");
     for (const ExportSource& source : input.sources()) {
-      if (!source.has_joints()) continue;
+      if (!has_poses(source)) continue;
       pose_text_ +=
           fmt::format("{} {}\n", pose_folder(input, source), fmt::join(source.joint_names, ","));
     }
+  }
+
+  void check(const ExportInput& input, const std::function<void()>& check_stop) const override {
+    if (lines == Lines::kBoxes) return;
+    for (const ExportShard& shard : input.shards()) {
+      check_stop();
+      if (!input.open(shard).tables().boxes.outline.empty()) return;
+    }
+    throw UsageError(
+        "expected boxes with outlines for --to yolo-seg, got none (--to yolo has boxes)");
   }
 
   std::string settings() const override {
@@ -57,7 +71,7 @@ class YoloExporter : public Exporter {
         write_image_pair(sample, "images/" + source.split, full_scale_, step);
         step.write("labels/" + below, labels_of(sample));
       }
-      if (source.has_joints()) {
+      if (has_poses(source)) {
         write_image_pair(sample, pose + "images/" + source.split, full_scale_, step);
         step.write(pose + "labels/" + below, poses_of(sample));
       }
@@ -71,28 +85,49 @@ class YoloExporter : public Exporter {
     for (const ExportShard* shard : shards) {
       const ExportSource& source = work.input.source_of(*shard);
       if (source.has_boxes()) of_folder[""].push_back(shard);
-      if (source.has_joints()) of_folder[pose_folder(work.input, source)].push_back(shard);
+      if (has_poses(source)) of_folder[pose_folder(work.input, source)].push_back(shard);
     }
     for (const auto& [folder, of_it] : of_folder) write_lists(work, folder, of_it);
   }
 
   void account(const OutgoingSample& sample, LeftOut& left_out) const override {
     account_full_scale(sample, full_scale_, left_out);
-    for_each_box(
-        sample, numbers_, keep_ignored_, [](const auto&, const auto&) {},
-        [&](const std::string& why) { ++left_out[why]; });
     const ShardHeader& header = sample.reader.header();
+    const auto take = [&](const auto&, const VolumeBox& box) {
+      if (lines == Lines::kBoxes) return;
+      if (box.outline.empty()) {
+        ++left_out["outlines of boxes that have none (the box in place of it)"];
+      } else if (shown_outline(sample.labels, box, header.volume.size).empty()) {
+        ++left_out["boxes of whose outline nothing is left in the volume"];
+      }
+    };
+    for_each_box(sample, numbers_, keep_ignored_, take,
+                 [&](const std::string& why) { ++left_out[why]; });
+    if (!has_poses(sample.source)) return;
     const JointChoice choice = choose_joints(header.label_schema);
     account_persons(sample.labels, choice, header.volume.size, left_out);
   }
 
  private:
+  static bool has_poses(const ExportSource& source) {
+    return lines == Lines::kBoxes && source.has_joints();
+  }
+
   std::string labels_of(const OutgoingSample& sample) const {
     std::string text;
     const ImageSize size = sample.reader.header().volume.size;
     const auto take = [&](const ClassNumbers::Entry& entry, const VolumeBox& box) {
       const int number = box.ignore ? static_cast<int>(names_.size()) - 1 : entry.number;
-      text += yolo_line(number, box.clipped, size) + "\n";
+      if (lines == Lines::kBoxes) {
+        text += yolo_line(number, box.clipped, size) + "\n";
+        return;
+      }
+      const auto& [left, top, right, bottom] = box.clipped;
+      const Outline outline =
+          box.outline.empty()
+              ? Outline{{{{left, top}, {right, top}, {right, bottom}, {left, bottom}}}}
+              : shown_outline(sample.labels, box, size);
+      if (!outline.empty()) text += yolo_outline_line(number, outline, size) + "\n";
     };
     for_each_box(sample, numbers_, keep_ignored_, take, [](const std::string&) {});
     return text;
@@ -172,7 +207,17 @@ ExportFormat yolo_format() {
                     "SPLIT.txt", "data.yaml", "pose[-N]/images/SPLIT/NAME.png",
                     "pose[-N]/images/SPLIT/NAME.npy", "pose[-N]/labels/SPLIT/NAME.txt",
                     "pose[-N]/SPLIT.txt", "pose[-N]/data.yaml"},
-          .make = make_exporter<YoloExporter>};
+          .make = make_exporter<YoloExporter<Lines::kBoxes>>};
+}
+
+ExportFormat yolo_seg_format() {
+  return {.word = "yolo-seg",
+          .title = "YOLO's text files for segmentation, images, volumes as .npy",
+          .need = LabelNeed::kBoxes,
+          .options = {"--classes", "--ignored", "--full-scale"},
+          .files = {"images/SPLIT/NAME.png", "images/SPLIT/NAME.npy", "labels/SPLIT/NAME.txt",
+                    "SPLIT.txt", "data.yaml"},
+          .make = make_exporter<YoloExporter<Lines::kOutlines>>};
 }
 
 }  // namespace eventgan

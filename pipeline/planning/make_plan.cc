@@ -1,6 +1,6 @@
 #include "pipeline/planning/make_plan.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
@@ -290,6 +290,27 @@ void note_narrow_values(const JobManifest& manifest, const SourceSpec& spec,
       range->low, range->high, spec.root));
 }
 
+/// Of objects that are to move on their own: how many can, as far as some labels tell.
+void note_outlines(const SourceSpec& spec, const Dataset& dataset,
+                   const std::vector<LabelledFrame>& frames, SourceSummary& summary) {
+  constexpr std::size_t kMostFrames = 200;
+  if (!spec.pairs.stills || !spec.pairs.stills->objects || frames.empty()) return;
+  const std::size_t looked_at = std::min(frames.size(), kMostFrames);
+  std::int64_t boxes = 0, outlined = 0;
+  for (std::size_t i = 0; i < looked_at; ++i) {
+    const auto annotation = dataset.annotation(frames[i * frames.size() / looked_at].label_key);
+    if (is_fault(annotation)) continue;
+    for (const Box& box : annotation->boxes) {
+      boxes += !box.ignore;
+      outlined += !box.ignore && !box.outline.empty();
+    }
+  }
+  summary.notes.push_back(fmt::format(
+      "{} of {} have an outline and move on their own (of {} looked at){}, in {}", outlined,
+      count_text(boxes, "box"), count_text(std::int64_t(looked_at), "labelled frame"),
+      outlined > 0 ? "" : ": everything moves as the image does", spec.root));
+}
+
 struct PlannedSource {
   SourceSummary summary;
   std::int64_t pairs = 0;
@@ -331,6 +352,7 @@ PlannedSource plan_source(const JobManifest& manifest, int index, const Dataset&
   }
   summary.notes = dataset.notes();
   note_narrow_values(manifest, spec, frames, summary);
+  note_outlines(spec, dataset, frames, summary);
   if (const auto left_out = dataset.labelled_frames().size() - frames.size(); left_out > 0) {
     summary.notes.push_back(std::to_string(left_out) + " of " +
                             count_text(std::ssize(dataset.labelled_frames()), "labelled frame") +
@@ -428,6 +450,21 @@ void settle_sizes(const JobManifest& manifest,
 
 constexpr char kLimitField[] = "limit";  // of a trial's fingerprint
 
+/// Says what of a source cannot be read. Throws InputError where it is more than the job's error
+/// policy allows.
+void tell_unreadable(const JobManifest& manifest, const SourceSpec& source, const Dataset& dataset,
+                     std::vector<std::string>& warnings) {
+  const auto [reasons, of] = dataset.unreadable();
+  if (reasons.empty()) return;
+  if (beyond_limits(manifest.errors, std::ssize(reasons), of)) {
+    throw InputError(fmt::format(
+        "expected recordings that can be read, as \"errors\" in the manifest allows, got {} of {} "
+        "that cannot, in {}:\n{}",
+        reasons.size(), of, source.root, fmt::join(reasons, "\n")));
+  }
+  for (const std::string& reason : reasons) warnings.push_back("left out: " + reason);
+}
+
 void open_datasets(const JobManifest& manifest, const PlanningOptions& options,
                    std::vector<std::unique_ptr<Dataset>>& datasets) {
   Phase phase(options.show_phase, {"sources", /*has_bytes=*/false, "opening"},
@@ -472,6 +509,7 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
     job.plan.sources.push_back(std::move(planned.summary));
     job.unpaired_by_gap.push_back(std::move(planned.unpaired_by_gap));
     std::ranges::move(dataset.warnings(), std::back_inserter(job.warnings));
+    tell_unreadable(manifest, manifest.sources[i], dataset, job.warnings);
     for (auto& [what, meaning] : dataset.label_meanings()) {
       meanings["labels " + std::to_string(i) + " " + what] = meaning;
     }

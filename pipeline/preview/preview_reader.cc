@@ -10,6 +10,7 @@
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/placement.h"
+#include "manifests/values/text.h"
 #include "manifests/values/words.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_guard.h"
@@ -183,9 +184,14 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
   content.previous_bgr = frame(sample.pair.previous);
   content.next_bgr = frame(sample.pair.next);
   const FramePair& pair = sample.pair;
+  const auto moving = std::ranges::count_if(
+      pair.objects, [](const auto& motion) { return motion && *motion != ImageMotion(); });
+  const std::string objects = moving > 0 ? ", " + count_text(moving, "object") + " on " +
+                                               (moving == 1 ? "its" : "their") + " own"
+                                         : "";
   content.title = header.dataset + " " + sample.sample_id +
                   (state_->has_events ? fmt::format(", {:.4g} s", pair.gap_s())
-                                      : (pair.motion ? ", still, gap " : ", gap ") +
+                                      : (pair.motion ? ", still" + objects + ", gap " : ", gap ") +
                                             std::to_string(pair.gap_frames)) +
                   (sample.valid ? "" : ", QUARANTINED");
   content.label_position = sample.pair.label_position;

@@ -203,11 +203,12 @@ std::string origin(const Survey& survey, const PageContext& context) {
       html +=
           fact("source",
                fmt::format("stills of {} from <code>{}</code>, moved {} the labelled image: {:g} "
-                           "to {:g} px, up to {:g} degrees, scale 1 &plusmn; {:g}, gap {}",
+                           "to {:g} px, up to {:g} degrees, scale 1 &plusmn; {:g}, gap {}{}",
                            escaped(source_name(survey, i)), escaped(source.root),
                            to_string(source.pairs.side), stills->translation_px[0],
                            stills->translation_px[1], stills->rotation_deg, stills->scale,
-                           stills->frames));
+                           stills->frames,
+                           stills->objects ? "; objects with an outline move on their own" : ""));
       continue;
     }
     html += fact("source",

@@ -32,32 +32,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of the file with the events and of what is read beside it.
-std::string recording_hash(const fs::path& path, const RecordingSpec& spec) {
-  const fs::path events = event_file(fs::absolute(path).lexically_normal(), spec.options);
-  std::vector<fs::path> files = event_companions(events, spec.format, spec.options);
-  if (files.empty()) return sha256_of_file(events);
-  files.insert(files.begin(), events);
-  std::string listing;
-  for (const fs::path& file : files) {
-    listing += file.filename().string() + '\t' + sha256_of_file(file) + '\n';
-  }
-  return sha256_hex(listing);
-}
-
-/// Of all files in the folder and below, in the order of their paths.
-std::string textures_hash(const fs::path& folder) {
-  std::set<fs::path> files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) files.insert(entry.path());
-  }
-  std::string listing;
-  for (const fs::path& file : files) {
-    listing += file.lexically_relative(folder).string() + '\t' + sha256_of_file(file) + '\n';
-  }
-  return sha256_hex(listing);
-}
-
 std::string steps_text(const TrainingManifest& manifest, const TrainingPosition& position) {
   std::vector<std::string> parts;
   for (const auto phase :
@@ -100,25 +74,24 @@ Weights trained_weights(const StateDict& generator_state, const TrainingManifest
 }
 
 void add_final_origin(Weights& weights, const TrainingManifest& manifest,
-                      std::span<const TrainingRecording> recordings,
+                      const std::map<std::string, std::string>& settings,
                       const std::map<std::string, double>& losses) {
-  std::string listing;
-  for (std::size_t i = 0; i < recordings.size(); ++i) {
-    const RecordingSpec& spec = manifest.recordings.at(i);
-    listing += spec.path + '\t' + recording_hash(recordings[i].file, spec) + '\n';
-  }
-  weights.metadata["training_recordings_sha256"] = listing;
-  if (manifest.simulated) {
-    std::string folders;
-    for (const std::string& folder : manifest.simulated->textures) {
-      folders += folder + '\t' + textures_hash(resolve(manifest, folder)) + '\n';
+  const auto listing = [&](const std::string& kind, std::size_t count, const auto& path_of) {
+    std::string lines;
+    for (std::size_t i = 0; i < count; ++i) {
+      lines += path_of(i) + '\t' + settings.at(fmt::format("{} {}", kind, i)) + '\n';
     }
-    weights.metadata["training_textures_sha256"] = folders;
+    return lines;
+  };
+  weights.metadata["training_recordings_sha256"] =
+      listing("recording", manifest.recordings.size(),
+              [&](std::size_t i) { return manifest.recordings[i].path; });
+  if (manifest.simulated) {
+    const std::vector<std::string>& folders = manifest.simulated->textures;
+    weights.metadata["training_textures_sha256"] =
+        listing("textures", folders.size(), [&](std::size_t i) { return folders[i]; });
   }
-  if (manifest.teacher) {
-    weights.metadata["training_teacher_sha256"] =
-        sha256_of_file(resolve(manifest, *manifest.teacher));
-  }
+  if (manifest.teacher) weights.metadata["training_teacher_sha256"] = settings.at("teacher");
   std::string means;
   for (const auto& [name, value] : losses) means += name + '\t' + csv_number(value) + '\n';
   weights.metadata["training_losses"] = means;
@@ -285,10 +258,10 @@ void GeneratorRecords::draw(const StateDict& generator_state, const TrainingPosi
 
 std::string GeneratorRecords::write_final_weights(
     const StateDict& generator_state, const TrainingPosition& position,
-    std::span<const TrainingRecording> recordings,
+    const std::map<std::string, std::string>& settings,
     const std::map<std::string, double>& losses) const {
   Weights weights = trained_weights(generator_state, manifest_, position);
-  add_final_origin(weights, manifest_, recordings, losses);
+  add_final_origin(weights, manifest_, settings, losses);
   const std::string bytes = serialize_weights(weights);
   write_file_atomically(folder_.weights(), bytes);
   return sha256_hex(bytes);

@@ -33,10 +33,10 @@ Weights trained_weights(const StateDict& generator_state, const TrainingManifest
                         const TrainingPosition& position);
 
 /// Adds what is known at the end: the path of each recording and folder of textures as the manifest
-/// has it with the SHA-256 of its files (reads them whole), the teacher's SHA-256, and the losses,
-/// means over the last steps.
+/// has it, with the SHA-256 that training_settings found when the training began or resumed, the
+/// teacher's, and the losses, means over the last steps.
 void add_final_origin(Weights& weights, const TrainingManifest& manifest,
-                      std::span<const TrainingRecording> recordings,
+                      const std::map<std::string, std::string>& settings,
                       const std::map<std::string, double>& losses);
 
 /// Means over the validation pairs.
@@ -99,7 +99,7 @@ class GeneratorRecords {
   /// weights.safetensors, with all that is known of its origin. Gives the file's SHA-256.
   std::string write_final_weights(const StateDict& generator_state,
                                   const TrainingPosition& position,
-                                  std::span<const TrainingRecording> recordings,
+                                  const std::map<std::string, std::string>& settings,
                                   const std::map<std::string, double>& losses) const;
 
  private:

@@ -204,7 +204,7 @@ TrainingReport TrainingRun::run() {
   if (complete && has_generator()) {
     report.weights = folder_.weights().string();
     report.weights_sha256 = generator_records_.write_final_weights(
-        trainer_.generator_state(), position_, source_.recordings(), report.losses);
+        trainer_.generator_state(), position_, settings_, report.losses);
   }
   report.run_seconds = std::chrono::duration<double>(Clock::now() - start_).count();
   report.total_seconds = total_seconds();
@@ -255,15 +255,17 @@ void TrainingRun::keep_records(const std::vector<TrainingSample>& batch) {
   if (passed(saved_, manifest_.checkpoint_minutes)) save();
 }
 
+/// The tables come first: rows beyond the checkpoint are cut off when the training resumes, and a
+/// kill in between must not leave one out.
 void TrainingRun::save() {
   losses_->flush();
-  save_checkpoint(folder_.checkpoints(),
-                  {position_, total_seconds(), settings_, environment_, trainer_.state()});
-  write_file_atomically(folder_.curves(), loss_curves(losses_->rows()));
   if (has_generator()) {
     generator_records_.save(trainer_.generator_state(), position_);
     use_training_threads(threads_);
   }
+  save_checkpoint(folder_.checkpoints(),
+                  {position_, total_seconds(), settings_, environment_, trainer_.state()});
+  write_file_atomically(folder_.curves(), loss_curves(losses_->rows()));
   steps_unsaved_ = 0;
   saved_ = Clock::now();
 }

@@ -15,6 +15,7 @@
 #include "pipeline/generators/load_generator.h"
 #include "pipeline/planning/spread.h"
 #include "pipeline/training/generator_records.h"
+#include "pipeline/training/training_folder.h"
 #include "stages/base/images/image_file.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/moving_planes.h"
@@ -85,8 +86,6 @@ namespace {
 
 constexpr std::size_t kFewestEvents = 100;
 constexpr int kMostAttempts = 10;
-/// A few hundred images hold more than a training sees; they stay in memory.
-constexpr std::size_t kMostTextures = 256;
 
 /// Where a crop of `cut` pixels that was drawn to begin at `drawn`, uniformly over `image`
 /// pixels, begins if it is to hold pixel `at`: uniformly over the places where it does.
@@ -99,8 +98,8 @@ int holding(int drawn, int at, int cut, int image) {
 
 }  // namespace
 
-std::vector<GreyImage> read_textures(std::span<const std::filesystem::path> folders,
-                                     std::size_t most) {
+std::vector<std::filesystem::path> texture_files(std::span<const std::filesystem::path> folders,
+                                                 std::size_t most) {
   namespace fs = std::filesystem;
   const auto is_image = [](const fs::path& file) {
     return std::ranges::find(kImageExtensions, lower_extension(file)) != kImageExtensions.end();
@@ -108,29 +107,50 @@ std::vector<GreyImage> read_textures(std::span<const std::filesystem::path> fold
   std::vector<fs::path> files;
   for (const fs::path& folder : folders) {
     try {
-      for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-        if (entry.is_regular_file() && is_image(entry.path())) files.push_back(entry.path());
+      for (auto at = fs::recursive_directory_iterator(folder); at != fs::end(at); ++at) {
+        if (at->is_directory() && fs::exists(TrainingFolder{at->path()}.lock())) {
+          at.disable_recursion_pending();
+        } else if (at->is_regular_file() && is_image(at->path())) {
+          files.push_back(at->path());
+        }
       }
     } catch (const fs::filesystem_error&) {
       std::throw_with_nested(InputError("cannot list the textures in " + folder.string()));
     }
   }
+  std::ranges::sort(files);
+  std::vector<fs::path> chosen;
+  for (const std::size_t place : spread(most, files.size())) chosen.push_back(files[place]);
+  return chosen;
+}
+
+std::vector<GreyImage> read_textures(std::span<const std::filesystem::path> folders,
+                                     std::size_t most) {
+  const std::vector<std::filesystem::path> files = texture_files(folders, most);
   if (files.empty()) {
     throw InputError("expected images for simulated.textures, got none, in " +
                      (folders.empty() ? "no folder" : folders.front().string()));
   }
-  std::ranges::sort(files);
   std::vector<GreyImage> textures;
-  for (const std::size_t place : spread(most, files.size())) {
+  for (const std::filesystem::path& file : files) {
     try {
-      const ColourFrame image = decode_image_file(files[place]);
+      const ColourFrame image = decode_image_file(file);
       textures.push_back(
           {image.size, prepare_frame(ColourView{image.size, image.bgr.data()}, {}).grey});
     } catch (const std::runtime_error&) {
-      std::throw_with_nested(InputError("cannot use the texture " + files[place].string()));
+      std::throw_with_nested(InputError("cannot use the texture " + file.string()));
     }
   }
   return textures;
+}
+
+std::vector<std::filesystem::path> texture_folders(const TrainingManifest& manifest) {
+  std::vector<std::filesystem::path> folders;
+  if (!manifest.simulated) return folders;
+  for (const std::string& folder : manifest.simulated->textures) {
+    folders.push_back(resolve(manifest, folder));
+  }
+  return folders;
 }
 
 std::unique_ptr<Generator> open_teacher(const TrainingManifest& manifest) {
@@ -160,11 +180,7 @@ SampleSource::SampleSource(const TrainingManifest& manifest,
                            std::vector<TrainingRecording> recordings)
     : manifest_(manifest), reader_(std::move(recordings), manifest.network.bins) {
   if (manifest.simulated) {
-    std::vector<std::filesystem::path> folders;
-    for (const std::string& folder : manifest.simulated->textures) {
-      folders.push_back(resolve(manifest, folder));
-    }
-    textures_ = read_textures(folders, kMostTextures);
+    textures_ = read_textures(texture_folders(manifest));
   }
   if (manifest.teacher) teacher_ = open_teacher(manifest);
 }

@@ -48,10 +48,21 @@ struct SampleDraw {
 SampleDraw draw_sample(std::span<const TrainingRecording> recordings,
                        const TrainingManifest& manifest, const SamplePlace& place, int attempt);
 
-/// The images of the folders and their subfolders, grey, in the order of their paths: at most
-/// `most`, evenly spread. Throws InputError if there is none, or one cannot be read.
+/// A few hundred images hold more than a training sees; they stay in memory.
+inline constexpr std::size_t kMostTextures = 256;
+
+/// The images in the folders and their subfolders, in the order of their paths: at most `most`,
+/// evenly spread. What trainings have drawn into their output folders is none. Throws InputError if
+/// a folder cannot be listed.
+std::vector<std::filesystem::path> texture_files(std::span<const std::filesystem::path> folders,
+                                                 std::size_t most = kMostTextures);
+
+/// These images, grey. Throws InputError if there is none, or one cannot be read.
 std::vector<GreyImage> read_textures(std::span<const std::filesystem::path> folders,
-                                     std::size_t most);
+                                     std::size_t most = kMostTextures);
+
+/// The folders of the manifest's `simulated.textures`, in its order.
+std::vector<std::filesystem::path> texture_folders(const TrainingManifest& manifest);
 
 /// The network of the manifest's `teacher`, which is there, in float32. Throws InputError if the
 /// weights cannot be used; UsageError if they have not learnt a sensor's threshold, all of those of

@@ -16,6 +16,7 @@
 #include "manifests/documents/plan.h"
 #include "manifests/values/faults.h"
 #include "pipeline/planning/fingerprint.h"
+#include "pipeline/training/sample_source.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/sha256.h"
 #include "stages/base/processor/processor.h"
@@ -27,29 +28,28 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Bytes of a file, or of all files of a folder.
-std::uintmax_t bytes_of(const fs::path& path) {
-  if (!fs::is_directory(path)) return fs::file_size(path);
-  std::uintmax_t bytes = 0;
-  for (const auto& entry : fs::recursive_directory_iterator(path)) {
-    if (entry.is_regular_file()) bytes += entry.file_size();
+/// Of the file with the events and of what is read beside it.
+std::string recording_hash(const fs::path& path, const RecordingSpec& spec) {
+  const fs::path events = event_file(fs::absolute(path).lexically_normal(), spec.options);
+  std::vector<fs::path> files = event_companions(events, spec.format, spec.options);
+  if (files.empty()) return sha256_of_file(events);
+  files.insert(files.begin(), events);
+  std::string listing;
+  for (const fs::path& file : files) {
+    listing += file.filename().string() + '\t' + sha256_of_file(file) + '\n';
   }
-  return bytes;
+  return sha256_hex(listing);
 }
 
-/// Of a folder of textures.
-std::string description(const fs::path& folder) {
-  std::error_code absent;
-  if (!fs::is_directory(folder, absent)) return "";
-  return std::to_string(std::distance(fs::recursive_directory_iterator(folder), {})) + " files, " +
-         std::to_string(bytes_of(folder)) + " bytes";
-}
-
-std::string description(const TrainingRecording& opened) {
-  std::error_code absent;
-  const bool there = fs::exists(opened.file, absent);
-  return std::to_string(there ? bytes_of(opened.file) : 0) + " bytes, " +
-         std::to_string(opened.recording->frame_count()) + " frames of " +
-         to_string(opened.recording->size());
+/// Of those of the textures that lie in the folder or below.
+std::string textures_hash(const fs::path& folder, const std::vector<fs::path>& textures) {
+  std::string listing;
+  for (const fs::path& file : textures) {
+    const fs::path below = file.lexically_relative(folder);
+    if (below.empty() || *below.begin() == "..") continue;
+    listing += below.string() + '\t' + sha256_of_file(file) + '\n';
+  }
+  return sha256_hex(listing);
 }
 
 }  // namespace
@@ -61,12 +61,15 @@ std::map<std::string, std::string> training_settings(
     if (!field.starts_with("$.output.")) settings["manifest " + field] = value;
   }
   for (std::size_t i = 0; i < recordings.size(); ++i) {
-    settings["recording " + std::to_string(i)] = description(recordings[i]);
+    settings["recording " + std::to_string(i)] =
+        recording_hash(recordings[i].file, manifest.recordings.at(i));
   }
-  if (manifest.simulated) {
-    for (const std::string& folder : manifest.simulated->textures) {
-      settings["textures " + folder] = description(resolve(manifest, folder));
-    }
+  const std::vector<fs::path> folders = texture_folders(manifest);
+  std::vector<fs::path> textures = texture_files(folders);
+  textures.erase(std::unique(textures.begin(), textures.end()),
+                 textures.end());  // of a folder in another
+  for (std::size_t i = 0; i < folders.size(); ++i) {
+    settings["textures " + std::to_string(i)] = textures_hash(folders[i], textures);
   }
   if (manifest.teacher) {
     settings["teacher"] = sha256_of_file(resolve(manifest, *manifest.teacher));

@@ -22,8 +22,9 @@ inline std::int64_t steps_of(const PhaseSteps& steps, TrainingPhase phase) {
 }
 
 /// What decides a training's result, field by field: the manifest's settings (without comments and
-/// `output`), the size in bytes, images and frames of each recording and of what lies beside it,
-/// and the teacher's SHA-256.
+/// `output`), and the SHA-256 of each recording with what lies beside it, of the textures that are
+/// used of each folder, and of the teacher: "recording 0", "textures 0", "teacher". Reads all of
+/// them.
 std::map<std::string, std::string> training_settings(const TrainingManifest& manifest,
                                                      std::span<const TrainingRecording> recordings);
 

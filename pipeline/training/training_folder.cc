@@ -78,7 +78,7 @@ void write_holder(int descriptor) {
 
 TrainingLock::TrainingLock(const fs::path& folder) {
   fs::create_directories(folder);
-  const fs::path file = folder / "training.lock";
+  const fs::path file = TrainingFolder{folder}.lock();
   require_no_link(folder, file.filename());
   descriptor_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (descriptor_ < 0) {

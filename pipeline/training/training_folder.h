@@ -17,6 +17,7 @@ struct TrainingFolder {
   std::filesystem::path validation() const { return root / "validation.csv"; }
   std::filesystem::path latest_weights() const { return root / "weights-latest.safetensors"; }
   std::filesystem::path weights() const { return root / "weights.safetensors"; }
+  std::filesystem::path lock() const { return root / "training.lock"; }
   std::filesystem::path images() const { return root / "images"; }
   std::filesystem::path image(const TrainingPosition& position) const {
     return images() /

@@ -4,10 +4,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string_view>
+#include <utility>
 
 #include "manifests/documents/detail/json_text.h"
+#include "manifests/values/outlines.h"
 
 namespace eventgan {
 
@@ -18,6 +23,90 @@ std::string yolo_line(int class_number, const Rectangle& box, ImageSize volume) 
                      share((box.top + box.bottom) / 2, volume.height),
                      share(box.right - box.left, volume.width),
                      share(box.bottom - box.top, volume.height));
+}
+
+namespace {
+
+using Ring = std::vector<Point>;
+
+/// Whether filling by turns (even-odd) covers the same pixels.
+bool is_covered_by_turns(const Outline& outline, ImageSize volume) {
+  GreyImage turns{volume, std::vector<std::uint8_t>(volume.pixel_count())};
+  for (Ring ring : outline.rings) {
+    const Rectangle around = bounds(Outline{{ring}});  // small, if there are many rings
+    const int left = static_cast<int>(around.left), top = static_cast<int>(around.top);
+    const int right = std::min(static_cast<int>(around.right) + 1, volume.width);
+    const int bottom = std::min(static_cast<int>(around.bottom) + 1, volume.height);
+    for (Point& corner : ring) corner = {corner.x - left, corner.y - top};
+    const GreyImage mask = mask_of(Outline{{std::move(ring)}}, {bottom - top, right - left});
+    for (int y = top; y < bottom; ++y) {
+      for (int x = left; x < right; ++x) {
+        turns.pixels[std::size_t(y) * std::size_t(volume.width) + std::size_t(x)] ^=
+            mask.pixels[std::size_t(y - top) * std::size_t(right - left) + std::size_t(x - left)];
+      }
+    }
+  }
+  return turns == mask_of(outline, volume);
+}
+
+/// Where a bridge between two rings begins and ends: the nearest corners, of very long rings of
+/// some of them.
+std::pair<std::size_t, std::size_t> bridge(const Ring& from, const Ring& to) {
+  constexpr std::size_t kMost = 1000;
+  const std::size_t step = 1 + from.size() / kMost, other_step = 1 + to.size() / kMost;
+  std::pair<std::size_t, std::size_t> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < from.size(); i += step) {
+    for (std::size_t j = 0; j < to.size(); j += other_step) {
+      const double distance = std::hypot(from[i].x - to[j].x, from[i].y - to[j].y);
+      if (distance >= least) continue;
+      least = distance;
+      best = {i, j};
+    }
+  }
+  return best;
+}
+
+/// One ring that winds around each place as often as all of them do.
+Ring joined(const std::vector<Ring>& rings) {
+  Ring path;
+  const auto visit = [&](const Ring& ring, std::size_t corner, std::size_t steps) {
+    for (std::size_t i = 0; i <= steps; ++i) path.push_back(ring[(corner + i) % ring.size()]);
+  };
+  const auto steps = [](const Ring& ring, std::size_t from, std::size_t to) {
+    return (to + ring.size() - from) % ring.size();
+  };
+  // Of each ring the way to the next one's bridge, all of the last ring, and back the other ways.
+  struct Ends {
+    std::size_t entry, exit;
+  };
+  std::vector<Ends> ends(rings.size(), Ends{0, 0});
+  for (std::size_t i = 0; i + 1 < rings.size(); ++i) {
+    const auto [exit, entry] = bridge(rings[i], rings[i + 1]);
+    ends[i].exit = exit;
+    ends[i + 1].entry = entry;
+    visit(rings[i], ends[i].entry, steps(rings[i], ends[i].entry, exit));
+  }
+  visit(rings.back(), ends.back().entry, rings.back().size());
+  for (std::size_t i = rings.size() - 1; i-- > 0;) {
+    const std::size_t done = steps(rings[i], ends[i].entry, ends[i].exit);
+    visit(rings[i], ends[i].exit, rings[i].size() - done);
+  }
+  path.pop_back();  // back at the first corner
+  return path;
+}
+
+}  // namespace
+
+std::string yolo_outline_line(int class_number, const Outline& outline, ImageSize volume) {
+  const bool is_plain = is_covered_by_turns(outline, volume);
+  const Ring ring = joined(is_plain ? outline.rings : outline_of(mask_of(outline, volume)).rings);
+  std::string line = fmt::format("{}", class_number);
+  for (const Point& corner : ring) {
+    line += fmt::format(" {:.9f} {:.9f}", std::clamp(corner.x / volume.width, 0.0, 1.0),
+                        std::clamp(corner.y / volume.height, 0.0, 1.0));
+  }
+  return line;
 }
 
 namespace {
@@ -130,8 +219,18 @@ std::string coco_image(std::int64_t id, const std::string& file_name, ImageSize 
                         {"sample_id", sample_id}});
 }
 
-std::string coco_box(const CocoPlace& place, const Rectangle& box, bool is_crowd) {
-  return dump_json(annotation(place, box, is_crowd));
+std::string coco_box(const CocoPlace& place, const Rectangle& box, bool is_crowd,
+                     const Outline& outline, ImageSize volume) {
+  Json json = annotation(place, box, is_crowd);
+  if (outline.empty()) return dump_json(json);
+  const GreyImage mask = mask_of(outline, volume);
+  json["area"] = std::ranges::count(mask.pixels, 1);
+  const bool has_holes =
+      std::ranges::any_of(outline.rings, [](const Ring& ring) { return twice_area(ring) < 0; });
+  json["segmentation"] = has_holes || is_crowd ? Json{{"size", {volume.height, volume.width}},
+                                                      {"counts", compressed(run_lengths(mask))}}
+                                               : Json::parse(outline_text(outline));
+  return dump_json(json);
 }
 
 std::string coco_person(const CocoPlace& place, const Rectangle& box, bool is_crowd,

@@ -19,6 +19,13 @@ namespace eventgan {
 /// within 0..1. `box` lies within the volume.
 std::string yolo_line(int class_number, const Rectangle& box, ImageSize volume);
 
+/// "class x1 y1 x2 y2 ...": the corners as shares of the volume's width and height, 9 decimals,
+/// each within 0..1. It is one ring, as YOLO has it: from each of the outline's rings a bridge
+/// without width leads to the next one and back, so that a reader that fills by turns (even-odd)
+/// covers what the outline does; one whose parts overlap is that of its mask. `outline` lies within
+/// the volume and is not empty.
+std::string yolo_outline_line(int class_number, const Outline& outline, ImageSize volume);
+
 /// A joint of an exported person.
 struct ExportedJoint {
   Point at = kMissingPoint;  ///< volume pixels; kMissingPoint if not annotated
@@ -59,8 +66,12 @@ struct CocoPlace {
   int category_id = 0;
 };
 
-/// An entry for a box: `bbox` is left, top, width, height; `area` that of the box.
-std::string coco_box(const CocoPlace& place, const Rectangle& box, bool is_crowd);
+/// An entry for a box: `bbox` is left, top, width, height. Without an outline, `area` is that of
+/// the box. With one, which lies within the volume, `area` is the number of pixels that it covers,
+/// and `segmentation` its parts as polygons, or the mask as compressed run lengths where it has
+/// holes or is a crowd's.
+std::string coco_box(const CocoPlace& place, const Rectangle& box, bool is_crowd,
+                     const Outline& outline, ImageSize volume);
 
 /// An entry for a person: COCO counts an image from its left edge, so each joint is moved by half
 /// a pixel; visibility 0 not annotated or outside the volume (then x = y = 0), 1 hidden, 2 visible

@@ -108,6 +108,14 @@ class Dataset {
   /// Those of the notes that had better be read before anything is converted: what was found makes
   /// the source of little use, though no sample is at fault.
   virtual std::vector<std::string> warnings() const { return {}; }
+
+  /// What is in the source and cannot be read, a line each with the reason, and how many such
+  /// things there are, read or not: the job's error policy says whether they may be left out.
+  struct Unreadable {
+    std::vector<std::string> reasons;
+    std::int64_t of = 0;
+  };
+  virtual Unreadable unreadable() const { return {}; }
 };
 
 /// What the name of a sequence of such a dataset tells: Human3.6M's "S1/Directions-1/54138969" or

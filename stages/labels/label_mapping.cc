@@ -6,6 +6,9 @@
 #include <initializer_list>
 #include <optional>
 #include <sstream>
+#include <utility>
+
+#include "manifests/values/outlines.h"
 
 namespace eventgan {
 namespace {
@@ -59,6 +62,16 @@ Rectangle to_source(const Placement& placement, const Rectangle& box) {
           y.edge_to_source(box.bottom)};
 }
 
+Outline to_volume(const Placement& placement, const Outline& outline) {
+  const Axis x = horizontal(placement);
+  const Axis y = vertical(placement);
+  Outline mapped = outline;
+  for (auto& ring : mapped.rings) {
+    for (Point& corner : ring) corner = {x.edge_to_volume(corner.x), y.edge_to_volume(corner.y)};
+  }
+  return mapped;
+}
+
 Intrinsics to_volume(const Placement& placement, const Intrinsics& camera) {
   const Axis x = horizontal(placement);
   const Axis y = vertical(placement);
@@ -81,6 +94,41 @@ Rectangle clip(const Rectangle& box, const Rectangle& area) {
   return {std::clamp(box.left, area.left, area.right), std::clamp(box.top, area.top, area.bottom),
           std::clamp(box.right, area.left, area.right),
           std::clamp(box.bottom, area.top, area.bottom)};
+}
+
+namespace {
+
+/// The part of a ring where sign * coordinate <= sign * limit, `coordinate` being x or y
+/// (Sutherland and Hodgman). A place in that part is wound around as often as before.
+std::vector<Point> cut_ring(const std::vector<Point>& ring, double Point::*coordinate, double limit,
+                            double sign) {
+  std::vector<Point> cut;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const Point& from = ring[i];
+    const Point& to = ring[(i + 1) % ring.size()];
+    const bool begins_inside = sign * from.*coordinate <= sign * limit;
+    if (begins_inside) cut.push_back(from);
+    if (begins_inside == (sign * to.*coordinate <= sign * limit)) continue;
+    const double share = (limit - from.*coordinate) / (to.*coordinate - from.*coordinate);
+    Point crossing{from.x + share * (to.x - from.x), from.y + share * (to.y - from.y)};
+    crossing.*coordinate = limit;
+    cut.push_back(crossing);
+  }
+  return cut;
+}
+
+}  // namespace
+
+Outline clip(const Outline& outline, const Rectangle& area) {
+  Outline clipped;
+  for (const std::vector<Point>& ring : outline.rings) {
+    std::vector<Point> cut = cut_ring(ring, &Point::x, area.right, 1);
+    cut = cut_ring(cut, &Point::x, area.left, -1);
+    cut = cut_ring(cut, &Point::y, area.bottom, 1);
+    cut = cut_ring(cut, &Point::y, area.top, -1);
+    if (twice_area(cut) != 0) clipped.rings.push_back(std::move(cut));
+  }
+  return clipped;
 }
 
 bool is_empty(const Rectangle& box) { return !(box.left < box.right && box.top < box.bottom); }
@@ -125,6 +173,10 @@ bool overlaps(const Rectangle& box, ImageSize image) {
   return box.left < image.width && box.right > 0 && box.top < image.height && box.bottom > 0;
 }
 
+bool meet(const Rectangle& a, const Rectangle& b) {
+  return a.left <= b.right && a.right >= b.left && a.top <= b.bottom && a.bottom >= b.top;
+}
+
 bool contains(ImageSize image, Point point) {
   return point.x >= -0.5 && point.x <= image.width - 0.5 && point.y >= -0.5 &&
          point.y <= image.height - 0.5;
@@ -167,6 +219,15 @@ Complaint check(const Box& box, ImageSize image) {
   }
   if (box.xyxy.right < box.xyxy.left || box.xyxy.bottom < box.xyxy.top) {
     return text("expected left <= right and top <= bottom, got ", box.xyxy);
+  }
+  for (const auto& ring : box.outline.rings) {
+    for (const Point& corner : ring) {
+      if (!is_near(corner)) return text("expected an outline within 1e6 pixels, got ", corner);
+    }
+  }
+  if (!box.outline.empty() && !meet(bounds(box.outline), box.xyxy)) {
+    return text("expected an outline over its box, ", box.xyxy, ", got one around ",
+                bounds(box.outline));
   }
   if (!box.ignore && !overlaps(box.xyxy, image)) {
     return text("expected an overlap with the image of ", to_string(image), " pixels, got ",
@@ -218,8 +279,12 @@ Complaint check(const Person& person, ImageSize image) {
 
 VolumeBox map(const Box& box, const Placement& placement) {
   const Rectangle unclipped = to_volume(placement, box.xyxy);
-  const Rectangle clipped = clip(unclipped, area_of(placement));
-  return {clipped, unclipped, box.ignore || is_empty(clipped)};
+  const Rectangle area = area_of(placement);
+  const Rectangle clipped = clip(unclipped, area);
+  Outline outline = to_volume(placement, box.outline);
+  const bool is_gone =
+      is_empty(clipped) || (!outline.empty() && is_empty(clip(bounds(outline), area)));
+  return {clipped, unclipped, box.ignore || is_gone, std::move(outline)};
 }
 
 Point map_unless_missing(Point point, const Placement& placement) {

@@ -147,14 +147,6 @@ void check_time(std::int64_t time_us) {
   throw EventFault(fmt::format("expected a time of 0..{} µs, got {} µs", kTimesEnd - 1, time_us));
 }
 
-/// The same of an event behind another.
-void check_order(std::int64_t time_us, std::int64_t last_us) {
-  check_time(time_us);
-  if (time_us >= last_us) return;
-  throw EventFault(
-      fmt::format("expected times that never decrease, got {} µs after {} µs", time_us, last_us));
-}
-
 void check_size(std::int64_t size_bytes) {
   if (size_bytes <= static_cast<std::int64_t>(kMostBytes)) return;
   throw EventFault(fmt::format("expected at most {} bytes, got {}", kMostBytes, size_bytes));
@@ -193,9 +185,9 @@ std::map<int, Aedat4File::Stream> streams_of(const std::string& xml) {
 
 }  // namespace
 
-bool PacketPlace::may_have_events_from(std::int64_t last_us) const {
+bool PacketPlace::may_have_events() const {
   constexpr auto kMostEvents = static_cast<std::int64_t>(kMostBytes / sizeof(aedat4::Event));
-  return count > 0 && count <= kMostEvents && begin_us >= last_us && end_us >= begin_us &&
+  return count > 0 && count <= kMostEvents && begin_us >= 0 && end_us >= begin_us &&
          end_us < kTimesEnd;
 }
 
@@ -231,10 +223,9 @@ Aedat4File::Aedat4File(const std::filesystem::path& path) : file_(path) {
     if (header_.compression < 0 || header_.compression > 4) {
       throw EventFault(fmt::format("expected a compression 0..4, got {}", header_.compression));
     }
-    if (header_.table_byte != -1 &&
-        (header_.table_byte < header_.end_byte || header_.table_byte > file_.end_byte())) {
-      throw EventFault(fmt::format("expected a table of packets at a byte {}..{}, got one at {}",
-                                   header_.end_byte, file_.end_byte(), header_.table_byte));
+    // After a crash it is where a table was to be.
+    if (header_.table_byte < header_.end_byte || header_.table_byte > file_.end_byte()) {
+      header_.table_byte = -1;
     }
     header_.streams = streams_of(table.info() ? table.info()->str() : std::string());
   });
@@ -270,7 +261,10 @@ std::vector<PacketPlace> Aedat4File::read_table() const {
   std::vector<PacketPlace> told;
   if (header_.table_byte == -1) return told;
   at(header_.table_byte, [&] {
-    std::string bytes = unpack(read(header_.table_byte, file_.end_byte()));
+    std::string bytes = read(header_.table_byte, file_.end_byte());
+    constexpr std::size_t kIdentifierAt = 8;  // as jAER writes it, whatever packets are
+    const bool is_plain = bytes.compare(kIdentifierAt, 4, "FTAB") == 0;
+    if (!is_plain) bytes = unpack(std::move(bytes));
     const auto* const entries = table_of<aedat4::PacketTable>(bytes, "FTAB").packets();
     for (flatbuffers::uoffset_t i = 0; entries && i < entries->size(); ++i) {
       const aedat4::PacketEntry& entry = *entries->Get(i);
@@ -281,6 +275,10 @@ std::vector<PacketPlace> Aedat4File::read_table() const {
     }
   });
   std::ranges::stable_sort(told, {}, &PacketPlace::byte);
+  // jAER counts from the packets' headers.
+  if (!told.empty() && told[0].byte == header_.end_byte) {
+    for (PacketPlace& packet : told) packet.byte += kPacketHeaderBytes;
+  }
   return told;
 }
 
@@ -319,7 +317,13 @@ std::vector<PacketPlace> Aedat4File::find_packets(const std::vector<PacketPlace>
     byte = packet.end();
     packets.push_back(packet);
   }
-  if (has_table && table.size() != packets.size()) {
+  return packets;
+}
+
+void Aedat4File::check_table(const std::vector<PacketPlace>& packets,
+                             const std::vector<PacketPlace>& table, int event_stream) const {
+  if (header_.table_byte == -1) return;
+  if (table.size() != packets.size()) {
     refuse(fmt::format("expected a table of {} packets, as many as there are, got {}",
                        packets.size(), table.size()),
            header_.table_byte);
@@ -327,11 +331,21 @@ std::vector<PacketPlace> Aedat4File::find_packets(const std::vector<PacketPlace>
   for (std::size_t i = 0; i < table.size(); ++i) {
     at(header_.table_byte, [&] { check_packet(packets[i], table[i]); });
   }
-  return packets;
+  const auto is_told = [&](const PacketPlace& packet) {
+    return packet.stream == event_stream && packet.may_have_events();
+  };
+  const auto first = std::ranges::find_if(table, is_told);
+  if (first == table.end()) return;
+  PacketPlace is = packets[static_cast<std::size_t>(first - table.begin())];
+  try {
+    events(is);
+  } catch (const InputError&) {
+    return;  // damaged: the windows that need it are refused
+  }
+  at(header_.table_byte, [&] { check_packet(is, *first); });
 }
 
-CompactEvents Aedat4File::events(PacketPlace& packet, std::int64_t first,
-                                 std::int64_t last_us) const {
+CompactEvents Aedat4File::events(PacketPlace& packet) const {
   return at(packet.byte, [&] {
     std::string bytes = content(packet);
     const auto* const elements = table_of<aedat4::Events>(bytes, "EVTS").elements();
@@ -343,16 +357,16 @@ CompactEvents Aedat4File::events(PacketPlace& packet, std::int64_t first,
       aedat4::Event event;  // copied, since nothing says that it lies where 64-bit numbers should
       std::memcpy(&event, elements->Data() + static_cast<std::size_t>(i) * sizeof(event),
                   sizeof(event));
-      try {
-        check_order(event.t_us(), last_us);
-      } catch (const EventFault& fault) {
-        throw InputError(fmt::format("{}, in {} (event {})", fault.what(), name(), first + i));
+      check_time(event.t_us());
+      const bool is_told = packet.count >= 0;
+      if (is_told && (event.t_us() < packet.begin_us || event.t_us() > packet.end_us)) {
+        throw EventFault(fmt::format("expected times of {} to {} µs, as the table says, got {} µs",
+                                     packet.begin_us, packet.end_us, event.t_us()));
       }
-      last_us = event.t_us();
-      if (i == 0) is.begin_us = last_us;
-      is.end_us = last_us;
+      if (i == 0) is.begin_us = event.t_us();
+      is.end_us = event.t_us();
       events.push_back({static_cast<double>(event.x()), static_cast<double>(event.y()),
-                        seconds(last_us), static_cast<double>(event.on())});
+                        seconds(event.t_us()), static_cast<double>(event.on())});
     }
     if (packet.count >= 0) check_packet(is, packet);
     packet = is;
@@ -385,24 +399,32 @@ Aedat4File::Frame Aedat4File::frame(const PacketPlace& packet, ImageSize size) c
                                    to_string(size), to_string(stored), table.left(), table.top()));
     }
     const int type = table.format();
-    if (type != CV_8UC1 && type != CV_8UC3 && type != CV_8UC4) {
-      throw EventFault(fmt::format("expected pixels of OpenCV's type {}, {} or {}, got {}", CV_8UC1,
-                                   CV_8UC3, CV_8UC4, type));
+    const int channels = CV_MAT_CN(type), bytes_per_value = CV_MAT_DEPTH(type) == CV_16U ? 2 : 1;
+    if ((CV_MAT_DEPTH(type) != CV_8U && CV_MAT_DEPTH(type) != CV_16U) || type < 0 ||
+        (channels != 1 && channels != 3 && channels != 4)) {
+      throw EventFault(
+          fmt::format("expected 1, 3 or 4 channels of 8 or 16 bits, got OpenCV's type {}", type));
     }
+    const std::size_t values = size.pixel_count() * static_cast<std::size_t>(channels);
     const std::size_t count = table.pixels() ? table.pixels()->size() : 0;
-    if (count != size.pixel_count() * CV_MAT_CN(type)) {
+    if (count != values * static_cast<std::size_t>(bytes_per_value)) {
       throw EventFault(fmt::format("expected {} bytes of pixels, got {}",
-                                   size.pixel_count() * CV_MAT_CN(type), count));
+                                   values * static_cast<std::size_t>(bytes_per_value), count));
     }
-    frame.is_grey = type == CV_8UC1;
+    frame.is_colour = channels > 1;
+    frame.is_deep = bytes_per_value > 1;
+    std::vector<std::uint8_t> pixels(values);  // of 16 bits, little-endian, the upper byte
+    for (std::size_t i = 0; i < values; ++i) {
+      const std::size_t at_byte = frame.is_deep ? 2 * i + 1 : i;
+      pixels[i] = table.pixels()->Get(static_cast<flatbuffers::uoffset_t>(at_byte));
+    }
     frame.image = {size, std::vector<std::uint8_t>(size.pixel_count())};
-    const std::uint8_t* const pixels = table.pixels()->data();
-    if (frame.is_grey) {
-      std::copy_n(pixels, count, frame.image.pixels.begin());
+    if (!frame.is_colour) {
+      frame.image.pixels = std::move(pixels);
     } else {
-      const cv::Mat colour(size.height, size.width, type, const_cast<std::uint8_t*>(pixels));
+      const cv::Mat colour(size.height, size.width, CV_8UC(channels), pixels.data());
       cv::Mat grey(size.height, size.width, CV_8UC1, frame.image.pixels.data());
-      cv::cvtColor(colour, grey, type == CV_8UC3 ? cv::COLOR_BGR2GRAY : cv::COLOR_BGRA2GRAY);
+      cv::cvtColor(colour, grey, channels == 3 ? cv::COLOR_BGR2GRAY : cv::COLOR_BGRA2GRAY);
     }
     return frame;
   });

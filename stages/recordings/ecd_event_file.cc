@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <system_error>
 
@@ -25,7 +24,7 @@ bool take_number(const char*& begin, const char* end, Number& number) {
 }
 
 /// Foreign text for a message: cut, all but printable ASCII as '?'.
-[[noreturn]] void refuse(std::string_view line) {
+[[noreturn]] void refuse_line(std::string_view line) {
   std::string text(line.substr(0, 40));
   for (char& character : text) {
     if (character < ' ' || character > '~') character = '?';
@@ -44,23 +43,26 @@ StoredEvent parse_ecd_event(std::string_view line) {
   int polarity = 0;
   if (!take_number(begin, end, t_s) || !take_number(begin, end, x) || !take_number(begin, end, y) ||
       !take_number(begin, end, polarity) || begin != end) {
-    refuse(line);
+    refuse_line(line);
   }
   return {static_cast<double>(x), static_cast<double>(y), t_s, static_cast<double>(polarity)};
 }
 
-double parse_ecd_event_time(std::string_view line) {
+namespace {
+
+/// None of a line that does not begin with a finite time.
+std::optional<double> time_of(std::string_view line) {
   const char* begin = line.data();
   double t_s = 0;
-  if (!take_number(begin, line.data() + line.size(), t_s) || !std::isfinite(t_s)) refuse(line);
+  if (!take_number(begin, line.data() + line.size(), t_s) || !std::isfinite(t_s)) {
+    return std::nullopt;
+  }
   return t_s;
 }
 
-namespace {
-
 constexpr std::int64_t kLongestLine = 256;
-constexpr std::int64_t kUsualLine = 21;  // "0.003811000 96 133 0\n"
-constexpr std::int64_t kWindow = 16 * kLongestLine;
+constexpr std::int64_t kUsualLine = 21;                         // "0.003811000 96 133 0\n"
+constexpr std::int64_t kBytesPerBlock = std::int64_t{1} << 16;  // what a search for a time reads
 constexpr std::int64_t kBytesPerRead = std::int64_t{1} << 20;
 
 /// Calls `take(line, offset)` with each line of `text`, until it gives false.
@@ -93,47 +95,64 @@ void EcdEventFile::refuse(const EventFault& fault, std::int64_t line_begin) cons
                    std::to_string(line) + ")");
 }
 
-EcdEventFile::Line EcdEventFile::line_from(std::int64_t byte) const {
-  const std::string bytes =
-      file_.read_between(byte - 1, std::min(byte + 2 * kLongestLine, file_.end_byte()));
-  const std::size_t before = bytes.find('\n');
-  const std::size_t begin = before + 1;
-  const std::size_t end = before == std::string::npos ? before : bytes.find('\n', begin);
-  const std::int64_t line_begin = byte + static_cast<std::int64_t>(begin) - 1;
-  try {
-    if (end == std::string::npos) refuse_length();
-    return {line_begin, byte + static_cast<std::int64_t>(end),
-            parse_ecd_event_time(std::string_view(bytes).substr(begin, end - begin))};
-  } catch (const EventFault& fault) {
-    refuse(fault, before == std::string::npos ? byte : line_begin);
-  }
+EcdEventFile::EcdEventFile(const std::filesystem::path& path) : file_(path) {
+  constexpr std::int64_t kMostComments = std::int64_t{1} << 16;
+  const std::string text = file_.read_between(0, std::min(kMostComments, file_.end_byte()));
+  for_each_line(text, [&](std::string_view line, std::size_t offset) {
+    begin_ = static_cast<std::int64_t>(offset);
+    const bool is_comment = line.starts_with('#');
+    if (is_comment) begin_ += std::min(std::ssize(line) + 1, std::ssize(text) - begin_);
+    return is_comment;
+  });
+}
+
+const EventOrder& EcdEventFile::order() const {
+  std::call_once(order_once_, [&] {
+    std::int64_t block = begin_;
+    for (std::int64_t begin = begin_; begin < file_.end_byte();) {
+      const std::int64_t end = std::min(begin + kBytesPerRead, file_.end_byte());
+      try {
+        std::string bytes = file_.read_between(begin, end);
+        if (end < file_.end_byte()) bytes.resize(bytes.rfind('\n') + 1);  // none: nothing
+        if (bytes.empty()) refuse(EventFault(long_line_text()), begin);
+        for_each_line(bytes, [&](std::string_view line, std::size_t offset) {
+          const std::int64_t byte = begin + static_cast<std::int64_t>(offset);
+          if (byte - block > kBytesPerBlock) order_.end_block(block = byte);
+          if (const auto time_s = time_of(line)) order_.add(*time_s, byte);
+          return true;
+        });
+        begin += static_cast<std::int64_t>(bytes.size());
+      } catch (const InputError&) {
+        order_.add_unreadable(std::current_exception());
+        begin = end;
+      }
+      order_.end_block(begin);
+    }
+  });
+  return order_;
 }
 
 std::int64_t EcdEventFile::first_byte_after(double time_s) const {
-  // Lines before `low` are at or before the time, those from `high` on are after it.
-  std::int64_t low = 0;
-  std::int64_t high = file_.end_byte();
-  while (high - low > kWindow) {
-    const Line line = line_from(low + (high - low) / 2);
-    (line.time_s > time_s ? high : low) = line.time_s > time_s ? line.begin : line.end;
-  }
-  const std::string bytes = file_.read_between(low, high);
-  std::int64_t found = high;
-  double previous_s = std::numeric_limits<double>::lowest();
+  const auto [begin, end] = order().block_after(time_s);
+  const std::string bytes = file_.read_between(begin, end);
+  std::int64_t found = end;
   for_each_line(bytes, [&](std::string_view line, std::size_t offset) {
-    const std::int64_t begin = low + static_cast<std::int64_t>(offset);
-    try {
-      const double line_s = parse_ecd_event_time(line);
-      check_event_time(previous_s, line_s);
-      previous_s = line_s;
-      if (line_s <= time_s) return true;
-    } catch (const EventFault& fault) {
-      refuse(fault, begin);
-    }
-    found = begin;
-    return false;
+    const auto line_s = time_of(line);
+    const bool is_later = line_s && *line_s > time_s;
+    if (is_later) found = begin + static_cast<std::int64_t>(offset);
+    return !is_later;
   });
   return found;
+}
+
+void EcdEventFile::require_order(double after_s, double until_s) const {
+  const EventOrder::Fall* const fall = order().fall_in(after_s, until_s);
+  if (fall == nullptr) return;
+  try {
+    refuse_fall(*fall);
+  } catch (const EventFault& fault) {
+    refuse(fault, fall->place);
+  }
 }
 
 namespace {
@@ -156,14 +175,14 @@ std::int64_t EcdEventFile::skip_lines(std::int64_t byte, std::int64_t lines) con
     }
     byte += static_cast<std::int64_t>(at);
   }
-  while (lines < 0 && byte > 0) {
-    const std::int64_t begin = std::max<std::int64_t>(byte - usual_bytes(-lines), 0);
+  while (lines < 0 && byte > begin_) {
+    const std::int64_t begin = std::max<std::int64_t>(byte - usual_bytes(-lines), begin_);
     const std::string bytes = file_.read_between(begin, byte);
     // The line before starts behind the last line end but the one that ends it.
     std::size_t at = bytes.size();
     for (; lines < 0 && at > 0; ++lines) {
       const std::size_t end = at >= 2 ? bytes.rfind('\n', at - 2) : std::string::npos;
-      if (end == std::string::npos && begin > 0) break;  // it starts before what was read
+      if (end == std::string::npos && begin > begin_) break;  // it starts before what was read
       at = end == std::string::npos ? 0 : end + 1;
     }
     if (at == bytes.size()) refuse(EventFault(long_line_text()), begin);
@@ -172,23 +191,27 @@ std::int64_t EcdEventFile::skip_lines(std::int64_t byte, std::int64_t lines) con
   return byte;
 }
 
+double EcdEventFile::time_at(std::int64_t byte) const {
+  const std::string bytes =
+      file_.read_between(byte, std::min(byte + kLongestLine, file_.end_byte()));
+  const std::string_view line = std::string_view(bytes).substr(0, bytes.find('\n'));
+  if (const auto time_s = time_of(line)) return *time_s;
+  try {
+    refuse_line(line);
+  } catch (const EventFault& fault) {
+    refuse(fault, byte);
+  }
+}
+
 std::optional<std::array<double, 2>> EcdEventFile::span() const {
-  const std::int64_t end = file_.end_byte();
-  if (end == 0) return std::nullopt;
-  const auto time_at = [&](std::int64_t byte) {
-    const std::string bytes = file_.read_between(byte, std::min(byte + kLongestLine, end));
-    try {
-      return parse_ecd_event_time(std::string_view(bytes).substr(0, bytes.find('\n')));
-    } catch (const EventFault& fault) {
-      refuse(fault, byte);
-    }
-  };
-  return std::array{time_at(0), time_at(skip_lines(end, -1))};
+  if (begin_ == file_.end_byte()) return std::nullopt;
+  time_at(begin_);
+  time_at(skip_lines(file_.end_byte(), -1));
+  return order().span();
 }
 
 std::vector<Event> EcdEventFile::events(std::int64_t begin, std::int64_t end,
                                         EventCheck check) const {
-  if (end < begin) refuse(EventFault("expected times that never decrease, got others"), end);
   std::vector<Event> events;
   events.reserve(static_cast<std::size_t>((end - begin) / kUsualLine));
   while (begin < end) {

@@ -1,5 +1,6 @@
 #include "stages/recordings/detail/ecd_recording.h"
 
+#include <algorithm>
 #include <charconv>
 #include <sstream>
 #include <stdexcept>
@@ -108,8 +109,7 @@ EcdRecording::EcdRecording(const std::filesystem::path& folder)
 EcdRecording::EcdRecording(const std::filesystem::path& folder, const EcdImageList& images)
     : name_(folder.string()),
       events_(folder / kEvents),
-      frames_(files_of(folder, images), images.times_s),
-      boundaries_(images.times_s.size()) {}
+      frames_(files_of(folder, images), images.times_s) {}
 
 double EcdRecording::frame_time_s(std::int64_t index) const {
   return frames_.times_s()[frame_position(index, frame_count(), name_)];
@@ -122,33 +122,33 @@ GreyImage EcdRecording::frame(std::int64_t index) const {
 
 std::vector<Event> EcdRecording::events_between(std::int64_t first_frame,
                                                 std::int64_t last_frame) const {
-  const FrameRange range = frame_range(first_frame, last_frame, frame_count(), name_);
-  const std::int64_t begin = first_byte_after(range.first);
-  const std::int64_t end = first_byte_after(range.last);
-  return events_.events(
-      begin, end,
-      EventCheck(size(), frames_.times_s()[range.first], frames_.times_s()[range.last]));
+  const auto [first, last] = frame_range(first_frame, last_frame, frame_count(), name_);
+  if (first == last) return {};
+  return events_in(frames_.times_s()[first], frames_.times_s()[last]);
 }
 
 std::vector<Event> EcdRecording::events_in(double after_s, double until_s) const {
+  events_.require_order(after_s, until_s);
   return events_.events(events_.first_byte_after(after_s), events_.first_byte_after(until_s),
                         EventCheck(size(), after_s, until_s));
 }
 
 std::vector<Event> EcdRecording::events_around(double time_s, std::int64_t before,
                                                std::int64_t after) const {
+  events_.require_order(time_s, time_s);
   const std::int64_t middle = events_.first_byte_after(time_s);
-  return events_.events(events_.skip_lines(middle, -before), events_.skip_lines(middle, after),
-                        EventCheck::of_any_time(size()));
+  const std::int64_t begin = events_.skip_lines(middle, -before);
+  const std::int64_t end = events_.skip_lines(middle, after);
+  if (begin < end) {  // events of these times may lie elsewhere
+    events_.require_order(std::min(events_.time_at(begin), time_s),
+                          std::max(events_.time_at(events_.skip_lines(end, -1)), time_s));
+  }
+  return events_.events(begin, end, EventCheck::of_any_time(size()));
 }
 
 std::optional<FlowField> EcdRecording::flow(std::int64_t index) const {
   frame_position(index, frame_count() - 1, name_);
   return std::nullopt;
-}
-
-std::int64_t EcdRecording::first_byte_after(std::size_t frame) const {
-  return boundaries_.at(frame, [&] { return events_.first_byte_after(frames_.times_s()[frame]); });
 }
 
 constinit const RecordingReader kEcdReader{

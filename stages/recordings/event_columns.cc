@@ -98,14 +98,6 @@ class ColumnStore final : public EventStore {
     return times;
   }
 
-  std::optional<std::int64_t> near(double time_s) const override {
-    const std::int64_t entries = ms_index_ ? static_cast<std::int64_t>(ms_index_->dims()[0]) : 0;
-    if (entries == 0) return std::nullopt;
-    const double ms = (time_s * kTicksPerSecond - static_cast<double>(offset_us_)) / kTicksPerMs;
-    const double entry = std::clamp(ms, 0.0, static_cast<double>(entries - 1));
-    return column(*ms_index_, static_cast<std::int64_t>(entry), 1)[0];
-  }
-
  private:
   std::vector<std::int64_t> column(const Hdf5Table& table, std::int64_t first,
                                    std::int64_t count) const {
@@ -161,20 +153,26 @@ std::optional<ImageSize> read_size(hid_t file, const ColumnLayout& layout,
   return ImageSize{static_cast<int>(sides[0]), static_cast<int>(sides[1])};
 }
 
-/// The events and the size. `otherwise`: of a file that does not tell it.
+/// DSEC's own files do not tell their size; those of others that have its columns alone do, or
+/// nobody knows it.
+std::optional<ImageSize> dsec_size(hid_t file, const ColumnLayout& layout) {
+  constexpr ImageSize kDsecSize{480, 640};
+  const bool is_dsec = !layout.t_offset.empty() && has_object(file, layout.t_offset) &&
+                       has_object(file, layout.ms_index);
+  return is_dsec ? std::optional(kDsecSize) : std::nullopt;
+}
+
+/// The events and the size.
 StoredParts open_columns(const fs::path& path, const ColumnLayout& layout,
-                         std::optional<ImageSize> otherwise) {
+                         const RecordingOptions& options) {
   const Hdf5Lock lock;
   StoredParts parts;
   parts.name = path.string();
   Hdf5Handle file = open_recording_file(path);
-  const std::optional<ImageSize> size =
+  std::optional<ImageSize> told =
       read_hdf5(parts.name, [&] { return read_size(file, layout, parts.name); });
-  if (!size && !otherwise) {
-    throw InputError("expected the sensor's size in " + layout.size[0] +
-                     ", or \"sensor\" in the manifest, got none, in " + parts.name);
-  }
-  parts.size = size ? *size : *otherwise;
+  if (!told && !options.sensor) told = dsec_size(file, layout);
+  parts.size = sensor_size(told, options.sensor, parts);
   parts.events = read_hdf5(parts.name, [&] {
     return std::make_unique<ColumnStore>(std::move(file), layout, parts.name);
   });
@@ -308,9 +306,8 @@ ColumnLayout m3ed_layout(const std::string& camera) {
 
 std::unique_ptr<Recording> open_dsec_recording(const fs::path& path,
                                                const RecordingOptions& options) {
-  constexpr ImageSize kDsecSize{480, 640};
   const fs::path file = dsec_event_file(path, options);
-  StoredParts parts = open_columns(file, dsec_layout(), options.sensor.value_or(kDsecSize));
+  StoredParts parts = open_columns(file, dsec_layout(), options);
   const fs::path sequence = sequence_of(fs::absolute(file).lexically_normal());
   std::vector<fs::path> frames = find_frames(sequence, parts.size, options, parts.notes);
   if (!frames.empty()) {
@@ -344,7 +341,7 @@ std::unique_ptr<Recording> open_dsec_recording(const fs::path& path,
 
 std::unique_ptr<Recording> open_m3ed_recording(const fs::path& path,
                                                const RecordingOptions& options) {
-  StoredParts parts = open_columns(path, m3ed_layout(options.camera), options.sensor);
+  StoredParts parts = open_columns(path, m3ed_layout(options.camera), options);
   const Hdf5Lock lock;
   if (has_object(open_recording_file(path), "ovc")) {
     parts.notes.push_back("opened without frames, which are another camera's (ovc), in " +

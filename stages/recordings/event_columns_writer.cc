@@ -34,6 +34,16 @@ void write_number(hid_t file, const std::string& path, std::int64_t number) {
 
 }  // namespace
 
+void require_recordable(std::span<const StampedEvent> events, ImageSize size,
+                        std::int64_t first_us) {
+  for (const StampedEvent& event : events) {
+    require(event.x < size.width && event.y < size.height, "expected events within the size");
+    require(event.t_us >= first_us,
+            "expected events in time order, not before the recording's begin");
+    first_us = event.t_us;
+  }
+}
+
 struct EventColumnsWriter::File {
   Hdf5OutputFile hdf5;
   ColumnFile layout;
@@ -92,18 +102,14 @@ void EventColumnsWriter::add_events(std::span<const StampedEvent> events) {
   std::vector<std::uint16_t> x, y;
   std::vector<std::uint8_t> p;
   std::vector<std::int64_t> t;
-  std::int64_t last_us = file_->last_us;
+  require_recordable(events, file_->size, file_->offset_us + file_->last_us);
   for (const StampedEvent& event : events) {
-    const std::int64_t time_us = event.t_us - file_->offset_us;
-    require(event.x < file_->size.width && event.y < file_->size.height,
-            "expected events within the size");
-    require(time_us >= last_us, "expected events in time order, not before the recording's begin");
-    last_us = time_us;
     x.push_back(event.x);
     y.push_back(event.y);
     p.push_back(event.positive ? 1 : 0);
-    t.push_back(time_us);
+    t.push_back(event.t_us - file_->offset_us);
   }
+  const std::int64_t last_us = t.empty() ? file_->last_us : t.back();
   const bool is_dsec = file_->layout == ColumnFile::kDsec;
   require(!is_dsec || last_us <= std::numeric_limits<std::uint32_t>::max(),
           "expected events within 2^32 microseconds of the recording's begin");

@@ -17,6 +17,11 @@ struct StampedEvent {
   bool positive = true;
 };
 
+/// Throws std::invalid_argument unless the events lie within the size and their times, from
+/// `first_us` on, never fall.
+void require_recordable(std::span<const StampedEvent> events, ImageSize size,
+                        std::int64_t first_us);
+
 /// Who keeps events as columns of one HDF5 file, events/{x, y, t, p}: x and y uint16, p uint8 (0 or
 /// 1), t in microseconds.
 enum class ColumnFile {

@@ -38,6 +38,11 @@ void CompactEvents::push_back(const StoredEvent& event) {
   polarity_.push_back(is_whole ? static_cast<std::int8_t>(event.polarity) : std::int8_t{0});
 }
 
+void CompactEvents::divide_times(double divisor) {
+  for (double& time_s : t_s_) time_s /= divisor;
+  for (auto& [place, event] : others_) event.t_s /= divisor;
+}
+
 StoredEvent CompactEvents::operator[](std::int64_t place) const {
   if (!others_.empty()) {
     if (const auto other = others_.find(place); other != others_.end()) return other->second;
@@ -100,15 +105,19 @@ void RecentEvents::drop(const Key& key) {
   entries_.erase(entry);
 }
 
-void EventParts::add_part(std::int64_t count, double begin_s) {
+void EventParts::add_part(std::int64_t count, double begin_s, double end_s) {
   firsts_.push_back(count_);
-  begins_s_.push_back(begin_s);
+  order_.add(begin_s, count_);
   count_ += count;
+  order_.add(end_s, count_ - 1);
+  order_.end_block(count_);
 }
 
 void EventParts::add_part(CompactEvents events) {
   if (events.size() == 0) return;
-  add_part(events.size(), events.times_s().front());
+  firsts_.push_back(count_);
+  order_.add_all(events.times_s(), count_);
+  count_ += events.size();
   recent_.get(this, firsts_.size() - 1, [&] { return std::move(events); });
 }
 
@@ -154,15 +163,6 @@ std::vector<double> EventParts::times_s(std::int64_t first, std::int64_t count) 
                   result.insert(result.end(), times + begin, times + end);
                 });
   return result;
-}
-
-std::optional<std::int64_t> EventParts::near(double time_s) const {
-  const auto behind = std::ranges::upper_bound(begins_s_, time_s);
-  if (behind == begins_s_.begin()) return 0;
-  const auto number = static_cast<std::size_t>(behind - begins_s_.begin()) - 1;
-  const RecentEvents::Events events = part(number);
-  return firsts_[number] +
-         (std::ranges::upper_bound(events->times_s(), time_s) - events->times_s().begin());
 }
 
 }  // namespace eventgan

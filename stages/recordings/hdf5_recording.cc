@@ -28,7 +28,6 @@ struct Hdf5RecordingTables {
   std::optional<Hdf5Table> flow;
   ImageSize size;
   std::vector<double> frame_times_s;
-  std::vector<std::int64_t> event_index;  ///< as the file says, or empty
 };
 
 Hdf5Table open_events(hid_t file, const Hdf5Layout& layout, const std::string& name) {
@@ -81,13 +80,6 @@ std::vector<double> read_frame_times(hid_t file, const Hdf5Layout& layout, const
   return times_s;
 }
 
-std::vector<std::int64_t> read_event_index(hid_t file, const Hdf5Layout& layout,
-                                           const std::string& name, hsize_t frame_count) {
-  if (!has_object(file, layout.event_index)) return {};
-  return read_column<std::int64_t>(Hdf5Table(file, layout.event_index, name), frame_count,
-                                   "an event's index for each frame, integer");
-}
-
 std::optional<Hdf5Table> open_flow(hid_t file, const Hdf5Layout& layout, const std::string& name,
                                    const Dims& frames) {
   if (layout.flow.empty() || !has_object(file, layout.flow)) return std::nullopt;
@@ -109,15 +101,13 @@ Hdf5RecordingTables open_tables(const std::filesystem::path& path, const Hdf5Lay
   Hdf5Table frames = open_frames(file, layout, name);
   const Dims dims = frames.dims();
   std::vector<double> times_s = read_frame_times(file, layout, name, dims[0]);
-  std::vector<std::int64_t> event_index = read_event_index(file, layout, name, dims[0]);
   std::optional<Hdf5Table> flow = open_flow(file, layout, name, dims);
   return {std::move(file),
           std::move(events),
           std::move(frames),
           std::move(flow),
           {static_cast<int>(dims[1]), static_cast<int>(dims[2])},
-          std::move(times_s),
-          std::move(event_index)};
+          std::move(times_s)};
 }
 
 class Hdf5Events final : public EventStore {
@@ -217,8 +207,7 @@ std::unique_ptr<Recording> open_hdf5_recording(const std::filesystem::path& path
   return make_stored_recording({.name = path.string(),
                                 .size = tables->size,
                                 .events = std::make_unique<Hdf5Events>(tables, path.string()),
-                                .frames = std::make_unique<Frames>(tables, path.string()),
-                                .event_index = tables->event_index});
+                                .frames = std::make_unique<Frames>(tables, path.string())});
 }
 
 constinit const RecordingReader kMvsecReader{

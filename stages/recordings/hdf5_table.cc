@@ -1,5 +1,6 @@
 #include "stages/recordings/detail/hdf5_table.h"
 
+#include <dlfcn.h>
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -47,10 +48,13 @@ Hdf5Handle open_dataset(hid_t file, const std::string& path) {
   return {H5Dopen2(file, path.c_str(), access), H5Dclose, "open", path};
 }
 
-/// numpy's name of a type of numbers; of others "text", "no numbers".
+/// numpy's name of a type of numbers; of others "text", "no numbers". A bool of numpy's is stored
+/// as an enumeration of whole numbers, which HDF5 reads as these.
 std::string describe_type(hid_t type) {
   const std::string bits = std::to_string(8 * H5Tget_size(type));
   switch (H5Tget_class(type)) {
+    case H5T_ENUM:
+      return describe_type(Hdf5Handle(H5Tget_super(type), H5Tclose, "read", "a type"));
     case H5T_FLOAT:
       return "float" + bits;
     case H5T_INTEGER:
@@ -62,16 +66,45 @@ std::string describe_type(hid_t type) {
   }
 }
 
-/// How many values of `width` bytes the dataset's share of the file can give.
+/// Whether deflate is all that compresses the dataset.
+bool is_deflated(hid_t creation) {
+  const int count = checked(H5Pget_nfilters(creation), "count", "the filters");
+  for (int i = 0; i < count; ++i) {
+    unsigned flags = 0;
+    std::size_t values = 0;
+    const H5Z_filter_t filter = checked(H5Pget_filter2(creation, static_cast<unsigned>(i), &flags,
+                                                       &values, nullptr, 0, nullptr, nullptr),
+                                        "read", "a filter");
+    if (filter != H5Z_FILTER_DEFLATE && filter != H5Z_FILTER_SHUFFLE &&
+        filter != H5Z_FILTER_FLETCHER32) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// How many values of `width` bytes the dataset's share of the file can give: of each stored byte
+/// what deflate can make of it; where other filters compress, whole chunks.
 hsize_t most_values(hid_t dataset, std::size_t width) {
   constexpr hsize_t kMost = std::numeric_limits<hsize_t>::max();
   const Hdf5Handle creation(H5Dget_create_plist(dataset), H5Pclose, "read", "the layout");
   const H5D_layout_t layout = H5Pget_layout(creation);
   if (layout == H5D_VIRTUAL || H5Pget_external_count(creation) > 0) return kMost;
   const hsize_t stored = H5Dget_storage_size(dataset);
-  const hsize_t growth = layout == H5D_CHUNKED ? kDeflateLimit : 1;
+  hsize_t growth = 1;
+  if (layout == H5D_CHUNKED && is_deflated(creation)) {
+    growth = kDeflateLimit;
+  } else if (layout == H5D_CHUNKED) {
+    Dims chunk(dims_of(dataset, "a dataset").size());
+    checked(H5Pget_chunk(creation, static_cast<int>(chunk.size()), chunk.data()), "read",
+            "the chunks");
+    const hsize_t values = element_count(chunk);
+    growth = values > kMost / width ? kMost : values * width;
+  }
   return stored > kMost / growth ? kMost : stored * growth / width;
 }
+
+constexpr H5Z_filter_t kLzfFilter = 32000;
 
 /// Filters of recordings that libhdf5 does not have itself, and Debian's packages of them.
 struct Plugin {
@@ -79,7 +112,7 @@ struct Plugin {
   const char* name;
   const char* package;
 };
-constexpr std::array kPlugins{Plugin{32000, "LZF", "hdf5-plugin-lzf"},
+constexpr std::array kPlugins{Plugin{kLzfFilter, "LZF", "hdf5-plugin-lzf liblzf1"},
                               Plugin{32001, "Blosc", "hdf5-filter-plugin-blosc-serial"}};
 
 /// HDF5 finds a filter that is installed as a plugin by itself.
@@ -92,6 +125,8 @@ void require_filters(hid_t dataset, const std::string& place) {
     const H5Z_filter_t filter = checked(H5Pget_filter2(creation, static_cast<unsigned>(i), &flags,
                                                        &values, nullptr, 0, nullptr, nullptr),
                                         "read", "a filter");
+    // Debian's plugin does not name the library that it needs, so that HDF5 alone cannot load it.
+    if (filter == kLzfFilter) dlopen("liblzf.so.1", RTLD_NOW | RTLD_GLOBAL);
     if (checked(H5Zfilter_avail(filter), "look for", "a filter") > 0) continue;
     const auto known = std::ranges::find(kPlugins, filter, &Plugin::filter);
     throw InputError(

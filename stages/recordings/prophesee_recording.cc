@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cstring>
 #include <string_view>
@@ -17,7 +18,7 @@
 namespace eventgan {
 namespace {
 
-enum class PropheseeEncoding { kDat, kEvt2, kEvt3 };
+enum class PropheseeEncoding { kDat, kEvt2, kEvt21, kEvt21Legacy, kEvt3 };
 
 // ---- The header
 
@@ -26,6 +27,7 @@ struct PropheseeHeader {
   std::string version;                        ///< DAT
   std::optional<int> width;
   std::optional<int> height;
+  bool is_legacy = false;  ///< EVT 2.1: the halves of a word are exchanged
   std::int64_t end_byte = 0;
 };
 
@@ -49,6 +51,21 @@ int pixels_of(std::string_view text, std::string_view key) {
       fmt::format("expected pixels 1..{} in \"{}\", got another", kMostSensorSide, key));
 }
 
+PropheseeEncoding encoding_of(std::string_view word, std::string_view evt2, std::string_view evt21,
+                              std::string_view evt3) {
+  if (word == evt2) return PropheseeEncoding::kEvt2;
+  if (word == evt21) return PropheseeEncoding::kEvt21;
+  if (word == evt3) return PropheseeEncoding::kEvt3;
+  throw EventFault(fmt::format("expected {}, {} or {}, got another encoding", evt2, evt21, evt3));
+}
+
+void read_endianness(std::string_view value, PropheseeHeader& header) {
+  if (value != "little" && value != "legacy") {
+    throw EventFault("expected little-endian words, got others");
+  }
+  header.is_legacy = value == "legacy";
+}
+
 /// "EVT3;height=720;width=1280"
 void read_format(std::string_view value, PropheseeHeader& header) {
   for (bool is_first = true; !value.empty(); is_first = false) {
@@ -56,18 +73,10 @@ void read_format(std::string_view value, PropheseeHeader& header) {
     value.remove_prefix(std::min(part.size() + 1, value.size()));
     const std::string_view key = part.substr(0, part.find('='));
     const std::string_view number = part.substr(std::min(key.size() + 1, part.size()));
-    if (is_first && part != "EVT2" && part != "EVT3") {
-      throw EventFault("expected a format EVT2 or EVT3, got another");
-    }
-    if (is_first) {
-      tell(header.encoding, part == "EVT2" ? PropheseeEncoding::kEvt2 : PropheseeEncoding::kEvt3,
-           "format");
-    }
+    if (is_first) tell(header.encoding, encoding_of(part, "EVT2", "EVT21", "EVT3"), "format");
     if (key == "width") tell(header.width, pixels_of(number, key), key);
     if (key == "height") tell(header.height, pixels_of(number, key), key);
-    if (key == "endianness" && number != "little") {
-      throw EventFault("expected little-endian words, got others");
-    }
+    if (key == "endianness") read_endianness(number, header);
   }
 }
 
@@ -77,9 +86,7 @@ void read_header_line(std::string_view key, std::string_view value, PropheseeHea
   } else if (key == "Version") {
     header.version = value;
   } else if (key == "evt") {
-    if (value != "2.0" && value != "3.0") throw EventFault("expected evt 2.0 or 3.0, got another");
-    tell(header.encoding, value == "2.0" ? PropheseeEncoding::kEvt2 : PropheseeEncoding::kEvt3,
-         key);
+    tell(header.encoding, encoding_of(value, "2.0", "2.1", "3.0"), key);
   } else if (key == "format") {
     read_format(value, header);
   } else if (key == "geometry") {
@@ -91,8 +98,8 @@ void read_header_line(std::string_view key, std::string_view value, PropheseeHea
     tell(header.width, pixels_of(value, key), key);
   } else if (key == "Height" || key == "height") {
     tell(header.height, pixels_of(value, key), key);
-  } else if (key == "endianness" && value != "little") {
-    throw EventFault("expected little-endian words, got others");
+  } else if (key == "endianness") {
+    read_endianness(value, header);
   }
 }
 
@@ -128,33 +135,36 @@ PropheseeHeader read_prophesee_header(std::string_view text, const std::string& 
 
 // ---- The words
 
+/// What was passed over.
+struct WordCounts {
+  std::int64_t left_out = 0;    ///< events before their time and place were told
+  std::int64_t outside = 0;     ///< events beside the sensor
+  std::int64_t reserved = 0;    ///< words of types that mean nothing
+  std::int64_t steps_back = 0;  ///< events before an earlier one
+};
+
 /// What a word's meaning depends on: all that the words before it have said.
 struct WordState {
   std::optional<std::uint32_t> counter;  ///< the upper part of the time as stored, or all of it
   std::int64_t wraps = 0;                ///< of the counter
+  std::int64_t shift_us = 0;             ///< taken off all times
   std::uint32_t low_us = 0;              ///< EVT 3.0: the lower part
   std::optional<int> y;                  ///< EVT 3.0
   std::optional<int> vector_x;           ///< EVT 3.0: of the next vector's first pixel
   bool vector_on = false;
   bool is_second_camera = false;
-  std::int64_t last_us = 0;   ///< of the last event
-  std::int64_t left_out = 0;  ///< events before their time and place were told
+  std::int64_t last_us = 0;  ///< of the last event
+  WordCounts counts;
 };
 
-constexpr std::size_t kMostEventsPerWord = 12;
+constexpr std::size_t kMostEventsPerWord = 32;
 using WordEvents = std::array<StoredEvent, kMostEventsPerWord>;
 
-/// Takes a new value of a counter of so many bits. A fall is a wrap from its last sixteenth to its
-/// first, and nothing else.
+/// Takes a new value of a counter of so many bits. A fall of half its range or more is a wrap, as
+/// where words were lost around one; a smaller one is a step back.
 void count_on(WordState& state, std::uint32_t value, int bits) {
-  const std::uint64_t sixteenth = std::uint64_t{1} << (bits - 4);
-  if (state.counter && value < *state.counter) {
-    if (*state.counter < 15 * sixteenth || value >= sixteenth) {
-      throw EventFault(fmt::format("expected a time that goes on or wraps, got {} after {} of {}",
-                                   value, *state.counter, 16 * sixteenth));
-    }
-    ++state.wraps;
-  }
+  const std::uint64_t half = std::uint64_t{1} << (bits - 1);
+  if (state.counter && *state.counter >= value + half) ++state.wraps;
   state.counter = value;
 }
 
@@ -164,21 +174,14 @@ std::int64_t counted(const WordState& state, int bits) {
 }
 
 StoredEvent event_at(WordState& state, std::int64_t time_us, int x, int y, std::uint32_t on) {
-  if (time_us < state.last_us) {
-    throw EventFault(fmt::format("expected times that never decrease, got {} µs after {} µs",
-                                 time_us, state.last_us));
-  }
+  if (time_us < state.last_us) ++state.counts.steps_back;
   state.last_us = time_us;
-  return {static_cast<double>(x), static_cast<double>(y), static_cast<double>(time_us) / 1e6,
-          static_cast<double>(on)};
-}
-
-[[noreturn]] void refuse_word(std::uint32_t type, const char* encoding) {
-  throw EventFault(fmt::format("expected a word of {}, got one of type {}", encoding, type));
+  return {static_cast<double>(x), static_cast<double>(y),
+          static_cast<double>(time_us - state.shift_us) / 1e6, static_cast<double>(on)};
 }
 
 /// Each takes a word, and gives how many events it is.
-std::size_t take_dat(std::uint64_t word, WordState& state, WordEvents& events) {
+std::size_t take_dat(std::uint64_t word, WordState& state, bool /*shifts*/, WordEvents& events) {
   const auto address = static_cast<std::uint32_t>(word >> 32);
   count_on(state, static_cast<std::uint32_t>(word), 32);
   events[0] = event_at(state, counted(state, 32), static_cast<int>(address & 0x3fff),
@@ -186,33 +189,66 @@ std::size_t take_dat(std::uint64_t word, WordState& state, WordEvents& events) {
   return 1;
 }
 
-std::size_t take_evt2(std::uint32_t word, WordState& state, WordEvents& events) {
-  constexpr int kTimeBits = 28;
+constexpr int kEvt2TimeBits = 28;
+
+/// The upper part of a time in EVT 2.0 and 2.1, in 64 µs. Metavision's readers begin at the first.
+void take_evt2_time(std::uint32_t upper, WordState& state, bool shifts) {
+  if (shifts && !state.counter) state.shift_us = std::int64_t{upper} << 6;
+  count_on(state, upper, kEvt2TimeBits);
+}
+
+std::size_t take_evt2(std::uint32_t word, WordState& state, bool shifts, WordEvents& events) {
   const std::uint32_t type = word >> 28;
   switch (type) {
     case 0x0:
     case 0x1:
       if (!state.counter) {
-        ++state.left_out;
+        ++state.counts.left_out;
         return 0;
       }
       events[0] =
-          event_at(state, (counted(state, kTimeBits) << 6) + (word >> 22 & 0x3f),
+          event_at(state, (counted(state, kEvt2TimeBits) << 6) + (word >> 22 & 0x3f),
                    static_cast<int>(word >> 11 & 0x7ff), static_cast<int>(word & 0x7ff), type);
       return 1;
     case 0x8:
-      count_on(state, word & 0xfffffff, kTimeBits);
+      take_evt2_time(word & 0xfffffff, state, shifts);
       return 0;
     case 0xa:  // trigger
     case 0xe:  // others
     case 0xf:  // continued
       return 0;
     default:
-      refuse_word(type, "EVT 2.0");
+      ++state.counts.reserved;
+      return 0;
   }
 }
 
-std::size_t take_evt3(std::uint16_t word, WordState& state, WordEvents& events) {
+/// As EVT 2.0, with a bit for each of 32 pixels from x on.
+std::size_t take_evt21(std::uint64_t word, WordState& state, bool shifts, WordEvents& events) {
+  const auto valid = static_cast<std::uint32_t>(word);
+  const auto upper = static_cast<std::uint32_t>(word >> 32);
+  const std::uint32_t type = upper >> 28;
+  if (type > 0x1) return take_evt2(upper, state, shifts, events);
+  if (!state.counter) {
+    state.counts.left_out += std::popcount(valid);
+    return 0;
+  }
+  const std::int64_t time_us = (counted(state, kEvt2TimeBits) << 6) + (upper >> 22 & 0x3f);
+  std::size_t count = 0;
+  for (int i = 0; i < 32; ++i) {
+    if ((valid >> i & 1) == 0) continue;
+    events[count++] = event_at(state, time_us, static_cast<int>(upper >> 11 & 0x7ff) + i,
+                               static_cast<int>(upper & 0x7ff), type);
+  }
+  return count;
+}
+
+std::size_t take_evt21_legacy(std::uint64_t word, WordState& state, bool shifts,
+                              WordEvents& events) {
+  return take_evt21(word << 32 | word >> 32, state, shifts, events);
+}
+
+std::size_t take_evt3(std::uint16_t word, WordState& state, bool shifts, WordEvents& events) {
   constexpr int kTimeBits = 12;
   const std::uint32_t type = word >> 12;
   const int place = word & 0x7ff;
@@ -228,7 +264,7 @@ std::size_t take_evt3(std::uint16_t word, WordState& state, WordEvents& events) 
       return 0;
     case 0x2:
       if (!state.counter || !state.y) {
-        ++state.left_out;
+        ++state.counts.left_out;
         return 0;
       }
       events[0] = event_at(state, time_us(), place, *state.y, on);
@@ -244,7 +280,7 @@ std::size_t take_evt3(std::uint16_t word, WordState& state, WordEvents& events) 
       for (int i = 0; i < length; ++i) {
         if ((word >> i & 1) == 0) continue;
         if (!state.counter || !state.y || !state.vector_x) {
-          ++state.left_out;
+          ++state.counts.left_out;
           continue;
         }
         events[count++] =
@@ -261,6 +297,10 @@ std::size_t take_evt3(std::uint16_t word, WordState& state, WordEvents& events) 
       state.low_us = word & 0xfff;
       return 0;
     case 0x8:
+      // Metavision's readers begin one before the first.
+      if (shifts && !state.counter) {
+        state.shift_us = std::max<std::int64_t>((word & 0xfff) - 1, 0) << 12;
+      }
       // Said again every 16 µs; only a new one begins at its start.
       if (state.counter != (word & 0xfffu)) state.low_us = 0;
       count_on(state, word & 0xfff, kTimeBits);
@@ -271,7 +311,8 @@ std::size_t take_evt3(std::uint16_t word, WordState& state, WordEvents& events) 
     case 0xf:  // continued
       return 0;
     default:
-      refuse_word(type, "EVT 3.0");
+      ++state.counts.reserved;
+      return 0;
   }
 }
 
@@ -283,22 +324,50 @@ struct DecodingStart {
 
 class PropheseeEvents final : public EventParts {
  public:
-  PropheseeEvents(InputFile file, PropheseeEncoding encoding, std::int64_t first_byte)
-      : EventParts(file.name()), file_(std::move(file)), encoding_(encoding) {
-    if (const std::int64_t rest = (file_.end_byte() - first_byte) % word_bytes(); rest != 0) {
-      refuse_at(fmt::format("expected whole words of {} bytes, got {} more", word_bytes(), rest),
-                file_.name(), file_.end_byte() - rest);
-    }
-    for (DecodingStart start{first_byte, {}}; start.byte < file_.end_byte();) {
+  PropheseeEvents(InputFile file, PropheseeEncoding encoding, std::int64_t first_byte,
+                  ImageSize size, bool shifts)
+      : EventParts(file.name()),
+        file_(std::move(file)),
+        encoding_(encoding),
+        size_(size),
+        shifts_(shifts),
+        end_byte_(file_.end_byte() - (file_.end_byte() - first_byte) % word_bytes()) {
+    DecodingStart start{first_byte, {}};
+    while (start.byte < end_byte_) {
       const DecodingStart begin = start;
       CompactEvents events = decode(start);
       if (events.size() > 0) starts_.push_back(begin);
       add_part(std::move(events));
-      left_out_ = start.state.left_out;
     }
+    counts_ = start.state.counts;
+    shift_us_ = start.state.shift_us;
   }
 
-  std::int64_t left_out() const { return left_out_; }
+  /// What a user should know goes into `parts`, which has its name.
+  void tell(StoredParts& parts) const {
+    const auto note = [&](std::int64_t number, std::string_view what) {
+      if (number > 0) parts.notes.push_back(fmt::format("{}: {}, in {}", what, number, parts.name));
+    };
+    if (shift_us_ > 0) {
+      parts.notes.push_back(fmt::format(
+          "times count from the recording's start, as Metavision gives them: {:.6f} s are taken "
+          "off (\"time_shift\": false keeps the camera's), in {}",
+          static_cast<double>(shift_us_) / 1e6, parts.name));
+    }
+    note(counts_.left_out, "events before the first time and place are left out");
+    note(counts_.reserved, "words of reserved types are passed over");
+    note(file_.end_byte() - end_byte_, "bytes behind the last word are passed over");
+    note(counts_.steps_back, "events are before an earlier one, and their windows at fault");
+    constexpr double kMuch = 0.01;
+    const auto outside = static_cast<double>(counts_.outside);
+    const std::string beside = fmt::format("events beside the sensor of {} are left out: {}, in {}",
+                                           to_string(size_), counts_.outside, parts.name);
+    if (outside > kMuch * (outside + static_cast<double>(count()))) {
+      parts.warnings.push_back(beside + " (is \"sensor\" the camera's size?)");
+    } else if (outside > 0) {
+      parts.notes.push_back(beside);
+    }
+  }
 
  private:
   static constexpr std::int64_t kBytesPerPart = 1 << 17;
@@ -309,7 +378,14 @@ class PropheseeEvents final : public EventParts {
   }
 
   std::int64_t word_bytes() const {
-    return encoding_ == PropheseeEncoding::kDat ? 8 : encoding_ == PropheseeEncoding::kEvt2 ? 4 : 2;
+    switch (encoding_) {
+      case PropheseeEncoding::kEvt2:
+        return 4;
+      case PropheseeEncoding::kEvt3:
+        return 2;
+      default:
+        return 8;
+    }
   }
 
   /// Decodes a part from `start` on, which goes to where decoding goes on behind it.
@@ -319,6 +395,10 @@ class PropheseeEvents final : public EventParts {
         return decode_words<std::uint64_t>(start, take_dat);
       case PropheseeEncoding::kEvt2:
         return decode_words<std::uint32_t>(start, take_evt2);
+      case PropheseeEncoding::kEvt21:
+        return decode_words<std::uint64_t>(start, take_evt21);
+      case PropheseeEncoding::kEvt21Legacy:
+        return decode_words<std::uint64_t>(start, take_evt21_legacy);
       case PropheseeEncoding::kEvt3:
         break;
     }
@@ -328,7 +408,7 @@ class PropheseeEvents final : public EventParts {
   template <class Word, class TakeWord>
   CompactEvents decode_words(DecodingStart& start, TakeWord take_word) const {
     const std::string bytes =
-        file_.read_between(start.byte, std::min(start.byte + kBytesPerPart, file_.end_byte()));
+        file_.read_between(start.byte, std::min(start.byte + kBytesPerPart, end_byte_));
     CompactEvents result;
     WordEvents events;
     for (std::size_t i = 0; i < bytes.size(); i += sizeof(Word)) {
@@ -336,38 +416,31 @@ class PropheseeEvents final : public EventParts {
       std::memcpy(&word, bytes.data() + i, sizeof(word));
       std::size_t count = 0;
       try {
-        count = take_word(word, start.state, events);
+        count = take_word(word, start.state, shifts_, events);
       } catch (const EventFault& fault) {
         refuse_at(fault.what(), file_.name(), start.byte);
       }
       start.byte += sizeof(Word);
-      for (std::size_t k = 0; k < count; ++k) result.push_back(events[k]);
+      for (std::size_t k = 0; k < count; ++k) {
+        if (events[k].x < size_.width && events[k].y < size_.height) {
+          result.push_back(events[k]);
+        } else {
+          ++start.state.counts.outside;
+        }
+      }
     }
     return result;
   }
 
   InputFile file_;
   PropheseeEncoding encoding_;
+  ImageSize size_;
+  bool shifts_;
+  std::int64_t end_byte_;              ///< of the last whole word
   std::vector<DecodingStart> starts_;  ///< of the parts, which have events
-  std::int64_t left_out_ = 0;
+  WordCounts counts_;
+  std::int64_t shift_us_ = 0;
 };
-
-ImageSize sensor_size(const PropheseeHeader& header, const std::optional<ImageSize>& sensor,
-                      const std::string& name) {
-  if (header.width && header.height) {
-    const ImageSize size{*header.height, *header.width};
-    if (!sensor || *sensor == size) return size;
-    throw InputError(
-        fmt::format("expected the manifest's \"sensor\" to be {}, as the header says, "
-                    "got {}, in {}",
-                    to_string(size), to_string(*sensor), name));
-  }
-  if (sensor) return *sensor;
-  throw InputError(
-      "expected the sensor's size in the header, got none: write it into the manifest, \"sensor\": "
-      "{\"width\": ..., \"height\": ...}, in " +
-      name);
-}
 
 /// Whether the file begins with the header of a recording of Prophesee's.
 bool is_prophesee(const RecordingInput& input, const RecordingOptions&) try {
@@ -376,17 +449,25 @@ bool is_prophesee(const RecordingInput& input, const RecordingOptions&) try {
   return false;
 }
 
+/// A header of Prophesee's that tells what is not read.
+std::optional<RecordingFault> prophesee_fault(const RecordingInput& input,
+                                              const RecordingOptions&) try {
+  read_prophesee_header(input.beginning(), input.path().string());
+  return std::nullopt;
+} catch (const InputError& error) {
+  return RecordingFault{error.what(), /*is_recording=*/true};
+}
+
 }  // namespace
 
-StoredParts open_prophesee(const std::filesystem::path& path,
-                           const std::optional<ImageSize>& sensor) {
+StoredParts open_prophesee(const std::filesystem::path& path, const RecordingOptions& options) {
   InputFile file(path);
   PropheseeHeader header = read_prophesee_header(
       file.read_between(0, std::min(kMostHeaderBytes, file.end_byte())), file.name());
   if (!header.encoding) {
     throw InputError(
-        "expected a header \"% Data file containing ...\", \"% evt 2.0\" or \"% evt 3.0\", got "
-        "none, in " +
+        "expected a header \"% Data file containing ...\", \"% evt 2.0\", 2.1 or 3.0, got none, "
+        "in " +
         file.name());
   }
   if (header.encoding == PropheseeEncoding::kDat) {
@@ -403,14 +484,20 @@ StoredParts open_prophesee(const std::filesystem::path& path,
     }
     header.end_byte = end;
   }
-  StoredParts parts{file.name(), sensor_size(header, sensor, file.name()), nullptr};
-  auto events =
-      std::make_unique<PropheseeEvents>(std::move(file), *header.encoding, header.end_byte);
-  if (events->left_out() > 0) {
-    parts.notes.push_back(
-        fmt::format("events before the first time and place are left out: {}, in {}",
-                    events->left_out(), parts.name));
+  if (header.is_legacy) {
+    if (header.encoding != PropheseeEncoding::kEvt21) {
+      refuse_at("expected little-endian words, got others", file.name(), 0);
+    }
+    header.encoding = PropheseeEncoding::kEvt21Legacy;
   }
+  StoredParts parts{file.name(), {}, nullptr};
+  const bool is_told = header.width && header.height;
+  parts.size =
+      sensor_size(is_told ? std::optional(ImageSize{*header.height, *header.width}) : std::nullopt,
+                  options.sensor, parts);
+  auto events = std::make_unique<PropheseeEvents>(std::move(file), *header.encoding,
+                                                  header.end_byte, parts.size, options.time_shift);
+  events->tell(parts);
   parts.events = std::move(events);
   return parts;
 }
@@ -418,8 +505,10 @@ StoredParts open_prophesee(const std::filesystem::path& path,
 constinit const RecordingReader kPropheseeReader{
     .format = RecordingFormat::kProphesee,
     .fits = is_prophesee,
-    .open = [](const std::filesystem::path& path, const RecordingOptions& options) {
-      return make_stored_recording(open_prophesee(path, options.sensor));
-    }};
+    .open =
+        [](const std::filesystem::path& path, const RecordingOptions& options) {
+          return make_stored_recording(open_prophesee(path, options));
+        },
+    .fault = prophesee_fault};
 
 }  // namespace eventgan

@@ -1,5 +1,7 @@
 #include "stages/recordings/recording.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <stdexcept>
@@ -8,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "manifests/values/faults.h"
 #include "stages/base/files/input_file.h"
 #include "stages/base/hdf5/detail/hdf5.h"
 #include "stages/recordings/detail/recording_reader.h"
@@ -43,14 +46,14 @@ RecordingInput::RecordingInput(std::filesystem::path path) : path_(std::move(pat
   is_folder_ = std::filesystem::is_directory(path_, ignored);
   if (is_folder_) return;
   try {
-    std::string nobody_asks;
-    const auto file = InputFile::open(path_, nobody_asks);
-    if (!file) return;
-    beginning_ = file->read(0, std::min(file->size_bytes(), kBeginningBytes));
-    if (!has_hdf5_signature(*file)) return;
+    const InputFile file(path_);
+    beginning_ = file.read(0, std::min(file.size_bytes(), kBeginningBytes));
+    is_hdf5_ = has_hdf5_signature(file);
+    if (!is_hdf5_) return;
     const Hdf5Lock lock;
     hdf5_ = std::make_unique<Hdf5File>(Hdf5File{open_hdf5_file(path_)});
-  } catch (const std::runtime_error&) {  // reported when it is opened
+  } catch (const std::runtime_error&) {
+    error_ = std::current_exception();
   }
 }
 
@@ -59,6 +62,85 @@ RecordingInput::~RecordingInput() = default;
 bool RecordingInput::has_hdf5_object(const std::string& object) const {
   const Hdf5Lock lock;
   return hdf5_ && has_object(hdf5_->file, object);
+}
+
+std::vector<std::string> RecordingInput::hdf5_names() const {
+  std::vector<std::string> names;
+  if (!hdf5_) return names;
+  const Hdf5Lock lock;
+  H5G_info_t group;
+  if (H5Gget_info(hdf5_->file, &group) < 0) return names;
+  constexpr hsize_t kMost = 10;
+  for (hsize_t i = 0; i < std::min(group.nlinks, kMost); ++i) {
+    std::array<char, 64> name{};
+    H5Lget_name_by_idx(hdf5_->file, ".", H5_INDEX_NAME, H5_ITER_INC, i, name.data(), name.size(),
+                       H5P_DEFAULT);
+    names.emplace_back(name.data());
+  }
+  return names;
+}
+
+namespace {
+
+/// Files that are told by how they begin, but not read, and what makes others of them.
+struct ForeignKind {
+  std::string_view beginning;
+  std::string_view title;
+  std::string_view way_out;
+};
+constexpr std::array kForeignKinds{
+    ForeignKind{"#!AER-DAT", "AEDAT of another version than 4.0",
+                "jAER or dv-gui write AEDAT4 of it"},
+    ForeignKind{"#ROSBAG", "a bag of ROS", "write its events as a table of t, x, y and p (.npz)"},
+    ForeignKind{"\x89MCAP", "MCAP", "write its events as a table of t, x, y and p (.npz)"},
+    ForeignKind{"Event Stream", "an Event Stream (.es)",
+                "write its events as a table of t, x, y and p (.npz)"}};
+
+bool has_own_extension(const std::filesystem::path& path) {
+  constexpr std::array kExtensions{".h5", ".hdf5", ".aedat4", ".raw", ".dat"};
+  return std::ranges::find(kExtensions, path.extension()) != kExtensions.end();
+}
+
+}  // namespace
+
+RecordingFault recording_fault(const std::filesystem::path& path, const RecordingOptions& options) {
+  const RecordingInput input(path);
+  const auto fault = [&](bool is_recording, const std::string& got, const std::string& help = "") {
+    return RecordingFault{fmt::format("expected a recording of an event camera{}, got {}, in {}",
+                                      help.empty() ? "" : " (" + help + ")", got, path.string()),
+                          is_recording};
+  };
+  if (input.is_folder()) {
+    return fault(false,
+                 "a folder without events.txt and without events/" + options.camera + "/events.h5");
+  }
+  if (input.error()) {
+    try {
+      std::rethrow_exception(input.error());
+    } catch (const std::runtime_error& error) {
+      return fault(input.is_hdf5() || has_own_extension(path),
+                   fmt::format("a file that does not open ({})", error.what()));
+    }
+  }
+  for (const RecordingReader* reader : kRecordingReaders) {
+    if (!reader->fault) continue;
+    if (auto found = reader->fault(input, options)) return *std::move(found);
+  }
+  for (const ForeignKind& kind : kForeignKinds) {
+    if (!input.beginning().starts_with(kind.beginning)) continue;
+    return fault(true, std::string(kind.title), std::string(kind.way_out));
+  }
+  if (input.has_hdf5_object("CD/events")) {
+    return fault(true, "Metavision's HDF5, whose events are packed by ECF",
+                 "metavision_file_to_csv writes a table of it, which is read");
+  }
+  if (input.is_hdf5()) {
+    return fault(
+        false, fmt::format("HDF5 of another layout, with {}", fmt::join(input.hdf5_names(), ", ")));
+  }
+  std::vector<std::string_view> titles;
+  for (const RecordingFormatRow& row : kRecordingFormats) titles.push_back(row.title);
+  return fault(false, "a file of another kind", fmt::format("{}", fmt::join(titles, ", ")));
 }
 
 std::optional<RecordingFormat> find_recording_format(const std::filesystem::path& path,
@@ -91,11 +173,7 @@ std::unique_ptr<Recording> open_recording(const std::filesystem::path& path,
                                           std::optional<RecordingFormat> format,
                                           const RecordingOptions& options) {
   if (!format) format = find_recording_format(path, options);
-  if (!format) {  // reported when it is opened
-    std::error_code ignored;
-    format = std::filesystem::is_directory(path, ignored) ? RecordingFormat::kEcd
-                                                          : RecordingFormat::kMvsec;
-  }
+  if (!format) throw InputError(recording_fault(path, options).reason);
   return reader_of(*format).open(path, options);
 }
 

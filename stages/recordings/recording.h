@@ -69,6 +69,9 @@ class Recording {
   /// What a user should know of the recording, a line each: what was found on opening it, and in
   /// the frames read since then.
   virtual std::vector<std::string> notes() const { return {}; }
+
+  /// What had better be read before anything is made of it, a line each: not in the notes.
+  virtual std::vector<std::string> warnings() const { return {}; }
 };
 
 /// What lies at `path`, told by what is in it: a folder with events.txt (or this file) is ECD's,
@@ -77,6 +80,16 @@ class Recording {
 /// that. The first format of kRecordingFormats that fits counts.
 std::optional<RecordingFormat> find_recording_format(const std::filesystem::path& path,
                                                      const RecordingOptions& options = {});
+
+/// Why what lies at a path is no recording that can be read.
+struct RecordingFault {
+  std::string reason;         ///< "expected X, got Y, in PATH", and what helps
+  bool is_recording = false;  ///< it is one, but damaged, locked, or of a kind that is not read
+};
+
+/// Of what find_recording_format gives none.
+RecordingFault recording_fault(const std::filesystem::path& path,
+                               const RecordingOptions& options = {});
 
 /// The file with the events of the recording at `path`, which stands for it: of ECD's folder the
 /// events.txt, of DSEC's the events.h5; of others it is `path`.

@@ -1,8 +1,11 @@
 #include "stages/recordings/detail/stored_recording.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <mutex>
 #include <string>
 #include <utility>
 
@@ -22,13 +25,46 @@ namespace {
 
 constexpr std::int64_t kEventsPerRead = std::int64_t{1} << 17;
 
+}  // namespace
+
+EventOrder EventStore::order() const {
+  EventOrder order;
+  for (std::int64_t first = 0; first < count(); first += kEventsPerRead) {
+    const std::int64_t events = std::min(kEventsPerRead, count() - first);
+    try {
+      order.add_all(times_s(first, events), first);
+    } catch (const InputError&) {
+      order.add_unreadable(std::current_exception());
+      order.end_block(first + events);
+    }
+  }
+  return order;
+}
+
+ImageSize sensor_size(const std::optional<ImageSize>& told, const std::optional<ImageSize>& given,
+                      StoredParts& parts) {
+  if (!told && !given) {
+    throw InputError(
+        "expected the sensor's size in the file, or \"sensor\": {\"width\": ..., \"height\": ...} in "
+        "the manifest, got none, in " +
+        parts.name);
+  }
+  if (told && given && *told != *given) {
+    parts.warnings.push_back(fmt::format(
+        "the file tells a sensor of {}, the manifest's \"sensor\" is {}, which counts, in {}",
+        to_string(*told), to_string(*given), parts.name));
+  }
+  return given ? *given : *told;
+}
+
+namespace {
+
 class StoredRecording final : public Recording {
  public:
   explicit StoredRecording(StoredParts parts)
       : parts_(std::move(parts)),
         event_count_(parts_.events->count()),
-        frame_times_s_(parts_.frames ? parts_.frames->times_s() : std::vector<double>()),
-        boundaries_(frame_times_s_.size()) {
+        frame_times_s_(parts_.frames ? parts_.frames->times_s() : std::vector<double>()) {
     if (parts_.frames) check_frame_times(frame_times_s_, parts_.name);
   }
 
@@ -41,6 +77,8 @@ class StoredRecording final : public Recording {
     if (parts_.frames) std::ranges::move(parts_.frames->notes(), std::back_inserter(notes));
     return notes;
   }
+
+  std::vector<std::string> warnings() const override { return parts_.warnings; }
 
   double frame_time_s(std::int64_t index) const override {
     return frame_times_s_[frame_position(index, frame_count(), name())];
@@ -59,73 +97,71 @@ class StoredRecording final : public Recording {
   std::vector<Event> events_between(std::int64_t first_frame,
                                     std::int64_t last_frame) const override {
     const auto [first, last] = frame_range(first_frame, last_frame, frame_count(), name());
-    return read_events(events_until(first), events_until(last),
-                       EventCheck(size(), frame_times_s_[first], frame_times_s_[last]));
+    if (first == last) return {};
+    return events_in(frame_times_s_[first], frame_times_s_[last]);
   }
 
   std::vector<Event> events_in(double after_s, double until_s) const override {
-    return read_events(events_until_time(after_s), events_until_time(until_s),
+    require_order(after_s, until_s);
+    return read_events(events_until(after_s), events_until(until_s),
                        EventCheck(size(), after_s, until_s));
   }
 
   std::vector<Event> events_around(double time_s, std::int64_t before,
                                    std::int64_t after) const override {
-    const std::int64_t middle = events_until_time(time_s);
-    return read_events(std::max<std::int64_t>(middle - before, 0),
-                       middle + std::min(after, event_count_ - middle),
-                       EventCheck::of_any_time(size()));
+    require_order(time_s, time_s);
+    const std::int64_t middle = events_until(time_s);
+    const std::int64_t begin = std::max<std::int64_t>(middle - before, 0);
+    const std::int64_t end = middle + std::min(after, event_count_ - middle);
+    if (begin < end) {  // events of these times may lie elsewhere
+      const auto first_s = parts_.events->times_s(begin, 1)[0];
+      const auto last_s = parts_.events->times_s(end - 1, 1)[0];
+      require_order(std::min(first_s, time_s), std::max(last_s, time_s));
+    }
+    return read_events(begin, end, EventCheck::of_any_time(size()));
   }
 
   std::optional<std::array<double, 2>> event_span() const override {
     if (event_count_ == 0) return std::nullopt;
-    return std::array{event_times(0, 1)[0], event_times(event_count_ - 1, 1)[0]};
+    for (const std::int64_t event : {std::int64_t{0}, event_count_ - 1}) {
+      const double time_s = parts_.events->times_s(event, 1)[0];
+      try {
+        check_event_time(time_s, time_s);
+      } catch (const EventFault& fault) {
+        refuse(fault, event);
+      }
+    }
+    return order().span();
   }
 
  private:
-  std::int64_t events_until(std::size_t frame) const {
-    return boundaries_.at(frame, [&] {
-      const std::vector<std::int64_t>& index = parts_.event_index;
-      const double time_s = frame_times_s_[frame];
-      return search(time_s, index.empty() ? parts_.events->near(time_s).value_or(event_count_ / 2)
-                                          : index[frame]);
-    });
+  const EventOrder& order() const {
+    std::call_once(order_once_, [&] { order_ = parts_.events->order(); });
+    return order_;
   }
 
-  /// Unless the events tell, the frame before tells where to look first.
-  std::int64_t events_until_time(double time_s) const {
-    if (const auto near = parts_.events->near(time_s)) return search(time_s, *near);
-    if (frame_times_s_.empty()) return search(time_s, event_count_ / 2);
-    const auto next = std::ranges::upper_bound(frame_times_s_, time_s);
-    if (next == frame_times_s_.begin()) return search(time_s, 0);
-    return search(time_s,
-                  events_until(static_cast<std::size_t>(next - frame_times_s_.begin()) - 1));
-  }
-
-  std::int64_t search(double time_s, std::int64_t guess) const {
-    return count_events_until(
-        time_s, guess, event_count_,
-        [&](std::int64_t begin, std::int64_t count) { return event_times(begin, count); });
-  }
-
-  std::vector<double> event_times(std::int64_t first, std::int64_t count) const {
-    std::vector<double> times = parts_.events->times_s(first, count);
-    // Among times out of order a search would find a wrong place and nobody would know.
-    std::size_t at = 0;
+  /// Throws InputError if events of this time may lie elsewhere than among the others of it.
+  void require_order(double after_s, double until_s) const {
+    const EventOrder::Fall* const fall = order().fall_in(after_s, until_s);
+    if (fall == nullptr) return;
     try {
-      for (; at < times.size(); ++at) check_event_time(times[at == 0 ? 0 : at - 1], times[at]);
+      refuse_fall(*fall);
     } catch (const EventFault& fault) {
-      refuse(fault, first + static_cast<std::int64_t>(at));
+      refuse(fault, fall->place);
     }
-    return times;
+  }
+
+  /// How many events are at or before a time, at which no time falls.
+  std::int64_t events_until(double time_s) const {
+    const auto [begin, end] = order().block_after(time_s);
+    const std::vector<double> times = parts_.events->times_s(begin, end - begin);
+    const auto later = std::ranges::find_if(times, [&](double t_s) { return t_s > time_s; });
+    return begin + (later - times.begin());
   }
 
   std::vector<Event> read_events(std::int64_t begin, std::int64_t end, EventCheck check) const {
-    if (end < begin) {
-      throw InputError("expected times that never decrease, got others, in " + name() +
-                       " (events " + std::to_string(end) + ".." + std::to_string(begin) + ")");
-    }
     std::vector<Event> events;
-    events.reserve(static_cast<std::size_t>(end - begin));
+    events.reserve(static_cast<std::size_t>(std::max<std::int64_t>(end - begin, 0)));
     std::int64_t next = begin;
     try {
       while (next < end) {
@@ -150,7 +186,8 @@ class StoredRecording final : public Recording {
   StoredParts parts_;
   std::int64_t event_count_;
   std::vector<double> frame_times_s_;
-  EventBoundaries boundaries_;
+  mutable std::once_flag order_once_;
+  mutable EventOrder order_;
 };
 
 }  // namespace

@@ -6,10 +6,12 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <string_view>
 #include <type_traits>
 #include <utility>
 
+#include "manifests/values/outlines.h"
 #include "manifests/values/placement.h"
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/shard_tables.h"
@@ -85,6 +87,15 @@ class SourceToVolume {
 std::array<double, 4> cut(Row box, const std::array<double, 4>& area) {
   return {std::clamp(box[0], area[0], area[2]), std::clamp(box[1], area[1], area[3]),
           std::clamp(box[2], area[0], area[2]), std::clamp(box[3], area[1], area[3])};
+}
+
+/// Whether an outline in float32, which lies within `outline`, and a box touch.
+bool meet(const Rectangle& outline, const Rectangle& box) {
+  const auto before = [](double a, double b) {
+    return a <= b + kTolerance_px + std::numeric_limits<float>::epsilon() * std::abs(a);
+  };
+  return before(outline.left, box.right) && before(box.left, outline.right) &&
+         before(outline.top, box.bottom) && before(box.top, outline.bottom);
 }
 
 /// The rows of one sample in the columns of floats that a shard has.
@@ -223,6 +234,16 @@ std::vector<std::string> label_faults(const ShardHeader& header, const ShardTabl
     if (class_id < 0 || class_id >= static_cast<int>(header.label_schema.class_names.size())) {
       faults.push_back("expected class_id of box " + std::to_string(i) + " to have a name, got " +
                        std::to_string(class_id));
+    }
+    const auto row = static_cast<std::size_t>(tables.boxes.offsets[std::size_t(slot)]) + i;
+    const bool has_outline = !tables.boxes.outline.empty() && !tables.boxes.outline[row].empty();
+    if (!has_outline) continue;
+    const std::string name = "outline of box " + std::to_string(i);
+    const VolumeBox& box = sample.labels.boxes[i];
+    if (box.outline.empty()) {
+      faults.push_back("expected " + name + " to be rings of corners as JSON, got another text");
+    } else if (!meet(bounds(box.outline), box.unclipped)) {
+      faults.push_back("expected " + name + " to lie over xyxy_unclipped, got another place");
     }
   }
 

@@ -19,8 +19,8 @@ Rectangle shown_area(const ShardSample& sample, ImageSize volume);
 /// What is wrong with the labels of the sample in `slot`, which `sample` is, by the rules of the
 /// columns (ColumnSpec): a number that is not finite; what is not as source_to_volume makes it of
 /// its annotation (more than 0.01 px off); a clipped box that is not the unclipped one cut to the
-/// shown_area; a motion of a pair that is no still's. Texts without the file's name; empty if
-/// sound.
+/// shown_area; an outline that is no outline's text, or lies apart from its box; a motion of a pair
+/// that is no still's. Texts without the file's name; empty if sound.
 std::vector<std::string> label_faults(const ShardHeader& header, const ShardTables& tables,
                                       int slot, const ShardSample& sample);
 

@@ -10,7 +10,10 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "manifests/values/outlines.h"
 
 namespace eventgan {
 namespace {
@@ -141,6 +144,9 @@ void append_box(const Box& box, const VolumeBox& mapped, const std::optional<Ima
   to.track_id.push_back(box.track_id);
   const auto difficulty = static_cast<std::int8_t>(box.difficulty);
   put<std::int8_t>(to.difficulty, {&difficulty, difficulty < 0 ? 0u : 1u}, 1, row, -1);
+  const std::string text = outline_text(mapped.outline);
+  const std::vector<char> outline(text.begin(), text.end());
+  put<std::vector<char>>(to.outline, {&outline, outline.empty() ? 0u : 1u}, 1, row, {});
   put(to.motion, motion, row);
 }
 
@@ -340,6 +346,26 @@ Box annotated_box(const BoxColumns& from, std::size_t row) {
   return box;
 }
 
+/// Empty if there is none, or no outline's text.
+Outline outline_at(const BoxColumns& from, std::size_t row) {
+  if (from.outline.empty()) return {};
+  const std::vector<char>& text = from.outline[row];
+  return read_outline({text.data(), text.size()}).value_or(Outline());
+}
+
+/// An outline in the volume back in the source, as edges map; empty if the map is not known.
+Outline to_source(Outline outline, const std::array<double, 6>& source_to_volume) {
+  const double scale_x = source_to_volume[0], scale_y = source_to_volume[4];
+  if (!(scale_x > 0 && scale_y > 0)) return {};
+  for (auto& ring : outline.rings) {
+    for (Point& corner : ring) {
+      corner = {(corner.x - 0.5 - source_to_volume[2]) / scale_x + 0.5,
+                (corner.y - 0.5 - source_to_volume[5]) / scale_y + 0.5};
+    }
+  }
+  return outline;
+}
+
 Person annotated_person(const PoseColumns& from, std::size_t joints, std::size_t row) {
   Person person;
   for (std::size_t j = row * joints; j < (row + 1) * joints; ++j) {
@@ -408,10 +434,16 @@ ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, in
   rows_of(tables.boxes.offsets, [&](std::size_t k) {
     const BoxColumns& boxes = tables.boxes;
     sample.annotation.boxes.push_back(annotated_box(boxes, k));
-    if (!boxes.motion.empty()) sample.pair.objects.push_back(motion_if_any(boxes.motion, k));
-    sample.labels.boxes.push_back(
-        {box_at(boxes.xyxy, k), box_at(boxes.xyxy_unclipped, k), boxes.ignore[k] != 0});
+    sample.labels.boxes.push_back({box_at(boxes.xyxy, k), box_at(boxes.xyxy_unclipped, k),
+                                   boxes.ignore[k] != 0, outline_at(boxes, k)});
+    sample.annotation.boxes.back().outline =
+        to_source(sample.labels.boxes.back().outline, sample.source_to_volume);
+    if (const auto motion = motion_if_any(boxes.motion, k)) {
+      sample.pair.objects.resize(sample.annotation.boxes.size());
+      sample.pair.objects.back() = motion;
+    }
   });
+  if (!sample.pair.objects.empty()) sample.pair.objects.resize(sample.annotation.boxes.size());
   const std::size_t joints = header.label_schema.joint_names.size();
   rows_of(tables.poses.offsets, [&](std::size_t k) {
     sample.annotation.persons.push_back(annotated_person(tables.poses, joints, k));

@@ -11,7 +11,9 @@ namespace eventgan {
 /// annotation is kept of it.
 void append_row(const ShardHeader& header, const ShardSample& sample, ShardTables& tables);
 
-/// Row `slot` as it was appended. The tables must be consistent, as ShardReader sees to.
+/// Row `slot` as it was appended. Outlines are in float32, and those of the annotated boxes are
+/// mapped back from the volume; what label_faults finds to be no outline is left out. The tables
+/// must be consistent, as ShardReader sees to.
 ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, int slot);
 
 }  // namespace eventgan

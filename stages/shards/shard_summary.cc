@@ -98,9 +98,12 @@ void describe_boxes(const ShardHeader& header, const ShardSample& sample, Lines&
   for (std::size_t i = 0; i < sample.annotation.boxes.size(); ++i) {
     const Box& box = sample.annotation.boxes[i];
     const VolumeBox& mapped = sample.labels.boxes[i];
-    line(fmt::format("box {}", i), "{} {}, source {}{}{}",
+    std::size_t corners = 0;
+    for (const auto& ring : mapped.outline.rings) corners += ring.size();
+    line(fmt::format("box {}", i), "{} {}, source {}{}{}{}",
          header.label_schema.class_names.at(static_cast<std::size_t>(box.class_id)),
          text_of(mapped.clipped), text_of(box.xyxy),
+         corners > 0 ? fmt::format(", outline of {} corners", corners) : "",
          box.track_id >= 0 ? fmt::format(", track {}", box.track_id) : "",
          mapped.ignore ? ", ignore" : "");
   }

@@ -56,7 +56,8 @@ struct BoxColumns {
   std::vector<float> alpha, box3d;
   std::vector<std::uint8_t> ignore, ignore_source;
   std::vector<std::int64_t> track_id;
-  std::vector<std::int8_t> difficulty;  ///< this and the next: empty as long as no box has one
+  std::vector<std::int8_t> difficulty;     ///< this and the next: empty as long as no box has one
+  std::vector<std::vector<char>> outline;  ///< bytes
   std::vector<double> motion;
 };
 
@@ -214,6 +215,7 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   visit(ColumnSpec{"/labels/boxes/ignore_source", kBoxes}, b.ignore_source);
   visit(ColumnSpec{"/labels/boxes/track_id", kBoxes}, b.track_id);
   visit(ColumnSpec{"/labels/boxes/difficulty", kBoxes, {}, kAny, {}, "difficulty"}, b.difficulty);
+  visit(ColumnSpec{"/labels/boxes/outline", kBoxes, {}, kAny, {}, "outlines"}, b.outline);
   visit(ColumnSpec{"/labels/boxes/motion", kBoxes, {4}, kFiniteOrNone, {}, "object_motion"},
         b.motion);
 

@@ -42,6 +42,28 @@ def slice_dsec(file, begin_us, end_us):
     return [file[f"events/{name}"][inside].astype(np.int64) + (offset if name == "t" else 0) for name in "txyp"]
 
 
+def decode_evt3(data):
+    """Height and width, and t, x, y, p of a RAW file of short silences, as the page of EVT 3.0 describes it."""
+    header, words = data.split(b"% end\n", 1)
+    height, width = (int(header.split(key, 1)[1].split(end, 1)[0])
+                     for key, end in ((b"height=", b";"), (b"width=", b"\n")))
+    words = np.frombuffer(words, "<u2").astype(np.int64)
+
+    def last(kind, value):
+        """What the last word of a kind told, at each word."""
+        at = np.where(words >> 12 == kind, np.arange(len(words)), 0)
+        return np.maximum.accumulate(at), value[np.maximum.accumulate(at)]
+
+    at_high, _ = last(8, words)
+    highs = words[words >> 12 == 8] & 0xfff
+    high = (highs + 4096 * np.cumsum(np.diff(highs, prepend=0) < 0))[np.cumsum(words >> 12 == 8) - 1]
+    at_low, low = last(6, words & 0xfff)
+    t = (high << 12) + np.where(at_low > at_high, low, 0)
+    events = words >> 12 == 2
+    return (height, width), (t[events], words[events] & 0x7ff, last(0, words & 0x7ff)[1][events],
+                             words[events] >> 11 & 1)
+
+
 class RvtSequence:
     """What RVT's SequenceBase and ObjectLabelFactory make of a sequence; their assertions stay."""
 
@@ -203,7 +225,11 @@ class Recordings(Export):
                                         generator={"kind": "difference"})))
         run("convert", manifest, "--progress", "none")
         run("finalize", manifest.parent / "out")
-        self.export("dsec", source=manifest.parent / "out")
+        said, _ = self.export("dsec", source=manifest.parent / "out")
+        self.assertIn("3 samples are of images without times: their clock counts 1 frame a second", said)
+        self.assertEqual(len(self.described()["notes"]), 1)
+        said, _ = self.export("dsec", source=manifest.parent / "out")  # which is done
+        self.assertIn("images without times", said)
         recording, = (self.out / "dsec" / "train").iterdir()
         self.assertEqual(recording.name, "a%20b")
         windows = read_windows(recording / "windows.txt")
@@ -213,6 +239,21 @@ class Recordings(Export):
                           for key, sample in found.items()})
         self.assertGreater(len(windows), 1)
         self.assertFalse((recording / "object_detections").exists())
+
+    def test_every_tenth_frame_of_25_a_second(self):
+        root = self.out.parent / "frames"
+        for k in (30, 40, 50, 60):
+            small_job.save_image(root / "clip" / f"{k:04d}.png", np.random.default_rng(k))
+        manifest = self.out.parent / "manifest.json"
+        manifest.write_text(
+            json.dumps(program.manifest([{"dataset": "frames", "root": str(root), "pairs": program.pairs([1])}],
+                                        generator={"kind": "difference"})))
+        run("convert", manifest, "--progress", "none")
+        run("finalize", manifest.parent / "out")
+        said, _ = self.export("raw", "--frames-per-second", "25", source=manifest.parent / "out")
+        self.assertIn("25 frames a second", said)
+        windows = read_windows(self.out / "raw" / "train" / "clip_windows.txt")
+        self.assertEqual([window[:2] for window in windows], [(0, 40000), (40000, 80000), (80000, 120000)])
 
     def test_a_folder_of_images_is_one_sequence(self):
         root = self.out.parent / "clip"
@@ -284,6 +325,24 @@ class Recordings(Export):
         self.assertEqual(left_out.get("boxes within the last pixel, where RVT's frame ends (in raw alone)", 0),
                          kept - in_frame)
         self.assertEqual(left_out.get("samples of recordings without boxes (in raw alone)", 0), unlabelled)
+
+    def test_raw_has_the_events_and_boxes_of_rvt(self):
+        rvt, raw = self.out / "rvt", self.out / "raw"
+        self.export("rvt", source=self.source, out=rvt)
+        self.export("raw", source=self.source, out=raw)
+        recordings = sorted((rvt / "raw").glob("*/*_td.h5"))
+        self.assertGreater(len(recordings), 2)
+        for path in recordings:
+            split, name = path.parent.name, path.name.removesuffix("_td.h5")
+            size, (t, x, y, p) = decode_evt3((raw / "raw" / split / f"{name}.raw").read_bytes())
+            with h5py.File(path) as file:
+                self.assertEqual(size, (file["events/height"][()], file["events/width"][()]))
+                for column, found in (("t", t), ("x", x), ("y", y), ("p", p)):
+                    np.testing.assert_array_equal(found, file[f"events/{column}"][:])
+            for ending in ("_bbox.npy", "_windows.txt"):
+                of_rvt, of_raw = path.with_name(name + ending), raw / "raw" / split / (name + ending)
+                self.assertEqual(of_rvt.read_bytes() if of_rvt.exists() else b"",
+                                 of_raw.read_bytes() if ending == "_windows.txt" or len(np.load(of_raw)) else b"")
 
     def test_rvt_names_files_of_gen1_as_its_preprocessing_does_and_leaves_no_bbox_in_a_name(self):
         manifest = self.out.parent / "manifest.json"

@@ -399,6 +399,19 @@ class TrainedWeights(program.InFolder):
         run("fit", clip, "--out", self.folder / "none" / "x.json", expect=66)
         run("fit", self.folder / "none.hdf5", expect=66)
 
+    def test_what_tells_nothing_leaves_a_good_document_as_it_is(self):
+        quiet, document = self.folder / "quiet.hdf5", self.folder / "sim.json"
+        shutil.copyfile(work / "recordings" / "clip.hdf5", quiet)
+        run("fit", quiet, "--name", "sim", "--out", document)
+        good = document.read_bytes()
+        with h5py.File(quiet, "a") as file:
+            events = file["davis/left/events"][:0]
+            del file["davis/left/events"]
+            file["davis/left/events"] = events
+        out, err = run("fit", quiet, "--name", "sim", "--out", document, expect=66)
+        self.assertIn("got none", err)
+        self.assertEqual(document.read_bytes(), good)
+
 
 if __name__ == "__main__":
     program.main()

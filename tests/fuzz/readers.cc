@@ -276,7 +276,7 @@ void read_prophesee_input(std::span<const std::uint8_t> input,
                           const std::filesystem::path& scratch) {
   std::ofstream(scratch, std::ios::binary) << text_of(input);
   try {
-    read_parts(open_prophesee(scratch, std::nullopt));
+    read_parts(open_prophesee(scratch));
   } catch (const InputError&) {
   }
 }

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from . import evaluate, reconstruction, shards, torch
     from .generator import Generator, sample_events
+    from .outlines import mask, rings
     from .plotting import show
     from .program import ProgramError, convert, init, open
     from .representations import signed_channel
@@ -31,7 +32,7 @@ _MODULE_OF = {
     "Generator": "generator", "sample_events": "generator",
     "FIELDS": "shards", "InvalidSample": "shards", "Sample": "shards", "Shards": "shards", "open_shard": "shards",
     "read_description": "shards", "ProgramError": "program", "convert": "program", "init": "program", "open": "program",
-    "show": "plotting", "signed_channel": "representations",
+    "mask": "outlines", "rings": "outlines", "show": "plotting", "signed_channel": "representations",
 }
 _MODULES = ("evaluate", "reconstruction", "shards", "torch")
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from .outlines import rings
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -67,7 +69,7 @@ def show(volume: npt.ArrayLike | Mapping[str, Any], boxes: npt.ArrayLike | None 
     ----------
     volume : array_like, float [2B, H, W], or dict
         A volume; or a sample of `Shards` or of `Generator.sample`, which is drawn with its labels: a colour for each
-        class, ignored boxes dashed, hidden joints hollow.
+        class, ignored boxes dashed, outlines thin, hidden joints hollow.
     boxes : array_like, [n, 4], optional
         Instead of a sample's: left, top, right, bottom in volume pixels, by edges; the whole volume is 0, 0, W, H.
     joints : array_like, [J, 2] or [P, J, 2], optional
@@ -98,7 +100,9 @@ def show(volume: npt.ArrayLike | Mapping[str, Any], boxes: npt.ArrayLike | None 
         ax = matplotlib.pyplot.subplots(figsize=(max(size * width, 2), max(size * height, 2)), layout="constrained")[1]
     ax.imshow(image, interpolation="nearest")
     ax.set_axis_off()
-    for (left, top, right, bottom), colour, ignore in _boxes_of(sample, boxes):
+    for (left, top, right, bottom), colour, ignore, outline in _boxes_of(sample, boxes):
+        for ring in rings(outline):
+            ax.add_patch(matplotlib.patches.Polygon(ring - 0.5, fill=False, edgecolor=np.divide(colour, 255)))
         # Pixel centres are whole numbers: the left edge of pixel x is half a pixel left of it.
         place = {"xy": (left - 0.5, top - 0.5), "width": right - left, "height": bottom - top, "fill": False}
         if ignore:
@@ -114,8 +118,8 @@ def show(volume: npt.ArrayLike | Mapping[str, Any], boxes: npt.ArrayLike | None 
 
 
 def _boxes_of(sample: Mapping[str, Any],
-              boxes: npt.ArrayLike | None) -> Iterator[tuple[np.ndarray, tuple[int, int, int], bool]]:
-    """Box [4], colour, and whether it is ignored; ignored ones first, so that they never cover an object."""
+              boxes: npt.ArrayLike | None) -> Iterator[tuple[np.ndarray, tuple[int, int, int], bool, bytes]]:
+    """Box [4], colour, whether it is ignored, and outline; ignored ones first, so that they never cover an object."""
     rows = sample.get("boxes", {}) if boxes is None else {}
     xyxy = np.asarray(rows.get("xyxy", []) if boxes is None else boxes, float)
     if xyxy.size and (xyxy.ndim != 2 or xyxy.shape[1] != 4):
@@ -124,7 +128,8 @@ def _boxes_of(sample: Mapping[str, Any],
     ignore = np.asarray(rows.get("ignore", np.zeros(len(xyxy)))) != 0
     numbers = np.maximum(rows.get("class_id", np.zeros(len(xyxy), int)), 0)
     for i in np.argsort(~ignore, kind="stable"):
-        yield xyxy[i], IGNORED if ignore[i] else CLASSES[numbers[i] % len(CLASSES)], bool(ignore[i])
+        colour = IGNORED if ignore[i] else CLASSES[numbers[i] % len(CLASSES)]
+        yield xyxy[i], colour, bool(ignore[i]), rows["outline"][i] if "outline" in rows else b""
 
 
 def _joints_of(sample: Mapping[str, Any], joints: npt.ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:

@@ -16,9 +16,11 @@ from typing import Any, NamedTuple, Union
 import h5py
 import numpy as np
 
+from .outlines import mask
+
 FORMAT, FORMAT_VERSION = "eventgan-shard", "1.0"
-FEATURES = frozenset(("tiles", "times", "origin", "motion", "threshold", "projection", "difficulty", "person_boxes",
-                      "joints3d", "camera", "joint_aliases"))
+FEATURES = frozenset(("tiles", "times", "origin", "motion", "threshold", "projection", "difficulty", "outlines",
+                      "object_motion", "person_boxes", "joints3d", "camera", "joint_aliases"))
 PLAN = "plan.json"
 DESCRIPTION, DESCRIPTION_FORMAT, DESCRIPTION_VERSION = "dataset.json", "eventgan-dataset", "1.0"
 VIEW = "dataset.h5"
@@ -179,7 +181,8 @@ class Shards(Sequence):
             pair : everything of /pairs: texts, numbers, `source_to_volume` [2, 3]; KITTI's `projection` [3, 4]
             statistics : everything of /events/statistics, eta98, and `tiles` [R, C] if the scope is a part;
                 flags as int64, since PyTorch has no uint32
-            boxes : arrays with a row for each box: xyxy [n, 4] in volume pixels, class_id, ignore...
+            boxes : arrays with a row for each box: xyxy [n, 4] in volume pixels, class_id, ignore...; `outline`, bytes
+                each, where a box of the shard has one (see `masks`)
             persons : arrays with a row for each person: joints [n, J, 2] in volume pixels, visible, center...
             original : bytes, the annotation as the dataset holds it
             valid, shard, slot : always there: bool; where it comes from
@@ -221,6 +224,44 @@ class Shards(Sequence):
         for change in changes:
             sample["volume"] = np.asarray(change(sample), np.float32)
         return {**sample, "valid": valid, "shard": str(path), "slot": slot}
+
+    def masks(self, index: int) -> np.ndarray:
+        """What the outlines of a sample's boxes cover of what the volume shows of the image.
+
+        Parameters
+        ----------
+        index : int
+
+        Returns
+        -------
+        numpy.ndarray
+            bool [n, H, W], the masks of all boxes in their order; all False of a box without an outline. Masks may
+            overlap.
+
+        Raises
+        ------
+        IndexError
+            There is no such sample.
+        InvalidSample
+            It is quarantined, and `invalid` is "raise".
+        """
+        boxes = self.sample(index, {"boxes"})["boxes"]
+        path, slot = self._place(index)
+        file = self._files[path]
+        masks = np.zeros((len(boxes["xyxy"]), *file.size), bool)
+        if not any(boxes.get("outline", ())):
+            return masks
+        one = self[[index]]
+        one.paths, one._shard = [path], np.zeros(1, np.int32)  # looks into no other shard
+        area = one.image_area() if np.isfinite(file.column("pairs/source_to_volume")[slot]).all() else None
+        for k, outline in enumerate(boxes["outline"]):
+            masks[k] = mask(outline, file.size)
+        if area is not None:
+            left, top, right, bottom = np.ceil(area - 0.5).astype(int)  # of the first pixels whose centres are beyond
+            shown = np.zeros(file.size, bool)
+            shown[top:bottom, left:right] = True
+            masks &= shown
+        return masks
 
     def column(self, name: str) -> np.ndarray:
         """A column of /pairs for every sample, read without volumes or boxes.
@@ -543,7 +584,10 @@ class _OpenShard:
 
     def rows(self, group: str, slot: int) -> Sample:
         first, last = self.column(group + "/offsets")[slot : slot + 2]
-        return {name: column[first:last] for name, column in self._group(group) if name != "offsets"}
+        rows = {name: column[first:last] for name, column in self._group(group) if name != "offsets"}
+        if "outline" in rows:
+            rows["outline"] = np.array([each.tobytes() for each in rows["outline"]], object)
+        return rows
 
     def names(self, item: str, attribute: str) -> list[str]:
         names = self._kept.names

@@ -16,6 +16,7 @@ import json
 import math
 import os
 import pathlib
+import subprocess
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -27,6 +28,8 @@ import torch
 import train_detector
 import training
 from eventgan import Generator, Shards, convert, signed_channel
+from eventgan.detection_scores import overlapping
+from eventgan.outlines import mask
 from eventgan.torch import DetectionDataset
 
 STILLS, CLIPS = ("pennfudan", "coco256", "voc100"), ("sot_person", "davis_tennis")
@@ -44,7 +47,7 @@ class Source:
     or what is made of the pairs that were converted for another."""
 
     generator: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    # a signed channel, of a sample of EventGAN 16's
+    # a signed channel, of a sample of EventGAN 16's, with layers of that one's
     of_pair: Callable[[argparse.Namespace, Mapping[str, Any]], np.ndarray] | None = None
     normalize: str = "none"
     motion_px: float = MOTION_PX
@@ -52,6 +55,12 @@ class Source:
     # the sensor has so many times the size's lines and columns; events are averaged down, as a camera's are before a
     # detector
     finer: int = 1
+    # photographs in layers: each object moves on its own, over a background that rests in half of them
+    layers: bool = False
+
+
+# of an object, on top of the image's motion
+OBJECTS = {"translation_px": [0, MOTION_PX], "rotation_deg": 3, "scale": 0.04}
 
 
 def grey(_: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
@@ -60,28 +69,41 @@ def grey(_: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
 
 
 def gradient(_: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
-    """The slope of the labelled frame's log intensity along a direction drawn for it:
-    what a small shift would bring about, without any generator."""
-    angle = np.random.default_rng(zlib.crc32(sample["pair"]["sample_id"].encode())).uniform(0, 2 * np.pi)
+    """The slope of the labelled frame's log intensity along a direction drawn for it: what a small shift would bring
+    about, without any generator. In layers each object that moves on its own has a direction of its own, and an image
+    that rests has none."""
+    random = np.random.default_rng(zlib.crc32(sample["pair"]["sample_id"].encode()))
+    angles = np.full(sample["volume"].shape[1:], random.uniform(0, 2 * np.pi))
+    if np.array_equal(sample["pair"].get("motion"), [0, 0, 0, 1]):
+        angles[:] = np.nan
+    boxes = sample["boxes"]
+    for k in np.argsort(boxes["xyxy"][:, 3]) if "motion" in boxes else ():  # nearer ones cover farther ones
+        if np.isfinite(boxes["motion"][k]).all():
+            # with its edge, where a slope is that of the object and what is behind it
+            there = cv2.dilate(mask(boxes["outline"][k], angles.shape).astype(np.uint8), np.ones((3, 3), np.uint8))
+            angles[there > 0] = random.uniform(0, 2 * np.pi)
 
-    def slope(_: np.ndarray, image: np.ndarray) -> np.ndarray:
+    def slope(shown: np.ndarray, image: np.ndarray) -> np.ndarray:
         y, x = np.gradient(np.log(image / 255 + recordings.LOG_EPSILON))
-        along = np.cos(angle) * x + np.sin(angle) * y
+        along = np.nan_to_num(np.cos(shown) * x + np.sin(shown) * y)
         return signed_channel(np.stack([along.clip(0), (-along).clip(0)]))
 
-    return _where_shown(sample, slope)
+    return _where_shown(sample, slope, angles)
 
 
 def v2e(args: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
     return _where_shown(sample, lambda previous, image: signed_channel(recordings.V2e(args.peers)(previous, image)))
 
 
-def _where_shown(sample: Mapping[str, Any], channel_of: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
-    """channel_of(previous, labelled frame), both without the letterbox's borders, which are 0."""
+def _where_shown(sample: Mapping[str, Any], channel_of: Callable[[np.ndarray, np.ndarray], np.ndarray],
+                 beside: np.ndarray | None = None) -> np.ndarray:
+    """channel_of(previous, labelled frame), both without the letterbox's borders, which are 0; or of what is given
+    in place of the previous frame."""
     size = sample["volume"].shape[1:]
     shown = _shown(sample["pair"]["source_size"], size)
     result = np.zeros((1, *size), np.float32)
-    result[:, shown[0], shown[1]] = channel_of(*(each[shown] for each in pair_of(sample)))
+    frames = pair_of(sample) if beside is None else (beside, labelled_in(sample))
+    result[:, shown[0], shown[1]] = channel_of(*(each[shown] for each in frames))
     return result
 
 
@@ -91,6 +113,11 @@ def _shown(shape: Sequence[int], size: tuple[int, int]) -> tuple[slice, slice]:
     lines, columns = (slice((whole - side) // 2, (whole - side) // 2 + side)
                       for whole, side in zip(size, sides.tolist()))
     return lines, columns
+
+
+def labelled_in(sample: Mapping[str, Any]) -> np.ndarray:
+    """The labelled frame where it lies in the volume, uint8 [H, W]."""
+    return training.placed(sample, training.labelled_image(sample)).round().astype(np.uint8)
 
 
 def pair_of(sample: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
@@ -108,8 +135,7 @@ def pair_of(sample: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
         affine = np.column_stack([linear, middle - linear @ middle + [x, y]])
         previous = cv2.warpAffine(image, affine, image.shape[::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
                                   borderMode=cv2.BORDER_REPLICATE)
-    first, second = (training.placed(sample, each).round().astype(np.uint8) for each in (previous, image))
-    return first, second
+    return training.placed(sample, previous).round().astype(np.uint8), labelled_in(sample)
 
 
 # A sensor that is another one for each pair, in place of the detector's augmentation.
@@ -129,7 +155,13 @@ METHODS = {  # of the main table
     "ESIM": Source({"kind": "esim"}),
     "v2e": Source(of_pair=v2e),
 }
-SOURCES = METHODS | SENSORS | {
+LAYERS = {
+    "EventGAN 16, layers": Source(SHIPPED[16], layers=True),
+    "EventGAN 8, layers": Source(SHIPPED[8], layers=True),
+    "difference, layers": Source({"kind": "difference"}, layers=True),
+    "gradient, layers": Source(of_pair=gradient, layers=True),
+}
+SOURCES = METHODS | SENSORS | LAYERS | {
     "EventGAN 16, finer": Source(SHIPPED[16], finer=2),
     "EventGAN 16, eta98": Source(SHIPPED[16], normalize="eta98"),
     "difference, eta98": Source({"kind": "difference"}, normalize="eta98"),
@@ -155,11 +187,16 @@ def manifest_of(args: argparse.Namespace, name: str, source: Source) -> dict[str
         path = labels / f"{folder}.csv"
         if not path.exists():
             _write_boxes(args.frames / folder, path, EVERY if folder in CLIPS else 1)
-        pairs = {"gaps": [1, 2, 3], "side": "before", "choose": "one"} if folder in CLIPS else {
-            "from": "stills",
-            "motion": {"translation_px": [0, source.motion_px], "rotation_deg": 2, "scale": 0.03, "frames": 1}}
-        sources.append({"dataset": "frames", "root": str(args.frames / folder / "images"),
-                        "labels": {"format": "csv", "path": str(path)}, "pairs": pairs})
+        found = {"dataset": "frames", "root": str(args.frames / folder / "images"),
+                 "labels": {"format": "csv", "path": str(path)},
+                 "pairs": {"gaps": [1, 2, 3], "side": "before", "choose": "one"}}
+        if folder in STILLS:
+            motion = {"translation_px": [0, source.motion_px], "rotation_deg": 2, "scale": 0.03, "frames": 1}
+            found["pairs"] = {"from": "stills", "motion": motion}
+            if source.layers:
+                motion["objects"] = OBJECTS
+                found["outlines"] = str(_outlines(args, folder))
+        sources.append(found)
     generator = dict(source.generator)
     if generator.get("sensor") == "fitted":
         threshold = fitted_threshold(args)
@@ -184,6 +221,63 @@ def _write_boxes(folder: pathlib.Path, path: pathlib.Path, every: int) -> None:
         table_of = csv.writer(file)
         table_of.writerow("image class left top right bottom".split())
         table_of.writerows([image, *box] for image in images for box in boxes[image] or [[""] * 5])
+
+
+def _outlines(args: argparse.Namespace, folder: str) -> pathlib.Path:
+    """A folder of index masks of the objects in the photographs: as they were annotated, or else cut out of their
+    boxes."""
+    masks = args.out / "outlines" / folder
+    labels = args.out / "labels" / f"{folder}.json"
+    if not labels.exists():
+        _write_coco(args.frames / folder, labels)
+    manifest = {"format": "eventgan-manifest", "version": 1, "name": folder, "seed": 7,
+                "sources": [{"dataset": "frames", "root": str(args.frames / folder / "images"),
+                             "labels": {"format": "coco", "path": str(labels)}, "pairs": {"from": "stills"}}],
+                "generator": {"kind": "difference"}, "image": {"height": SIZE[0], "width": SIZE[1]},
+                "output": {"directory": folder}}
+    path = labels.with_suffix(".manifest.json")
+    path.write_text(json.dumps(manifest), encoding="utf-8")
+    subprocess.run([os.environ["EVENTGAN_PROGRAM"], "outline", path, "--out", masks], check=True)
+    return masks
+
+
+def _write_coco(folder: pathlib.Path, path: pathlib.Path) -> None:
+    """All boxes in their order as COCO's JSON, with the outlines that lie over them in instances.json (COCO's polygons)
+    and masks/ (numbers of objects)."""
+    images, annotations, numbers = [], [], {}
+    polygons = collections.defaultdict(list)
+    if (folder / "instances.json").exists():
+        instances = json.loads((folder / "instances.json").read_text(encoding="utf-8"))
+        names = {image["id"]: image["file_name"] for image in instances["images"]}
+        for entry in instances["annotations"]:
+            left, top, width, height = entry["bbox"]
+            polygons[names[entry["image_id"]]].append(([left, top, left + width, top + height], entry["segmentation"]))
+    with open(folder / "frames.csv", newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            images.append({"id": len(images) + 1, "file_name": row["image"], "width": int(row["width"]),
+                           "height": int(row["height"])})
+            mask = cv2.imread(str(folder / "masks" / f"{pathlib.Path(row['image']).stem}.png"), cv2.IMREAD_UNCHANGED)
+            for number in range(1, 1 + (0 if mask is None else int(mask.max()))):
+                y, x = np.nonzero(mask == number)
+                runs = np.diff(np.flatnonzero(np.diff((mask == number).T.ravel(), prepend=0, append=2)), prepend=0)
+                polygons[row["image"]].append(([x.min(), y.min(), x.max() + 1, y.max() + 1],
+                                               {"size": mask.shape, "counts": runs.tolist()}))
+    ids = {image["file_name"]: image["id"] for image in images}
+    with open(folder / "boxes.csv", newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            left, top, right, bottom = box = [float(row[edge]) for edge in ("x1", "y1", "x2", "y2")]
+            entry = {"id": len(annotations) + 1, "image_id": ids[row["image"]], "iscrowd": 0,
+                     "category_id": numbers.setdefault(row["class"], len(numbers) + 1),
+                     "bbox": [left, top, right - left, bottom - top]}
+            known = polygons[row["image"]]
+            same = overlapping(np.zeros(1, int), np.array([box]), np.zeros(len(known), int),
+                               np.array([each[0] for each in known], float).reshape(-1, 4), 0.7)
+            if len(same.iou):
+                entry["segmentation"] = known.pop(int(same.second[same.iou.argmax()]))[1]
+            annotations.append(entry)
+    path.write_text(json.dumps({"images": images, "annotations": annotations,
+                                "categories": [{"id": number, "name": name} for name, number in numbers.items()]}),
+                    encoding="utf-8")
 
 
 def shards_of(args: argparse.Namespace, name: str) -> Shards:
@@ -222,7 +316,7 @@ def items_of(args: argparse.Namespace, name: str, signed: bool = True) -> list[I
     source = SOURCES[name]
 
     def make() -> list[Item]:
-        shards = shards_of(args, name if source.generator else "EventGAN 16")
+        shards = shards_of(args, name if source.generator else f"EventGAN 16{', layers' if source.layers else ''}")
         if source.of_pair:
             shards = shards.changed(functools.partial(source.of_pair, args))
         elif signed and source.finer == 1:
@@ -287,8 +381,9 @@ def _drawn(path: pathlib.Path, labels: pathlib.Path, size: tuple[int, int]) -> I
     if events.min() == 0 or events.max() == 0:  # no polarity: one is drawn for each pixel
         events *= np.random.default_rng(zlib.crc32(path.stem.encode())).choice(np.float32([-1, 1]), events.shape)
     boxes = torch.from_numpy(_boxes(labels, image.shape)).float()
-    item = {"volume": torch.from_numpy(events[None]), "boxes": boxes, "labels": torch.zeros(len(boxes), dtype=torch.int64),
-            "ignore": torch.zeros(len(boxes), dtype=torch.bool), "id": path.stem}
+    item = {"volume": torch.from_numpy(events[None]), "boxes": boxes,
+            "labels": torch.zeros(len(boxes), dtype=torch.int64), "ignore": torch.zeros(len(boxes), dtype=torch.bool),
+            "id": path.stem}
     return _smaller(item, size, lambda signed: signed_channel(np.concatenate([signed.clip(0), (-signed).clip(0)])))
 
 

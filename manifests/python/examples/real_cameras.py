@@ -34,8 +34,8 @@ from eventgan import Shards, drawing
 from eventgan.detection_scores import Detections, GroundTruth, detection_scores, overlapping
 from eventgan.evaluate import Samples, evaluate_detections
 from eventgan.torch import EventAugmentation
-from labelled_events import (CLASSES, METHODS, SENSORS, SIZE, SOURCES, Item, file_name, items_of, key_of, recordings_in,
-                             replace, test_items, windows_folder, windows_of)
+from labelled_events import (CLASSES, LAYERS, METHODS, SENSORS, SIZE, SOURCES, Item, file_name, items_of, key_of,
+                             recordings_in, replace, test_items, windows_folder, windows_of)
 from torch import nn
 
 STEPS, YOLO_STEPS, BATCH, RATE = 300, 200, 16, 2e-3
@@ -85,6 +85,13 @@ def drawn_sensors() -> list[Row]:
              for name in (*SENSORS, "gradient", "EventGAN 16")]
     return [*plain, *(Row(f"{name}, augmented, {SENSOR_STEPS} steps", (name,), steps=SENSOR_STEPS)
                       for name in ("EventGAN 16", "EventGAN 16, finer"))]
+
+
+def in_layers() -> list[Row]:
+    """Photographs in which objects move on their own, against those that move as one, and both together."""
+    return [Row(f"{' and '.join(sources)}, augmented, {SENSOR_STEPS} steps", sources, steps=SENSOR_STEPS)
+            for name in LAYERS for whole in [name.removesuffix(", layers")]
+            for sources in ((whole,), (name,), *([(whole, name)] if whole == "EventGAN 16" else []))]
 
 
 def ablations() -> list[Row]:
@@ -325,7 +332,8 @@ def run(args: argparse.Namespace) -> None:
         args.out = args.out / "quick"
         args.steps, args.seeds, main, drawn, extra = 60, 1, [row for row in main
                                                              if row.name == "EventGAN 16, augmented"], [], []
-    tasks = [(args, row, seed) for seed in range(args.seeds) for row in (*main, *drawn)]
+    layers = [] if args.quick else [row for row in in_layers() if row not in drawn]
+    tasks = [(args, row, seed) for seed in range(args.seeds) for row in (*main, *drawn, *layers)]
     tasks += [(args, row, seed) for seed in range(min(args.seeds, ABLATION_SEEDS)) for row in extra]
     if args.trainer and not args.quick:
         tasks += [(args, name, seed) for seed in range(min(args.seeds, ABLATION_SEEDS)) for name in SOURCES
@@ -350,6 +358,8 @@ def run(args: argparse.Namespace) -> None:
     text += tables(results, [row.name for row in main if row.augmentation == FULL], "Augmented",
                    "EventGAN 16, augmented")
     text += tables(results, [row.name for row in drawn], "Drawn sensors",
+                   f"EventGAN 16, augmented, {SENSOR_STEPS} steps")
+    text += tables(results, [row.name for row in in_layers()], "Objects that move on their own",
                    f"EventGAN 16, augmented, {SENSOR_STEPS} steps")
     text += tables(results, ["EventGAN 16", "EventGAN 16, augmented", *(row.name for row in extra)],
                    "One thing changed")

@@ -205,13 +205,17 @@ def main() -> None:
     size = tuple(32 * math.ceil(side * args.scale / 32) for side in (area[2:] - area[:2])[::-1])
     view, classes = fitted(area, size), args.classes.split(",")
 
-    def items_of(shards: Shards) -> list[dict[str, Any]]:
-        dataset = DetectionDataset(shards.changed(signed) if args.channels == "signed" else shards, classes, size,
-                                   view=view)
+    def seen(shards: Shards) -> Shards:
+        return shards.changed(signed) if args.channels == "signed" else shards
+
+    def items_of(dataset: DetectionDataset) -> list[dict[str, Any]]:
         return [dataset[i] for i in range(len(dataset))]
 
     try:
-        items, validation, test = (items_of(shards) for shards in (train_shards, validation_shards, test_shards))
+        items, validation = (items_of(DetectionDataset(seen(shards), classes, size, view=view))
+                             for shards in (train_shards, validation_shards))
+        test_set, test_view = training.detection_test(args, seen(test_shards), classes, size, view)
+        test = items_of(test_set)
     except ValueError as error:
         raise SystemExit(str(error))
     model = train(args, items, classes, AUGMENTATION, validation)
@@ -224,7 +228,7 @@ def main() -> None:
 
     found = search(model, test, args.batch)
     training.write_predictions(args, (entry for item, boxes in found
-                                      for entry in training.box_predictions(item, boxes, classes, view)))
+                                      for entry in training.box_predictions(item, boxes, classes, test_view)))
     training.write_images(args, len(validation), image_of)
 
 

@@ -27,7 +27,7 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package
 
 from eventgan import Sample, Shards, drawing, read_description
 from eventgan.detection_scores import Detections, GroundTruth, detection_scores
-from eventgan.torch import inverse, move_boxes
+from eventgan.torch import DetectionDataset, fitted, inverse, move_boxes
 
 VALIDATION_SPLITS = ("validation", "valid", "val", "test")
 GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps together, the most first
@@ -201,6 +201,16 @@ def _to_test(args: argparse.Namespace, validation_shards: Shards, usable: Callab
     except (OSError, ValueError) as error:
         sys.exit(str(error))
     return shards.changed(labelled_frame) if args.frames else shards
+
+
+def detection_test(args: argparse.Namespace, shards: Shards, classes: Sequence[str], size: tuple[int, int],
+                   view: np.ndarray) -> tuple[DetectionDataset, np.ndarray]:
+    """What `tested` gives as items of that size, and their view: that of the training, but for a dataset of its own,
+    whose images have another size: then the one that fits all of them. It need not have all classes."""
+    if args.test:
+        view = fitted(shards.image_area(), size)
+    known = {name: i for i, name in enumerate(classes) if name in shards.known_classes()}
+    return DetectionDataset(shards, known or classes, size, view=view), view
 
 
 def _mean(shards: Shards) -> float:

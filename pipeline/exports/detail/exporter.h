@@ -83,6 +83,9 @@ class Exporter {
 
   /// What of whole samples is not exported, as far as `finish` alone can tell.
   virtual LeftOut whole_samples_left_out() const { return {}; }
+
+  /// What a user should know of what `finish` has made, a line each.
+  virtual std::vector<std::string> notes() const { return {}; }
 };
 
 /// For ExportFormat::make.
@@ -114,6 +117,9 @@ void write_image_pair(const OutgoingSample& sample, const std::string& folder, d
 
 /// Counts a sample that has values above the full scale.
 void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut& left_out);
+
+/// What of a box's outline lies within what the volume shows of the image; empty without one.
+Outline shown_outline(const ShardSample& sample, const VolumeBox& box, ImageSize volume);
 
 /// A person's box: as annotated, else around its chosen joints and its head; cut to what the volume
 /// shows of the image. None if nothing is left.

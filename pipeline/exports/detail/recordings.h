@@ -37,7 +37,7 @@ struct OutgoingRecording {
   std::string name;  ///< of its files
   const ExportSource* source = nullptr;
   VolumeShape shape;
-  bool is_timed = true;               ///< else its clock counts frames, a second each
+  bool is_timed = true;               ///< else its clock counts frames
   std::vector<SampleWindow> windows;  ///< at least one
 
   std::int64_t begin_us() const { return windows.front().begin_us; }
@@ -69,7 +69,8 @@ struct RecordedSample {
 };
 
 /// An exporter of recordings. Samples of a sequence whose frames' times are known share its clock;
-/// of those whose frames have but numbers, frame k is at k seconds. Where their windows overlap
+/// of those whose frames have but numbers, one frame is the smallest step between the numbers of a
+/// pair, and there are ExportOptions::frames_per_second. Where their windows overlap
 /// they are spread over as few recordings as need be, NAME, NAME~2 ..., so that no moment has the
 /// events of two samples. A sample of no sequence is a recording by itself, from 0 to its gap (1 s
 /// if that is not known). The recordings of a sequence are one step of the export, so are the
@@ -84,6 +85,7 @@ class RecordingsExporter : public Exporter {
   void finish(const ExportWork& work, const std::vector<const ExportShard*>& shards) const override;
   void account(const OutgoingSample& sample, LeftOut& left_out) const override;
   LeftOut whole_samples_left_out() const override;
+  std::vector<std::string> notes() const override;
 
  protected:
   /// Where the samples of a recording come from, one after the other.
@@ -109,7 +111,9 @@ class RecordingsExporter : public Exporter {
   ExportOptions options_;
   std::unique_ptr<ClassNumbers> numbers_;
   bool keeps_volumes_;
-  mutable std::int64_t unlabelled_ = 0;  ///< samples of recordings without labels; of `finish`
+  // Of `finish`:
+  mutable std::int64_t unlabelled_ = 0;  ///< samples of recordings without labels
+  mutable std::int64_t untimed_ = 0;     ///< samples whose clock counts frames
 };
 
 /// Gives each box without a track a number of its own, beyond those that there are: an object that
@@ -121,6 +125,14 @@ void number_tracks(std::vector<RecordedBox>& boxes, const OutgoingRecording& rec
 /// count from `clock_us` on, the number of events, and the sample's id.
 std::string window_line(const SampleWindow& window, const RecordedSample& sample,
                         std::int64_t clock_us);
+
+/// Boxes as Prophesee's programs and RVT read them, RECORDING_bbox.npy: BBOX_DTYPE of RVT's
+/// utils/evaluation/prophesee.
+std::string prophesee_boxes(const std::vector<RecordedBox>& boxes);
+
+/// The name of a recording's files beside that: their readers cut a name at its first "bbox", so in
+/// it that is "%62box".
+std::string name_before_bbox(const OutgoingRecording& recording);
 
 /// Appends a number's bytes, little endian.
 template <class Number>

@@ -121,6 +121,16 @@ void draw_rectangle(cv::Mat& panel, const Rectangle& box, PanelScale scale,
   }
 }
 
+/// Thin, in contrast to its box.
+void draw_outline(cv::Mat& panel, const Outline& outline, PanelScale scale,
+                  const cv::Scalar& colour) {
+  for (const auto& ring : outline.rings) {
+    std::vector<cv::Point> corners;
+    for (const Point& corner : ring) corners.push_back(fixed(scale.corner(corner.x, corner.y)));
+    cv::polylines(panel, corners, /*isClosed=*/true, colour, 1, cv::LINE_AA, kShift);
+  }
+}
+
 cv::Rect panel_rectangle(const Rectangle& box, PanelScale scale) {
   const cv::Point first = fixed(scale.corner(box.left, box.top)) / (1 << kShift);
   const cv::Point last = fixed(scale.corner(box.right, box.bottom)) / (1 << kShift);
@@ -243,8 +253,10 @@ void draw_labels(const PreviewContent& content, PanelScale scale, LabelStyle sty
     for (std::size_t i = 0; i < content.labels.boxes.size(); ++i) {
       const VolumeBox& box = content.labels.boxes[i];
       if (box.ignore != ignored) continue;
-      draw_rectangle(panel, box.clipped, scale,
-                     ignored ? kIgnored : class_colour(content.annotation.boxes[i].class_id),
+      const cv::Scalar colour =
+          ignored ? kIgnored : class_colour(content.annotation.boxes[i].class_id);
+      if (!is_hint) draw_outline(panel, box.outline, scale, colour);
+      draw_rectangle(panel, box.clipped, scale, colour,
                      ignored                      ? LineStyle::kShadowedDashes
                      : is_hint                    ? LineStyle::kDashes
                      : style == LabelStyle::kFull ? LineStyle::kSolid

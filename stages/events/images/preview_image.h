@@ -54,10 +54,10 @@ struct PreviewContent {
 
 /// Draws previous frame, next frame and average-timestamp image. The events and the labelled
 /// frame, whose panel has a bright border, have the boxes (with their class; ignored regions dashed
-/// grey) and poses (hidden joints hollow; limbs where the joint names are MPII's or Human3.6M's);
-/// on another frame, where things have moved, thin dashes hint at them. A box's name is where
-/// it covers boxes least. Small volumes are enlarged by whole factors, so that text and lines stay
-/// readable.
+/// grey), their outlines as thin lines, and poses (hidden joints hollow; limbs where the joint
+/// names are MPII's or Human3.6M's); on another frame, where things have moved, thin dashes hint at
+/// them. A box's name is where it covers boxes least. Small volumes are enlarged by whole factors,
+/// so that text and lines stay readable.
 ///
 /// Time is colour, early blue to late red, the mean over both polarities. Brightness says how many
 /// events, on an absolute scale, so that noise looks faint: 1 - exp(-m) of full brightness where

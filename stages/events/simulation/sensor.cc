@@ -70,9 +70,27 @@ std::vector<float> draw_thresholds(double mean, double spread, std::size_t pixel
   return thresholds;
 }
 
+namespace {
+
+/// A pixel's own rate: log-normal of this mean.
+double own_rate(double mean, const CounterRandom& random, std::size_t pixel) {
+  constexpr double kBias = kNoiseRateSpread * kNoiseRateSpread / 2;
+  return mean * std::exp(kNoiseRateSpread * gaussian(random, pixel) - kBias);
+}
+
+/// Whatever the thresholds: the leak is in parts of these.
+PixelLeak draw_leak(CounterRandom random, std::size_t pixel) {
+  const CounterRandom leak = random.keyed("leak");
+  const double phase = leak.keyed("phase").uniform(pixel);
+  return {static_cast<float>(own_rate(1, leak, pixel)),
+          std::min(static_cast<float>(phase), std::nextafter(1.0f, 0.0f))};
+}
+
+}  // namespace
+
 PixelNoise::PixelNoise(const SensorSpec& spec, std::size_t pixel_count, double start_s,
                        CounterRandom random)
-    : shot_rate_hz_(spec.shot_noise_rate_hz),
+    : shot_rate_hz_(pixel_count, 0.0f),
       hot_rate_hz_(spec.hot_pixel_rate_hz),
       wait_random_(random.keyed("wait")),
       kind_random_(random.keyed("kind")),
@@ -83,6 +101,10 @@ PixelNoise::PixelNoise(const SensorSpec& spec, std::size_t pixel_count, double s
   for (std::size_t pixel = 0; pixel < pixel_count; ++pixel) {
     if (hot_random.uniform(2 * pixel) < spec.hot_pixel_fraction) {
       hot_[pixel] = hot_random.below(2 * pixel + 1, 2) == 0 ? -1 : 1;
+    }
+    if (spec.shot_noise_rate_hz > 0) {
+      shot_rate_hz_[pixel] =
+          static_cast<float>(own_rate(spec.shot_noise_rate_hz, random.keyed("shot rate"), pixel));
     }
     draw_wait(pixel);
   }
@@ -97,12 +119,13 @@ bool PixelNoise::take(std::size_t pixel) {
   const std::uint64_t arrival = (draws_[pixel] - 1) * next_s_.size() + pixel;
   const double kind_hz = kind_random_.uniform(arrival) * rate_hz(pixel);
   draw_wait(pixel);
-  if (kind_hz < shot_rate_hz_) return kind_hz < shot_rate_hz_ / 2;
+  const double shot_hz = shot_rate_hz_[pixel];
+  if (kind_hz < shot_hz) return kind_hz < shot_hz / 2;
   return hot_[pixel] > 0;
 }
 
 double PixelNoise::rate_hz(std::size_t pixel) const {
-  return hot_[pixel] == 0 ? shot_rate_hz_ : shot_rate_hz_ + hot_rate_hz_;
+  return hot_[pixel] == 0 ? double{shot_rate_hz_[pixel]} : shot_rate_hz_[pixel] + hot_rate_hz_;
 }
 
 void PixelNoise::draw_wait(std::size_t pixel) {
@@ -203,6 +226,7 @@ struct Pixel {
   int y;
   double positive_threshold;
   double negative_threshold;
+  PixelLeak leak;
 };
 
 double next_noise_s(const PixelNoise* noise, std::size_t pixel) {
@@ -215,7 +239,7 @@ void run_eventful_pixel(const Pixel& pixel, double change, const Step& step, Pix
 /// Takes a pixel through a step in which its log intensity moves by `log_change`.
 inline void run_pixel(const Pixel& pixel, float log_change, const Step& step, PixelNoise* noise,
                       PixelState& state, std::vector<Event>& events) {
-  const double change = log_change + step.leak * pixel.positive_threshold;
+  const double change = log_change + step.leak * pixel.leak.rate * pixel.positive_threshold;
   // Most pixels: a line between the thresholds at both ends crosses neither.
   const double end = state.difference + change;
   if (end < pixel.positive_threshold && end > -pixel.negative_threshold &&
@@ -268,7 +292,12 @@ Sensor::Sensor(const SensorSpec& spec, ImageSize size, CounterRandom random)
       positive_threshold_(draw_thresholds(spec.positive_threshold, spec.threshold_spread,
                                           size.pixel_count(), positive_random(random))),
       negative_threshold_(draw_thresholds(spec.negative_threshold, spec.threshold_spread,
-                                          size.pixel_count(), negative_random(random))) {}
+                                          size.pixel_count(), negative_random(random))) {
+  if (!(spec.leak_rate_hz > 0)) return;
+  for (std::size_t pixel = 0; pixel < size.pixel_count(); ++pixel) {
+    leak_.push_back(draw_leak(random, pixel));
+  }
+}
 
 std::vector<Event> Sensor::step(std::span<const float> intensity, double t_s) {
   check(intensity, t_s);
@@ -285,7 +314,8 @@ std::vector<Event> Sensor::step(std::span<const float> intensity, double t_s) {
       const float after = std::log(intensity[number] + epsilon);
       const float log_change = after - log_intensity_[number];
       log_intensity_[number] = after;
-      run_pixel({number, x, y, positive_threshold_[number], negative_threshold_[number]},
+      run_pixel({number, x, y, positive_threshold_[number], negative_threshold_[number],
+                 leak_.empty() ? PixelLeak() : leak_[number]},
                 log_change, step, &*noise_, pixels_[number], events);
     }
   }
@@ -313,6 +343,9 @@ void Sensor::start(std::span<const float> intensity, double t_s) {
   std::ranges::transform(intensity, log_intensity_.begin(),
                          [epsilon](float value) { return std::log(value + epsilon); });
   pixels_.assign(intensity.size(), {.difference = 0, .held_until_s = t_s});
+  for (std::size_t i = 0; i < leak_.size(); ++i) {
+    pixels_[i].difference = double{leak_[i].phase} * positive_threshold_[i];
+  }
   noise_.emplace(spec_, intensity.size(), t_s, noise_random(random_));
   time_s_ = t_s;
 }
@@ -400,6 +433,8 @@ class RowRuns {
                   positive_random(random)),
         negative_(spec.negative_threshold, spec.threshold_spread, log_error(times_s.size()),
                   negative_random(random)),
+        random_(random),
+        leaks_(spec.leak_rate_hz > 0),
         start_s_(times_s.front()),
         changes_(times_s.size() - 1) {
     for (std::size_t i = 1; i < times_s.size(); ++i) {
@@ -408,7 +443,7 @@ class RowRuns {
     if (PixelNoise::any(spec)) {
       noise_.emplace(spec, size.pixel_count(), start_s_, noise_random(random));
     }
-    only_light_ = !noise_ && !(spec.leak_rate_hz > 0);
+    only_light_ = !noise_ && !leaks_;
   }
 
   /// intensity: [image, x] of row y.
@@ -419,10 +454,15 @@ class RowRuns {
     negative_.draw(pixels_, negative_thresholds_);
     for (std::size_t i = 0; i < pixels_.size(); ++i) {
       const std::size_t x = pixels_[i] - row;
-      const Pixel pixel{pixels_[i], static_cast<int>(x), y, positive_thresholds_[i],
-                        negative_thresholds_[i]};
+      const Pixel pixel{pixels_[i],
+                        static_cast<int>(x),
+                        y,
+                        positive_thresholds_[i],
+                        negative_thresholds_[i],
+                        leaks_ ? draw_leak(random_, pixels_[i]) : PixelLeak()};
       look(intensity.subspan(x));
-      PixelState state{.difference = 0, .held_until_s = start_s_};
+      PixelState state{.difference = pixel.leak.phase * pixel.positive_threshold,
+                       .held_until_s = start_s_};
       for (std::size_t k = 0; k < steps_.size(); ++k) {
         run_pixel(pixel, changes_[k], steps_[k], noise_ ? &*noise_ : nullptr, state, events);
       }
@@ -471,6 +511,8 @@ class RowRuns {
   float epsilon_;
   ThresholdDraws positive_;
   ThresholdDraws negative_;
+  CounterRandom random_;
+  bool leaks_;
   double start_s_;
   std::vector<Step> steps_;
   std::optional<PixelNoise> noise_;

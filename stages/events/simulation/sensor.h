@@ -28,10 +28,14 @@ inline constexpr float kSmallestThreshold = 0.01f;
 std::vector<float> draw_thresholds(double mean, double spread, std::size_t pixel_count,
                                    CounterRandom random);
 
-/// Noise events of a sensor's pixels: a Poisson process a pixel, of rate shot_noise_rate_hz plus,
-/// on a hot pixel, hot_pixel_rate_hz. Times between arrivals are drawn from the exponential
-/// distribution by its inverse, so they do not depend on how time is cut into steps.
-/// Not thread safe.
+/// Standard deviation of the logarithm of a pixel's own rate of leak or shot noise, whose mean over
+/// the pixels is the sensor's: real sensors show a factor of 1.7 to 1.9.
+inline constexpr double kNoiseRateSpread = 0.5878;  // ln 1.8
+
+/// Noise events of a sensor's pixels: a Poisson process a pixel, of its own rate (log-normal of
+/// mean shot_noise_rate_hz) plus, on a hot pixel, hot_pixel_rate_hz. Times between arrivals are
+/// drawn from the exponential distribution by its inverse, so they do not depend on how time is cut
+/// into steps. Not thread safe.
 class PixelNoise {
  public:
   /// No arrivals before start_s.
@@ -51,7 +55,7 @@ class PixelNoise {
   double rate_hz(std::size_t pixel) const;
   void draw_wait(std::size_t pixel);
 
-  double shot_rate_hz_;
+  std::vector<float> shot_rate_hz_;
   double hot_rate_hz_;
   CounterRandom wait_random_;
   CounterRandom kind_random_;
@@ -69,6 +73,12 @@ double idle_event_bytes(const SensorSpec& spec, std::size_t pixel_count, double 
 void check_events_fit(const SensorSpec& spec, ImageSize size, double duration_s,
                       std::size_t memory_bytes);
 
+/// How a pixel leaks.
+struct PixelLeak {
+  float rate = 1;   ///< of the sensor's mean
+  float phase = 0;  ///< how far towards an event it is when it begins, 0..1
+};
+
 /// What a pixel of a Sensor remembers beside its log intensity.
 struct PixelState {
   double difference = 0;    ///< d; 0 where the pixel is still held
@@ -85,8 +95,9 @@ struct PixelState {
 ///   crossing the next is a full threshold away.
 /// - Refractory time R: after an event at t the pixel is held in reset until t + R. Noise and
 ///   crossings in between are lost, and at t + R the level is L(t + R).
-/// - Leak: the level of a pixel that is not held falls by C₊ · leak_rate_hz a second (v2e, Hu et
-///   al. 2021): without motion a positive event each 1/leak_rate_hz (+ R) seconds.
+/// - Leak: the level of a pixel that is not held falls by C₊ · r a second (v2e, Hu et al. 2021), r
+///   being the pixel's own rate, log-normal of mean leak_rate_hz: without motion a positive event
+///   each 1/r (+ R) seconds. With a leak, a pixel begins anywhere between two events of it.
 /// - Shot noise and hot pixels: see PixelNoise.
 /// - Thresholds: see draw_thresholds, one draw a pixel and polarity.
 ///
@@ -112,6 +123,7 @@ class Sensor {
   CounterRandom random_;
   std::vector<float> positive_threshold_;
   std::vector<float> negative_threshold_;
+  std::vector<PixelLeak> leak_;  ///< empty: there is none
 
   // State at time_s_; noise_ is set by the first image.
   double time_s_ = 0;

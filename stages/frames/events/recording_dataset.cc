@@ -7,6 +7,8 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <exception>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -65,6 +67,22 @@ struct Recorded {
 /// Begin (exclusive) and end of a window in seconds.
 using Span = std::array<double, 2>;
 
+/// `time_s` + `length_s`. Of whole microseconds, or nanoseconds, the same number as the time of an
+/// event that is stored so: whether it is in a window is not for rounding to say.
+double later(double time_s, double length_s) {
+  for (const double ticks_per_s : {1e6, 1e9}) {
+    constexpr double kMostTicks = 9007199254740992;  // 2^53: beyond it a double has not all
+    const double time = std::round(time_s * ticks_per_s);
+    const double length = std::round(length_s * ticks_per_s);
+    const double rounding = 4 * std::numeric_limits<double>::epsilon() * std::abs(length_s);
+    if (std::abs(time) < kMostTicks && time / ticks_per_s == time_s &&
+        std::abs(length / ticks_per_s - length_s) <= rounding) {
+      return (time + length) / ticks_per_s;
+    }
+  }
+  return time_s + length_s;
+}
+
 /// The window of a time by the frames around it.
 Span frame_window(const std::vector<double>& frames, double time_s, LabelPlace place) {
   const auto after = std::ranges::lower_bound(frames, time_s);
@@ -108,7 +126,7 @@ class RecordingDataset final : public Dataset {
       : window_(spec.window), options_(spec.recording) {
     find_recordings(spec, base);
     find_labels(spec, base);
-    for (auto& [name, recorded] : recordings_) open(recorded, base);
+    open_all(base);
     number_classes();
     for (const auto& [name, recorded] : recordings_) {
       const std::size_t first = labelled_.size();
@@ -120,6 +138,8 @@ class RecordingDataset final : public Dataset {
     }
     std::ranges::sort(labelled_, {}, &LabelledFrame::sample_id);
     std::ranges::sort(annotation_files_);
+    annotation_files_.erase(std::ranges::unique(annotation_files_).begin(),
+                            annotation_files_.end());
   }
 
   const LabelSchema& label_schema() const override { return schema_; }
@@ -129,12 +149,23 @@ class RecordingDataset final : public Dataset {
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes = notes_;
     for (const auto& [name, recorded] : recordings_) {
+      std::ranges::move(recorded.recording->warnings(), std::back_inserter(notes));
       std::ranges::move(recorded.recording->notes(), std::back_inserter(notes));
     }
     return notes;
   }
 
-  std::vector<std::string> warnings() const override { return warnings_; }
+  std::vector<std::string> warnings() const override {
+    std::vector<std::string> warnings = warnings_;
+    for (const auto& [name, recorded] : recordings_) {
+      std::ranges::move(recorded.recording->warnings(), std::back_inserter(warnings));
+    }
+    return warnings;
+  }
+
+  Unreadable unreadable() const override {
+    return {unreadable_, std::ssize(unreadable_) + std::ssize(recordings_)};
+  }
 
   PairedFrame paired_frame(const LabelledFrame& labelled, int steps) const override {
     if (steps == 0) return {PairedFrame::State::kPresent, labelled.frame};
@@ -228,12 +259,17 @@ class RecordingDataset final : public Dataset {
       return Span{begin_s + i * length_s, begin_s + (i + 1) * length_s};
     }
     const double after_s = window_.label == LabelPlace::kMiddle ? *window_.duration_s / 2 : 0;
-    return Span{time_s - (*window_.duration_s - after_s), time_s + after_s};
+    return Span{later(time_s, after_s - *window_.duration_s), later(time_s, after_s)};
   }
 
   void add(const std::string& name, const std::string& path, RecordingFormat format) {
     const auto [recorded, is_new] = recordings_.try_emplace(name);
-    if (!is_new) {
+    const auto is_csv = [](const fs::path& file) { return file.extension() == ".csv"; };
+    if (!is_new && is_csv(path) != is_csv(recorded->second.path)) {  // tools write one beside it
+      notes_.push_back("left out, since the recording is there in another file: " +
+                       (is_csv(path) ? path : recorded->second.path));
+      if (is_csv(path)) return;
+    } else if (!is_new) {
       throw InputError("expected recordings of different names, got " + name + " twice, in " +
                        path);
     }
@@ -257,17 +293,11 @@ class RecordingDataset final : public Dataset {
       default_labels_ = named.parent_path();
       return;
     }
-    const auto refuse = [&] {
-      std::vector<std::string_view> titles;
-      for (const RecordingFormatRow& row : kRecordingFormats) titles.push_back(row.title);
-      throw InputError(fmt::format(
-          "expected a recording of an event camera ({}), or a folder of them, got none, in {}",
-          fmt::join(titles, ", "), root.string()));
-    };
-    if (fs::is_regular_file(root)) refuse();
+    if (fs::is_regular_file(root)) throw InputError(recording_fault(root, options_).reason);
     const SourceRoot folder(spec.root, base);
     folder.require_folder("");
     std::vector<std::string> left_out;
+    std::string reason;  // of the last
     for (const std::string& name : folder.folders_in("")) {
       if (const auto format = find_recording_format(folder.on_disk(name), options_)) {
         add(name, spelled(folder.written(name)), *format);
@@ -278,11 +308,24 @@ class RecordingDataset final : public Dataset {
     for (const fs::path name : folder.files_in("")) {
       if (const auto format = find_recording_format(folder.on_disk(name.string()), options_)) {
         add(name.stem().string(), folder.written(name.string()), *format);
+        continue;
+      }
+      const RecordingFault fault = recording_fault(folder.on_disk(name.string()), options_);
+      if (fault.is_recording) {
+        unreadable_.push_back(fault.reason);
       } else if (!is_label_file(name)) {
         left_out.push_back(name.string());
+        reason = fault.reason;
       }
     }
-    if (recordings_.empty()) refuse();
+    if (recordings_.empty()) {
+      std::vector<std::string_view> titles;
+      for (const RecordingFormatRow& row : kRecordingFormats) titles.push_back(row.title);
+      if (!unreadable_.empty()) reason = unreadable_[0];
+      throw InputError(fmt::format(
+          "expected a recording of an event camera ({}), or a folder of them, got none, in {}{}",
+          fmt::join(titles, ", "), root.string(), reason.empty() ? "" : " (" + reason + ")"));
+    }
     if (!left_out.empty()) {
       notes_.push_back(counted(left_out, "entry", " left out in " + folder.written("")));
     }
@@ -310,6 +353,11 @@ class RecordingDataset final : public Dataset {
         return !fs::exists(file) || is_manifest(file) ||
                fs::absolute(file).lexically_normal() == own;
       });
+      if (!files.empty() && files[0].extension() == ".csv" && !is_label_table(files[0])) {
+        notes_.push_back("no labels, since its first line has none of their columns: " +
+                         files[0].string());
+        files.erase(files.begin());
+      }
       if (files.size() > 1) {
         throw InputError("expected labels in one file, got two, in " + files[0].string() + " and " +
                          files[1].string());
@@ -346,6 +394,28 @@ class RecordingDataset final : public Dataset {
     recorded.labels = read_recording_labels(file);
     recorded.label_file = path;
     annotation_files_.push_back(path);
+    for (const fs::path& beside : recording_label_companions(file)) {
+      annotation_files_.push_back(
+          (fs::path(path).parent_path() / beside.filename()).generic_string());
+    }
+  }
+
+  /// Of several recordings, those that do not open are told of and left out.
+  void open_all(const fs::path& base) {
+    const bool is_one = recordings_.size() + unreadable_.size() == 1;
+    std::exception_ptr first;
+    for (auto entry = recordings_.begin(); entry != recordings_.end();) {
+      try {
+        open(entry->second, base);
+        ++entry;
+      } catch (const InputError& error) {
+        if (is_one) throw;
+        if (!first) first = std::current_exception();
+        unreadable_.emplace_back(error.what());
+        entry = recordings_.erase(entry);
+      }
+    }
+    if (recordings_.empty()) std::rethrow_exception(first);
   }
 
   void open(Recorded& recorded, const fs::path& base) {
@@ -523,6 +593,7 @@ class RecordingDataset final : public Dataset {
   std::vector<std::string> annotation_files_;  ///< as FrameRef::path is written
   std::vector<std::string> notes_;
   std::vector<std::string> warnings_;
+  std::vector<std::string> unreadable_;  ///< Dataset::unreadable
 };
 
 }  // namespace

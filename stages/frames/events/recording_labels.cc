@@ -310,6 +310,10 @@ RecordingLabels read_json(std::string_view text, const std::string& file) {
 
 // ---- NumPy
 
+std::filesystem::path class_map_of(const std::filesystem::path& file) {
+  return file.parent_path() / "label_map_dictionary.json";
+}
+
 /// Names of classes by their numbers; none: there is no such file.
 std::optional<std::unordered_map<int, std::string>> read_class_map(
     const std::filesystem::path& file) {
@@ -346,7 +350,7 @@ class BboxReader {
         throw InputError("expected numbers, got text, in " + file_ + " (" + field.name + ")");
       }
     }
-    names_ = read_class_map(file.parent_path() / "label_map_dictionary.json");
+    names_ = read_class_map(class_map_of(file));
   }
 
   RecordingLabels read() {
@@ -427,6 +431,19 @@ class BboxReader {
 };
 
 }  // namespace
+
+std::vector<std::filesystem::path> recording_label_companions(const std::filesystem::path& file) {
+  if (file.extension() != ".npy") return {};
+  return {class_map_of(file)};
+}
+
+bool is_label_table(const std::filesystem::path& file) {
+  const std::string text = read_text_file(file);
+  const auto header = CsvReader(text).next();
+  return !header || std::ranges::any_of(header->fields, [](std::string_view field) {
+    return std::ranges::find(kColumns, field) != kColumns.end();
+  });
+}
 
 RecordingLabels read_recording_labels(const std::filesystem::path& file) try {
   if (file.extension() == ".npy") return BboxReader(file).read();

@@ -37,4 +37,10 @@ struct RecordingLabels {
 /// Throws InputError, with every fault of the file: "expected X, got Y, in FILE (line 3)".
 RecordingLabels read_recording_labels(const std::filesystem::path& file);
 
+/// What is read beside such a file and decides what its labels mean, whether it is there or not.
+std::vector<std::filesystem::path> recording_label_companions(const std::filesystem::path& file);
+
+/// Whether a NAME.csv is one of labels: its first line has one of their columns, or there is none.
+bool is_label_table(const std::filesystem::path& file);
+
 }  // namespace eventgan

@@ -28,8 +28,9 @@ struct PacketPlace {
 
   std::int64_t end() const { return byte + size_bytes; }
   double begin_s() const { return static_cast<double>(begin_us) / 1e6; }
-  /// Whether it can have so many events of such times, none before `last_us`.
-  bool may_have_events_from(std::int64_t last_us) const;
+  double end_s() const { return static_cast<double>(end_us) / 1e6; }
+  /// Whether it can have so many events of such times.
+  bool may_have_events() const;
 };
 
 /// Throws EventFault unless the table tells of a packet as it is; older writers left out all but
@@ -52,7 +53,8 @@ class Aedat4File {
   };
   struct Frame {
     double time_s = 0;
-    bool is_grey = true;
+    bool is_colour = false;
+    bool is_deep = false;  ///< of 16 bits
     GreyImage image;
   };
 
@@ -71,9 +73,13 @@ class Aedat4File {
   std::vector<PacketPlace> find_packets(const std::vector<PacketPlace>& table,
                                         std::vector<std::string>& notes) const;
 
-  /// Reads a packet, whose first event is the recording's `first` and not before `last_us`. What
-  /// was not known of it is known then; what was must be so.
-  CompactEvents events(PacketPlace& packet, std::int64_t first, std::int64_t last_us) const;
+  /// Throws InputError unless the table tells of these packets as they are: of all their places,
+  /// and of the first with events what is in it.
+  void check_table(const std::vector<PacketPlace>& packets, const std::vector<PacketPlace>& table,
+                   int event_stream) const;
+
+  /// Reads a packet. What was not known of it is known then; what was must be so. Times may fall.
+  CompactEvents events(PacketPlace& packet) const;
 
   /// The frame of a packet, which must be of this size; its time is the middle of its exposure.
   Frame frame(const PacketPlace& packet, ImageSize size) const;

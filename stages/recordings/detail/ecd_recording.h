@@ -45,12 +45,10 @@ class EcdRecording final : public Recording {
 
  private:
   EcdRecording(const std::filesystem::path& folder, const EcdImageList& images);
-  std::int64_t first_byte_after(std::size_t frame) const;
 
   std::string name_;
   EcdEventFile events_;
   ImageFrames frames_;
-  EventBoundaries boundaries_;
 };
 
 }  // namespace eventgan

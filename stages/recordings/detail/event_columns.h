@@ -10,7 +10,7 @@
 namespace eventgan {
 
 /// Where an HDF5 file has a dataset for each column of its events: whole numbers [events], x and y
-/// in pixels, t in µs, p 0 or 1 (or -1 or 1).
+/// in pixels, t in µs, p 0 or 1 (or -1 or 1, or a bool).
 struct ColumnLayout {
   std::string events;    ///< the group of x, y, t, p
   std::string ms_index;  ///< whole numbers [ms]: the first event at or after each ms; may be absent
@@ -27,8 +27,8 @@ ColumnLayout dsec_layout();
 /// M3ED's, of one camera: "left" or "right".
 ColumnLayout m3ed_layout(const std::string& camera);
 
-/// `path` is a sequence's folder, or its events.h5. The sensor is what the file says, else the
-/// options', else 640x480.
+/// `path` is a sequence's folder, or its events.h5. The sensor is the options', else what the file
+/// says, else, of a file with ms_to_idx and t_offset, 640x480.
 ///
 /// Frames are the PNGs of SEQUENCE/images/left/distorted, as DSEC-Det has them, with the times of
 /// SEQUENCE/images/timestamps.txt; with `rectify` those of images/left/rectified. DSEC's own images

@@ -23,6 +23,7 @@ class CompactEvents {
  public:
   void reserve(std::size_t count);
   void push_back(const StoredEvent& event);
+  void divide_times(double divisor);
 
   std::int64_t size() const { return std::ssize(t_s_); }
   StoredEvent operator[](std::int64_t place) const;
@@ -80,25 +81,22 @@ class EventParts : public EventStore {
   std::vector<StoredEvent> read(std::int64_t first, std::int64_t count) const final;
   std::vector<double> times_s(std::int64_t first, std::int64_t count) const final;
 
-  /// Exactly, if the times never decrease: a search for it reads two parts at most.
-  std::optional<std::int64_t> near(double time_s) const final;
+  /// Known since it was opened.
+  EventOrder order() const final { return order_; }
 
  protected:
   /// `name` is for messages.
   explicit EventParts(std::string name, RecentEvents& recent = RecentEvents::of_process())
       : name_(std::move(name)), recent_(recent) {}
 
-  /// While it is opened: the next part, which has events, the first at `begin_s`.
-  void add_part(std::int64_t count, double begin_s);
+  /// While it is opened: the next part, which has events of times from `begin_s` to `end_s`.
+  void add_part(std::int64_t count, double begin_s, double end_s);
   /// The same, of what has been read already; nothing if it is empty.
   void add_part(CompactEvents events);
 
   /// The events of a part. If they are not as many as it was added with, the file has changed,
   /// which is told the caller as InputError. Thread safe.
   virtual CompactEvents read_part(std::size_t part) const = 0;
-
-  /// Of the part's first event.
-  std::int64_t first_of(std::size_t part) const { return firsts_[part]; }
 
  private:
   RecentEvents::Events part(std::size_t number) const;
@@ -109,8 +107,8 @@ class EventParts : public EventStore {
   std::string name_;
   RecentEvents& recent_;
   std::vector<std::int64_t> firsts_;  ///< the number of each part's first event
-  std::vector<double> begins_s_;
   std::int64_t count_ = 0;
+  EventOrder order_;
 };
 
 }  // namespace eventgan

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -25,6 +26,12 @@ class RecordingInput {
   bool is_folder() const { return is_folder_; }
   /// A file's first 16 KiB; empty if there are none to read.
   std::string_view beginning() const { return beginning_; }
+  /// Why it cannot be opened; null if it can.
+  const std::exception_ptr& error() const { return error_; }
+  /// Whether it begins as an HDF5 file.
+  bool is_hdf5() const { return is_hdf5_; }
+  /// What the root of an HDF5 file has, by name.
+  std::vector<std::string> hdf5_names() const;
   /// Whether it is an HDF5 file that has the object, such as "events/t".
   bool has_hdf5_object(const std::string& object) const;
 
@@ -34,6 +41,8 @@ class RecordingInput {
   std::filesystem::path path_;
   bool is_folder_ = false;
   std::string beginning_;
+  std::exception_ptr error_;
+  bool is_hdf5_ = false;
   std::unique_ptr<const Hdf5File> hdf5_;
 };
 
@@ -53,6 +62,10 @@ struct RecordingReader {
   /// As the function event_companions. Null: there are none.
   std::vector<std::filesystem::path> (*companions)(const std::filesystem::path& event_file,
                                                    const RecordingOptions& options) = nullptr;
+  /// As the function recording_fault, of what may be of this format; none: it is not. Null: what is
+  /// of this format is found to be.
+  std::optional<RecordingFault> (*fault)(const RecordingInput& input,
+                                         const RecordingOptions& options) = nullptr;
 };
 
 extern const RecordingReader kMvsecReader, kEventganReader, kEcdReader, kAedat4Reader, kDsecReader,

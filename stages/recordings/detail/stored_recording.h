@@ -9,6 +9,7 @@
 
 #include "manifests/values/frames.h"
 #include "stages/recordings/detail/event_check.h"
+#include "stages/recordings/detail/event_order.h"
 #include "stages/recordings/recording.h"
 
 namespace eventgan {
@@ -29,8 +30,9 @@ class EventStore {
   /// Their times alone, in seconds; throws likewise.
   virtual std::vector<double> times_s(std::int64_t first, std::int64_t count) const;
 
-  /// Where to look first for the event of a time; any number serves. None: nothing tells.
-  virtual std::optional<std::int64_t> near(double) const { return std::nullopt; }
+  /// What all times tell; places are events' positions. Reads them once, which takes as long as the
+  /// file is large; what cannot be read is told by it, not thrown.
+  virtual EventOrder order() const;
 };
 
 /// The frames of a recording. Thread safe.
@@ -55,16 +57,21 @@ struct StoredParts {
   ImageSize size;
   std::unique_ptr<EventStore> events;
   std::unique_ptr<FrameStore> frames = nullptr;  ///< null: there are none
-  /// Where to look first for the last event before each frame; empty: nothing is known.
-  std::vector<std::int64_t> event_index = {};
   /// Moves an event; false where it leaves the image and is left out. Null: events stay.
   std::function<bool(Event&)> move = nullptr;
   std::vector<std::string> notes = {};
+  std::vector<std::string> warnings = {};  ///< Recording::warnings
 };
 
+/// The sensor's size: what the manifest gives, else what the file tells. Where they differ,
+/// `parts`, which must have its name, gets a warning. Throws InputError if there is neither.
+ImageSize sensor_size(const std::optional<ImageSize>& told, const std::optional<ImageSize>& given,
+                      StoredParts& parts);
+
 /// The recording of these parts, with the checks that Recording promises: times that never
-/// decrease, pixels inside the image, finite values. Where a frame's events end is looked up by
-/// time, a file's own event index being only a guess, since its meaning differs among files.
+/// decrease, pixels inside the image, finite values. Where the events of a time lie is told by the
+/// order of all times, which is looked at when the first events are asked for; a file's own index
+/// is not used, since its meaning differs among files.
 std::unique_ptr<Recording> make_stored_recording(StoredParts parts);
 
 }  // namespace eventgan

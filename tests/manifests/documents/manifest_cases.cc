@@ -86,7 +86,7 @@ std::vector<ManifestCase> source_cases() {
        {}},
       {"recordings that do not tell everything",
        {{"/sources/0", R"({"dataset": "recording", "root": "r", "rectify": true,
-                           "sensor": {"height": 1, "width": 8192}, "columns": {}})"},
+                           "sensor": {"height": 1, "width": 8192}, "columns": {}, "stream": 0, "time_shift": false})"},
         {"/sources/1", R"({"dataset": "recording", "root": "r", "window_s": 1,
                            "columns": {"t": "t_us", "x": "0", "y": "y", "p": "on", "unit": "ns"}})"},
         events,

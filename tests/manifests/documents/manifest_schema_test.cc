@@ -54,7 +54,6 @@ TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
   EXPECT_EQ(stated((columns + "x").c_str()), fields.x);
   EXPECT_EQ(stated((columns + "y").c_str()), fields.y);
   EXPECT_EQ(stated((columns + "p").c_str()), fields.p);
-  EXPECT_EQ(stated((columns + "unit").c_str()), word_of(kTimeUnitWords, fields.tick_s));
   EXPECT_EQ(stated("/properties/sources/items/properties/camera"), source.recording.camera);
   EXPECT_EQ(stated("/properties/sources/items/properties/rectify"), source.recording.rectify);
   EXPECT_EQ(stated("/properties/sources/items/properties/pairs/properties/side"),

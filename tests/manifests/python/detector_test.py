@@ -121,3 +121,31 @@ def test_a_few_steps(channels, data, tmp_path):
     done = subprocess.run([*line, "--classes", "Cat", "--epochs", "1", "--out", tmp_path / "cats"], capture_output=True,
                           text=True)
     assert done.returncode == 1 and "got Cat" in done.stderr and "Traceback" not in done.stderr
+
+
+class TestShards:
+    """As much of Shards as training.detection_test asks for: images of 1280x720 with cars alone."""
+    _described_as = "test"
+
+    def image_area(self):
+        return np.array([0.0, 0.0, 1280.0, 720.0])
+
+    def known_classes(self):
+        return ["Car"]
+
+
+def test_a_test_set_of_its_own_has_its_own_view_and_need_not_have_all_classes():
+    """The training's view would show a part of its images: a box at their lower right corner must be seen whole."""
+    import argparse
+    training = detector.training
+    view = detector.fitted([0, 0, 346, 260], (256, 352))
+    dataset, own = training.detection_test(argparse.Namespace(test="elsewhere"), TestShards(), ["Van", "Car"],
+                                           (256, 352), view)
+    assert dataset.classes == {"Car": 1}
+    left, top, right, bottom = training.move_boxes(np.array([[1180.0, 620.0, 1280.0, 720.0]]), own)[0]
+    assert 0 <= left < right <= 352 and 0 <= top < bottom <= 256
+    assert (right - left) / 100 == pytest.approx(352 / 1280)
+    same, its = training.detection_test(argparse.Namespace(test=None), TestShards(), ["Car"], (256, 352), view)
+    assert its is view and same.classes == {"Car": 0}
+    with pytest.raises(ValueError, match="expected classes of Car, got Van"):
+        training.detection_test(argparse.Namespace(test=None), TestShards(), ["Van"], (256, 352), view)

@@ -158,6 +158,17 @@ def test_a_sample_s_own_labels_and_others_in_their_place():
     assert eventgan.show(own, ax=ax) is ax
 
 
+def test_outlines_are_edges_too():
+    sample = {"volume": np.zeros((18, 20, 30)), "boxes": {
+        "xyxy": np.array([[1.0, 2, 5, 6], [7, 8, 9, 10]]), "class_id": np.array([1, 0]), "ignore": np.array([0, 0]),
+        "outline": np.array([b"[[1,2,5,2,5,6],[3,3,3,4,4,4]]", b""], object)}}
+    outer, hole, first, second = eventgan.show(sample).patches
+    np.testing.assert_array_equal(outer.get_xy(), [(0.5, 1.5), (4.5, 1.5), (4.5, 5.5), (0.5, 1.5)])
+    np.testing.assert_array_equal(hole.get_xy()[:3], [(2.5, 2.5), (2.5, 3.5), (3.5, 3.5)])
+    assert outer.get_edgecolor() == first.get_edgecolor() != second.get_edgecolor() and not outer.get_fill()
+    assert len(eventgan.show(sample, boxes=sample["boxes"]["xyxy"]).patches) == 2  # others in their place
+
+
 def test_a_scale_is_that_of_the_stored_numbers():
     stored = (one_event(2, 8) * 10).astype(np.uint8)
     np.testing.assert_array_equal(eventgan.show({"volume": stored, "scale": np.float32(0.1)}).images[0].get_array(),

@@ -185,6 +185,7 @@ def test_tables_compare_seed_by_seed():
 
 def test_rows_are_those_of_one_thing_each():
     rows = [*real_cameras.rows(["one", "other"]), *real_cameras.drawn_sensors(), *real_cameras.ablations()]
+    rows += [row for row in real_cameras.in_layers() if row not in rows]
     assert len({row.name for row in rows}) == len(rows)
     known = {*labelled_events.SOURCES, "real one", "real other"}
     assert all(set(row.sources) <= known for row in rows)

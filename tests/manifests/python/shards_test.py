@@ -73,6 +73,37 @@ def test_volumes_as_they_are_stored(example):
     np.testing.assert_allclose(sample["volume"] * sample["scale"], expected, rtol=0, atol=3e-3)
 
 
+def test_outlines_are_bytes_and_masks(example):
+    shards = Shards(example.path("float16-1"))
+    boxes = shards[0]["boxes"]
+    assert list(boxes["outline"]) == [b"[[1,1,4.25,1,4.25,4.5,1,4.5],[2,2,2,3,3,3,3,2]]", b""]
+    masks = shards.masks(0)
+    expected = np.zeros((6, 8), bool)
+    expected[1:4, 1:4] = True  # the centres 1.5 to 3.5; 4.5 is an edge, and belongs to what is below it
+    expected[2, 2] = False
+    assert masks.dtype == bool and masks.shape == (2, 6, 8)
+    np.testing.assert_array_equal(masks, [expected, np.zeros((6, 8), bool)])
+    assert shards.masks(1).shape == (0, 6, 8) and not shards.masks(2).any()
+    with pytest.raises(IndexError, match="got number 4"):
+        shards.masks(4)
+    pickle.loads(pickle.dumps(shards[0]))
+    assert "outline" not in Shards(example.path("unlabelled"))[0]["boxes"]
+    assert Shards(example.path("unlabelled")).masks(0).shape == (0, 6, 8)
+
+
+def test_masks_end_where_the_image_does(example, tmp_path):
+    path = tmp_path / "letterbox.h5"
+    path.write_bytes(example.path("float16-1").read_bytes())
+    with h5py.File(path, "r+") as file:
+        # 16 x 12 pixels as 8 x 4, with a row of border above and below: an edge maps as x / 2 and y / 3 + 1
+        file["pairs/source_to_volume"][3] = [[1 / 2, 0, -1 / 4], [0, 1 / 3, 1 / 6 + 1 - 1 / 2]]
+        outlines = file["labels/boxes/outline"]
+        outlines[2] = np.frombuffer(b"[[-9,-9,99,-9,99,99,-9,99]]", np.uint8)
+    expected = np.zeros((6, 8), bool)
+    expected[1:5] = True
+    np.testing.assert_array_equal(Shards(path).masks(2), [expected])
+
+
 def half(sample):
     return sample["volume"] / 2
 

@@ -122,7 +122,7 @@ TEST(DatasetDescription, SaysWhatTheDatasetIs) {
   EXPECT_EQ(text["version"], "1.0");
   EXPECT_THAT(text["features"],
               ElementsAre("camera", "difficulty", "joint_aliases", "joints3d", "motion", "origin",
-                          "person_boxes", "projection", "threshold", "tiles", "times"));
+                          "outlines", "person_boxes", "projection", "threshold", "tiles", "times"));
   EXPECT_EQ(text["name"], "demo");
   EXPECT_EQ(text["complete"], true);
   EXPECT_EQ(text["missing"], nlohmann::json::array());

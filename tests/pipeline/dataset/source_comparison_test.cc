@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
+#include <cmath>
 #include <utility>
 
 #include "manifests/documents/job_manifest.h"
@@ -53,6 +54,24 @@ TEST_F(RowDifferences, AreNoneIfAllIsTheSame) {
   EXPECT_THAT(found(expected_), IsEmpty());
   expected_.labels.boxes[0].unclipped.right = 1e300;
   stored_.boxes.xyxy_unclipped[2] = 1e300 * (1 + 1e-15);
+  EXPECT_THAT(found(expected_), IsEmpty());
+  const float corner = std::nextafter(4.25f, 5.0f);  // of an outline, which has 32 bits
+  expected_.labels.boxes[0].outline.rings[0][1].x = corner;
+  EXPECT_THAT(found(expected_), IsEmpty());
+}
+
+TEST_F(RowDifferences, AreOfOutlinesThatLieElsewhere) {
+  Outline& outline = expected_.labels.boxes[0].outline;
+  outline.rings[0][1].x += 1e-5;
+  EXPECT_THAT(found(expected_),
+              ElementsAre(HasSubstr(" in /labels/boxes/outline of box 0 according to labels/0.txt, "
+                                    "got 47 bytes")));
+  outline = example_.samples[0].labels.boxes[0].outline;
+  outline.rings.pop_back();
+  EXPECT_THAT(found(expected_), ElementsAre(HasSubstr("expected 29 bytes in ")));
+  outline = {};
+  EXPECT_THAT(found(expected_), ElementsAre(HasSubstr("expected 0 bytes in ")));
+  stored_.boxes.outline.clear();
   EXPECT_THAT(found(expected_), IsEmpty());
 }
 

@@ -101,6 +101,33 @@ TEST(SimulatedGenerator, EsimMovesThePreviousFrame) {
   EXPECT_EQ(sum(volume_of(*generator, halves(50, 50), halves(50, 200))), 0);
 }
 
+TEST(SimulatedGenerator, EsimSeesWhatIsBetweenTheFramesIfThatIsKnown) {
+  const auto generator = make_simulated_generator(quiet(GeneratorKind::kEsim), 5, 1);
+  // All of it is 50 at both ends and 200 half-way: ln((200/255 + 0.001)/(50/255 + 0.001)) = 1.382
+  // is six thresholds of 0.2 up, and six down again.
+  std::vector<double> asked;
+  FramesBetween between;
+  between.at = [&](double u) {
+    asked.push_back(u);
+    const auto level = static_cast<std::uint8_t>(u == 0.5 ? 200 : 50);
+    return GreyImage{kSize, std::vector<std::uint8_t>(kSize.pixel_count(), level)};
+  };
+  const auto events = [&](double displacement_px) {
+    between.displacement_px = displacement_px;
+    asked.clear();
+    std::vector<float> frames(2 * kSize.pixel_count());
+    std::vector<float> volume(VolumeShape{5, kSize}.value_count());
+    generator->generate({frames, kSize, std::nullopt, &between}, volume);
+    return sum(volume) / static_cast<double>(kSize.pixel_count());
+  };
+  EXPECT_NEAR(events(2), 12, 1e-3);
+  EXPECT_THAT(asked, ::testing::ElementsAre(0, 0.5, 1));
+  EXPECT_NEAR(events(3.5), 12, 1e-3) << "no more than 1 px a step";
+  EXPECT_THAT(asked, ::testing::ElementsAre(0, 0.25, 0.5, 0.75, 1));
+  EXPECT_NEAR(events(0), 0, 1e-3);
+  EXPECT_THAT(asked, ::testing::ElementsAre(0, 1));
+}
+
 TEST(SimulatedGenerator, DependsOnFramesSeedAndSettingsAlone) {
   const GeneratorSpec spec = quiet(GeneratorKind::kEsim);
   const auto frames = halves(50, 200);

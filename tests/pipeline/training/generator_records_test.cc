@@ -38,7 +38,8 @@ TEST(TrainedWeights, RunAndSayWhereTheyComeFrom) {
 
     const auto recordings =
         open_training_recordings(manifest.recordings, manifest.directory, manifest.crop, 1);
-    add_final_origin(weights, manifest, recordings, {{"volume", 0.25}});
+    add_final_origin(weights, manifest, training_settings(manifest, recordings),
+                     {{"volume", 0.25}});
     EXPECT_EQ(weights.metadata.at("training_recordings_sha256"),
               "bar.hdf5\t" + sha256_of_file(folder / "bar.hdf5") + "\n");
     EXPECT_EQ(weights.metadata.at("training_losses"), "volume\t0.25\n");
@@ -53,7 +54,9 @@ TEST(TrainedWeights, SayWhichTexturesTheySaw) {
   testing::write_file(folder / "textures/b/c.png", "1");
   testing::write_file(folder / "textures/a.png", "2");
   Weights weights;
-  add_final_origin(weights, manifest, {}, {});
+  const auto recordings =
+      open_training_recordings(manifest.recordings, manifest.directory, manifest.crop, 1);
+  add_final_origin(weights, manifest, training_settings(manifest, recordings), {});
   const std::string c = "c.png\t" + sha256_hex("1") + "\n";
   const std::string all = "a.png\t" + sha256_hex("2") + "\nb/" + c;
   EXPECT_EQ(weights.metadata.at("training_textures_sha256"),
@@ -65,7 +68,9 @@ TEST(TrainedWeights, SayWhoTaughtThem) {
   TrainingManifest manifest = testing::small_training(folder.path());
   manifest.teacher = "bar.hdf5";  // any file
   Weights weights;
-  add_final_origin(weights, manifest, {}, {});
+  const auto recordings =
+      open_training_recordings(manifest.recordings, manifest.directory, manifest.crop, 1);
+  add_final_origin(weights, manifest, training_settings(manifest, recordings), {});
   EXPECT_EQ(weights.metadata.at("training_teacher_sha256"), sha256_of_file(folder / "bar.hdf5"));
 }
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "manifests/values/faults.h"
+#include "stages/base/files/sha256.h"
 #include "tests/pipeline/training/bar_training.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -54,16 +55,26 @@ TEST_F(Resumption, NamesTheFieldThatDiffers) {
               AllOf(HasSubstr("$.batch: expected 2, got 4"), Not(HasSubstr("$.seed"))));
 }
 
-TEST_F(Resumption, ComparesTheTextures) {
+TEST_F(Resumption, ComparesTheTexturesByTheirBytes) {
   settings();
   manifest_.simulated = SimulatedSpec{{"textures"}, 0.5};
   testing::write_file(folder_ / "textures/a.png", "abc");
   const auto before = training_settings(manifest_, {});
-  EXPECT_EQ(before.at("textures textures"), "1 files, 3 bytes");
-  testing::write_file(folder_ / "textures/b.png", "d");
-  EXPECT_THROW(
-      check_resumable(before, training_settings(manifest_, {}), kInReconstruction, manifest_),
-      UsageError);
+  EXPECT_EQ(before.at("textures 0"), sha256_hex("a.png\t" + sha256_hex("abc") + "\n"));
+  // What a training draws into an output folder below is no texture, nor is what is no image.
+  testing::write_file(folder_ / "textures/out/training.lock", "");
+  testing::write_file(folder_ / "textures/out/images/generator-1.png", "abc");
+  testing::write_file(folder_ / "textures/read.me", "abc");
+  EXPECT_EQ(training_settings(manifest_, {}), before);
+  const auto now = [&](const std::string& file, const std::string& bytes) {
+    testing::write_file(folder_ / file, bytes);
+    return training_settings(manifest_, {});
+  };
+  for (const char* bytes : {"abd", "abc"}) {  // of the same size; the name alone
+    const auto changed =
+        now(bytes == std::string("abd") ? "textures/a.png" : "textures/b.png", bytes);
+    EXPECT_THROW(check_resumable(before, changed, kInReconstruction, manifest_), UsageError);
+  }
 }
 
 TEST_F(Resumption, ComparesTheTeacher) {
@@ -76,11 +87,11 @@ TEST_F(Resumption, ComparesTheTeacher) {
   EXPECT_THROW(check_resumable(with("abc"), with("abd"), kInReconstruction, manifest_), UsageError);
 }
 
-TEST_F(Resumption, ComparesTheRecordings) {
+TEST_F(Resumption, ComparesTheRecordingsByTheirBytes) {
   auto before = settings();
   const auto now = before;
-  EXPECT_THAT(before.at("recording 0"), HasSubstr("9 frames of 64x56"));
-  before["recording 0"] = "1 bytes, 9 frames of 64x56";
+  EXPECT_EQ(before.at("recording 0"), sha256_of_file(folder_ / "bar.hdf5"));
+  before["recording 0"] = sha256_hex("another of the same size");
   EXPECT_THROW(check_resumable(before, now, kInReconstruction, manifest_), UsageError);
 }
 

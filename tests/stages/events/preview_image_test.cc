@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
@@ -129,7 +130,7 @@ void add_box(PreviewContent& content, const Rectangle& edges, bool ignore) {
   box.xyxy = edges;
   box.ignore = ignore;
   content.annotation.boxes.push_back(box);
-  content.labels.boxes.push_back({edges, edges, ignore});
+  content.labels.boxes.push_back({edges, edges, ignore, {}});
   content.schema.class_names = {"Car"};
 }
 
@@ -194,6 +195,35 @@ TEST(PreviewImage, ABoxStandsAtItsPlace) {
     EXPECT_EQ(cv::countNonZero(marks.rowRange(0, 4 * 50 - 2)) > 0, number > 0)
         << "the caption is above, where the label belongs";
   }
+}
+
+TEST(PreviewImage, AnOutlineIsDrawnWhereTheLabelBelongs) {
+  PreviewContent content = content_with(90);
+  for (const bool ignore : {false, true}) {
+    add_box(content, {40, 50, 90, 80}, ignore);
+    content.labels.boxes.back().outline = {{{{50, 60}, {80, 60}, {80, 75}, {50, 75}}}};
+    for (int number = 0; number < 3; ++number) {
+      const cv::Mat marks = labels_only(content, number);
+      for (const cv::Point edge : {cv::Point(65, 60), {80, 67}, {65, 75}, {50, 67}}) {
+        const cv::Rect around(4 * edge.x - 2, 4 * edge.y - 2, 5, 5);
+        EXPECT_EQ(cv::countNonZero(marks(around)) > 0, number > 0) << edge;
+      }
+      EXPECT_EQ(cv::countNonZero(marks(cv::Rect(4 * 52, 4 * 62, 4 * 26, 4 * 11))), 0);
+    }
+    content.annotation.boxes.clear();
+    content.labels.boxes.clear();
+  }
+}
+
+TEST(PreviewImage, OutlinesOfAnySizeAreDrawn) {
+  PreviewContent content = content_with(90);
+  add_box(content, {40, 50, 90, 80}, /*ignore=*/false);
+  auto& ring = content.labels.boxes[0].outline.rings.emplace_back();
+  for (int i = 0; i < 100'000; ++i) {
+    const double angle = 2 * M_PI * i / 100'000;
+    ring.push_back({65 + 1e6 * std::cos(angle), 65 + 10 * std::sin(angle)});
+  }
+  EXPECT_GT(cv::countNonZero(labels_only(content, 2)), 0);
 }
 
 TEST(PreviewImage, TheLabelledFrameIsMarkedAndTheOtherHasThinDashes) {

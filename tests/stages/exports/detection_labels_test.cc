@@ -2,7 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
+
+#include "manifests/values/outlines.h"
 
 namespace eventgan {
 namespace {
@@ -71,13 +76,135 @@ TEST(CocoImage, HasSizeAndId) {
 }
 
 TEST(CocoBox, IsLeftTopWidthHeight) {
-  const Json json = Json::parse(coco_box({7, 5, 2}, {1.5, 2, 4, 8}, true));
+  const Json json = Json::parse(coco_box({7, 5, 2}, {1.5, 2, 4, 8}, true, {}, {9, 9}));
   EXPECT_EQ(json["bbox"], Json({1.5, 2.0, 2.5, 6.0}));
   EXPECT_EQ(json["area"], 15.0);
   EXPECT_EQ(json["iscrowd"], 1);
   EXPECT_EQ(json["id"], 7);
   EXPECT_EQ(json["image_id"], 5);
   EXPECT_EQ(json["category_id"], 2);
+  EXPECT_FALSE(json.contains("segmentation"));
+}
+
+TEST(CocoBox, PartsArePolygonsAndTheAreaTheirPixels) {
+  // The second part covers columns 5 and 6 of row 3; of the first the centres with x + y >= 4.
+  const Outline outline{
+      {{{4.25, 0}, {4.25, 4}, {0.25, 4}}, {{4.75, 3}, {7, 3}, {7, 4}, {4.75, 4}}}};
+  const Json json = Json::parse(coco_box({1, 1, 1}, {0.25, 0, 7, 4}, false, outline, {6, 8}));
+  EXPECT_EQ(json["segmentation"],
+            Json::parse("[[4.25, 0, 4.25, 4, 0.25, 4], [4.75, 3, 7, 3, 7, 4, 4.75, 4]]"));
+  int area = 2;
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 4; ++x) area += x + 0.5 + y + 0.5 >= 4.25 ? 1 : 0;
+  }
+  EXPECT_EQ(json["area"], area);
+  EXPECT_EQ(json["bbox"], Json({0.25, 0.0, 6.75, 4.0}));
+}
+
+TEST(CocoBox, HolesAndCrowdsAreRunLengths) {
+  // Rows ###. / #.#. / ###. in 4 x 3 pixels, down the columns: 3 on, 1 on, 1 off, 4 on, 3 off.
+  const Outline holed{{{{0, 0}, {3, 0}, {3, 3}, {0, 3}}, {{1, 1}, {1, 2}, {2, 2}, {2, 1}}}};
+  const Json json = Json::parse(coco_box({1, 1, 1}, {0, 0, 3, 3}, false, holed, {3, 4}));
+  EXPECT_EQ(json["area"], 8);
+  EXPECT_EQ(json["segmentation"]["size"], Json({3, 4}));
+  // 0 4 1 4 3, less the one two before from the fourth on: 0 4 1 0 2, each plus 48.
+  EXPECT_EQ(json["segmentation"]["counts"], "04102");
+  const Outline whole{{holed.rings[0]}};
+  EXPECT_TRUE(Json::parse(coco_box({1, 1, 1}, {0, 0, 3, 3}, false, whole, {3, 4}))["segmentation"]
+                  .is_array());
+  EXPECT_EQ(
+      Json::parse(coco_box({1, 1, 1}, {0, 0, 3, 3}, true, whole, {3, 4}))["segmentation"]["counts"],
+      "093");  // 0 9 3
+}
+
+/// The corners of a line, in pixels; what is wrong with it fails.
+std::vector<Point> corners_of(const std::string& line, ImageSize volume) {
+  std::istringstream words(line);
+  int number = -1;
+  words >> number;
+  EXPECT_EQ(number, 7);
+  std::vector<Point> corners;
+  for (double x = 0, y = 0; words >> x >> y;) {
+    EXPECT_TRUE(x >= 0 && x <= 1 && y >= 0 && y <= 1) << line;
+    corners.push_back({x * volume.width, y * volume.height});
+  }
+  EXPECT_GE(corners.size(), 3u);
+  return corners;
+}
+
+/// How many edges lie right of a point: a fill by turns covers it if they are odd.
+bool is_odd(const std::vector<Point>& ring, double x, double y) {
+  bool odd = false;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const Point a = ring[i], b = ring[(i + 1) % ring.size()];
+    if ((a.y > y) == (b.y > y)) continue;
+    if (a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x) > x) odd = !odd;
+  }
+  return odd;
+}
+
+/// One line covers what the outline does, by turns.
+void expect_same_pixels(const Outline& outline, ImageSize volume) {
+  const std::vector<Point> ring = corners_of(yolo_outline_line(7, outline, volume), volume);
+  const GreyImage mask = mask_of(outline, volume);
+  for (int y = 0; y < volume.height; ++y) {
+    for (int x = 0; x < volume.width; ++x) {
+      const std::size_t at = static_cast<std::size_t>(y * volume.width + x);
+      ASSERT_EQ(is_odd(ring, x + 0.5, y + 0.5), mask.pixels[at] != 0) << x << " " << y;
+    }
+  }
+}
+
+TEST(YoloOutlineLine, OfOneRingIsItsCornersAsShares) {
+  EXPECT_EQ(yolo_outline_line(3, {{{{10, 8}, {30, 8}, {30, 24.00000001}}}}, {24, 40}),
+            "3 0.250000000 0.333333333 0.750000000 0.333333333 0.750000000 1.000000000");
+}
+
+TEST(YoloOutlineLine, BridgesLeadToPartsAndHolesAndBack) {
+  // From (4, 0) to the second square's (6, 0), around it, and back.
+  EXPECT_EQ(yolo_outline_line(
+                0, {{{{0, 0}, {4, 0}, {4, 4}, {0, 4}}, {{6, 0}, {8, 0}, {8, 4}, {6, 4}}}}, {8, 8}),
+            "0 0.000000000 0.000000000 0.500000000 0.000000000 0.750000000 0.000000000 "
+            "1.000000000 0.000000000 1.000000000 0.500000000 0.750000000 0.500000000 "
+            "0.750000000 0.000000000 0.500000000 0.000000000 0.500000000 0.500000000 "
+            "0.000000000 0.500000000");
+  expect_same_pixels({{{{1, 1}, {19, 1}, {19, 19}, {1, 19}},
+                       {{5, 5}, {5, 9}, {9, 9}, {9, 5}},
+                       {{12, 12}, {12, 15}, {15.25, 15}},
+                       {{20, 20}, {25, 20}, {25, 25.25}}}},
+                     {26, 27});
+}
+
+TEST(YoloOutlineLine, OverlappingPartsAreFilledOnce) {
+  expect_same_pixels({{{{1, 1}, {9, 1}, {9, 9}, {1, 9}}, {{5, 5}, {13, 5}, {13, 12}, {5, 12}}}},
+                     {14, 15});
+}
+
+TEST(YoloOutlineLine, CoversWhatAnyMaskDoes) {
+  std::mt19937 random(3);
+  for (int trial = 0; trial < 30; ++trial) {
+    GreyImage mask{{1 + static_cast<int>(random() % 17), 2 + static_cast<int>(random() % 19)}, {}};
+    for (std::size_t i = 0; i < mask.size.pixel_count(); ++i) {
+      mask.pixels.push_back(random() % 5 < static_cast<unsigned>(trial % 5) ? 1 : 0);
+    }
+    mask.pixels[0] = 1;
+    expect_same_pixels(outline_of(mask), mask.size);
+  }
+}
+
+TEST(YoloOutlineLine, OfAHundredThousandCornersIsQuick) {
+  Outline outline;
+  for (const double radius : {400.0, 300.0}) {  // a ring and its hole
+    auto& ring = outline.rings.emplace_back();
+    for (int i = 0; i < 50'000; ++i) {
+      const double angle = (radius > 350 ? 1 : -1) * 2 * M_PI * i / 50'000;
+      ring.push_back({450 + radius * std::cos(angle), 450 + radius * std::sin(angle)});
+    }
+  }
+  const auto corners = corners_of(yolo_outline_line(7, outline, {900, 900}), {900, 900});
+  EXPECT_EQ(corners.size(), 100'002u);
+  EXPECT_TRUE(is_odd(corners, 450 + 350, 450));
+  EXPECT_FALSE(is_odd(corners, 450, 450));
 }
 
 TEST(CocoPerson, JointsAreMovedByHalfAPixelAndSayHowVisible) {

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <random>
+#include <utility>
 
 namespace eventgan {
 namespace {
@@ -270,6 +272,137 @@ TEST(MapLabels, PlacesLieWithinAMillionPixels) {
   one = good;
   one.camera = Intrinsics{1000, 1e308, 50, 50};
   EXPECT_THAT(reason({"", {}, {one}}), HasSubstr("a camera within 1e6 pixels, got f_x 1000"));
+}
+
+/// How often an outline winds around a point: the sum of the angles under which it sees the edges.
+int winding(const Outline& outline, double x, double y) {
+  double angle = 0;
+  for (const auto& ring : outline.rings) {
+    for (std::size_t i = 0; i < ring.size(); ++i) {
+      const Point a{ring[i].x - x, ring[i].y - y};
+      const Point b{ring[(i + 1) % ring.size()].x - x, ring[(i + 1) % ring.size()].y - y};
+      angle += std::atan2(a.x * b.y - a.y * b.x, a.x * b.x + a.y * b.y);
+    }
+  }
+  return static_cast<int>(std::lround(angle / (2 * std::acos(-1))));
+}
+
+/// Rings of up to nine corners anywhere in and around an image, either way round.
+Outline random_outline(ImageSize image, std::mt19937& random) {
+  const auto within = [&](double least, double most) {
+    return std::uniform_real_distribution(least, most)(random);
+  };
+  Outline outline;
+  for (int rings = 1 + static_cast<int>(random() % 3); rings > 0; --rings) {
+    auto& ring = outline.rings.emplace_back();
+    for (int corners = 3 + static_cast<int>(random() % 7); corners > 0; --corners) {
+      ring.push_back({within(-0.4 * image.width, 1.4 * image.width),
+                      within(-0.4 * image.height, 1.4 * image.height)});
+    }
+  }
+  return outline;
+}
+
+Box outlined(Outline outline) {
+  Box made = box(0, 0, 30, 30);
+  made.outline = std::move(outline);
+  return made;
+}
+
+TEST(MapLabels, AnOutlineMapsAsTheEdgesOfItsBox) {
+  const Outline outline{{{{10, 20}, {30.5, 20}, {30.5, 41}}}};
+  Box one = box(10, 20, 30.5, 41);
+  one.outline = outline;
+  const VolumeBox half = mapped({"", {one}, {}}, kHalf).boxes[0];
+  const double down = 188.0 / 375;
+  EXPECT_EQ(half.outline, (Outline{{{{5, 20 * down}, {15.25, 20 * down}, {15.25, 41 * down}}}}));
+  EXPECT_FALSE(half.ignore);
+  const VolumeBox none = mapped({"", {box(0, 0, 9, 9)}, {}}, kHalf).boxes[0];
+  EXPECT_TRUE(none.outline.empty());
+}
+
+TEST(MapLabels, WhatAnOutlineCoversIsWhatItCoversInTheSource) {
+  std::mt19937 random(7);
+  // Odd sizes: a letterbox, a crop, both axes by other factors, and a still without its borders.
+  for (const Placement& placement : {Placement{{37, 51}, {29, 40}, {41, 40}, 0, 6},
+                                     Placement{{37, 51}, {37, 51}, {21, 17}, -17, -8},
+                                     Placement{{37, 51}, {90, 23}, {90, 23}, 0, 0},
+                                     Placement{{37, 51}, {29, 40}, {41, 40}, 0, 6, 5, 3}}) {
+    for (int trial = 0; trial < 10; ++trial) {
+      Box one = box(-30, -30, 90, 90);
+      one.outline = random_outline(placement.source, random);
+      const Outline got = mapped({"", {one}, {}}, placement).boxes[0].outline;
+      for (int y = 0; y < placement.volume.height; ++y) {
+        for (int x = 0; x < placement.volume.width; ++x) {
+          const double source_x = (x + 0.5 - placement.offset_x) * (51 - 2 * placement.border_x) /
+                                      placement.scaled.width +
+                                  placement.border_x;
+          const double source_y = (y + 0.5 - placement.offset_y) * (37 - 2 * placement.border_y) /
+                                      placement.scaled.height +
+                                  placement.border_y;
+          ASSERT_EQ(winding(got, x + 0.5, y + 0.5), winding(one.outline, source_x, source_y));
+        }
+      }
+    }
+  }
+}
+
+TEST(MapLabels, AnOutlineThatACropLeavesNothingOfIsIgnoredWithItsBox) {
+  Box one = box(400, 150, 460, 200);  // kMiddle shows it from x = 421 on
+  one.outline = {{{{400, 150}, {420, 150}, {420, 200}}}};
+  VolumeBox got = mapped({"", {one}, {}}, kMiddle).boxes[0];
+  EXPECT_FALSE(is_empty(got.clipped));
+  EXPECT_TRUE(got.ignore);
+  EXPECT_EQ(got.outline, (Outline{{{{-21, 50}, {-1, 50}, {-1, 100}}}})) << "it is kept, uncut";
+  one.outline.rings[0][1].x = 422;
+  EXPECT_FALSE(mapped({"", {one}, {}}, kMiddle).boxes[0].ignore);
+}
+
+TEST(MapLabels, AnOutlineOfACornerThatIsNoPlaceIsAFault) {
+  for (const double wrong : {kNan, HUGE_VAL, -1.1e6}) {
+    EXPECT_THAT(fault(outlined({{{{0, 0}, {9, 0}, {9, wrong}}}})),
+                HasSubstr("expected an outline within 1e6 pixels, got (9, "));
+  }
+  EXPECT_EQ(fault(outlined({{{{0, 0}, {9, 0}, {9, -1e6}}}})), "");
+}
+
+TEST(MapLabels, AnOutlineApartFromItsBoxIsAFault) {
+  EXPECT_EQ(fault(outlined({{{{31, 5}, {40, 5}, {40, 9}}}})),
+            "expected an outline over its box, left 0, top 0, right 30, bottom 30, got one around "
+            "left 31, top 5, right 40, bottom 9, in box 1 of 1, in label_2/001497.txt");
+  EXPECT_EQ(fault(outlined({{{{30, 5}, {40, 5}, {40, 9}}}})), "");
+  Box region = outlined({{{{31, 5}, {40, 5}, {40, 9}}}});
+  region.ignore = true;
+  EXPECT_THAT(fault(region), HasSubstr("expected an outline over its box"));
+}
+
+TEST(Clip, OfAnOutlineCoversTheSameWithinTheAreaAndHasNoCornerOutside) {
+  std::mt19937 random(11);
+  const Rectangle area{3, 2, 31, 22.5};
+  for (int trial = 0; trial < 60; ++trial) {
+    const Outline outline = random_outline({24, 35}, random);
+    const Outline cut = clip(outline, area);
+    for (const auto& ring : cut.rings) {
+      ASSERT_GE(ring.size(), 3u);
+      for (const Point& corner : ring) {
+        ASSERT_TRUE(corner.x >= 3 && corner.x <= 31 && corner.y >= 2 && corner.y <= 22.5);
+      }
+    }
+    for (double y = 2.25; y < 22.5; ++y) {
+      for (double x = 3.25; x < 31; ++x) {
+        ASSERT_EQ(winding(cut, x, y), winding(outline, x, y)) << trial << ": " << x << " " << y;
+      }
+    }
+  }
+}
+
+TEST(Clip, OfAnOutlineWithinChangesNothingAndOfOneOutsideLeavesNothing) {
+  const Outline within{{{{3, 2}, {31, 2}, {31, 22}}, {{5, 3}, {5, 4}, {6, 4}}}};
+  EXPECT_EQ(clip(within, {3, 2, 31, 22}), within);
+  EXPECT_TRUE(clip(within, {-9, -9, 2, 1}).empty());
+  EXPECT_TRUE(clip(within, {31, 0, 40, 40}).empty()) << "they touch";
+  EXPECT_TRUE(clip(within, {3, 21, 4, 30}).empty()) << "beside it";
+  EXPECT_TRUE(clip(Outline(), {0, 0, 9, 9}).empty());
 }
 
 TEST(MapLabels, AProjectionThatIsNotFiniteIsAFault) {

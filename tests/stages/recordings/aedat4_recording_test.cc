@@ -25,6 +25,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Throws;
 using ::testing::ThrowsMessage;
 
 constexpr int kEventStream = 0;
@@ -247,10 +248,10 @@ TEST_F(Aedat4Test, OfItsPacketsOnlyThoseOfTheWindowAreRead) {
   const InputCounter counter;
   const auto recording = open_recording(path_, RecordingFormat::kAedat4);
   EXPECT_EQ(recording->frame_count(), 0);
-  EXPECT_LT(counter.of(path_).bytes, kPacket / 2);  // the header and the table
+  EXPECT_LT(counter.of(path_).bytes, 3 * kPacket / 2);  // header, table and the first packet
   // Of packets 20 and 21; their times are looked for up to 512 events around.
   EXPECT_EQ(recording->events_in(0.0206, 0.0214).size(), 800u);
-  EXPECT_LT(counter.of(path_).bytes, 3 * kPacket);
+  EXPECT_LT(counter.of(path_).bytes, 4 * kPacket);
 }
 
 // Grey as ITU-R BT.601 weighs: 0.114 * 10 + 0.587 * 100 + 0.299 * 200 = 119.64.
@@ -310,53 +311,89 @@ TEST_F(Aedat4Test, ReadsTablesOfBothAlignments) {
   EXPECT_EQ(open("#!AER-DAT4.0\r\n" + table + packets)->events_in(0, 2).size(), 5u);
 }
 
-TEST_F(Aedat4Test, RefusesATableThatSaysOtherwise) {
+TEST_F(Aedat4Test, DoesWithoutATableThatSaysOtherwise) {
   using Change = std::function<void(TestFile&)>;
   const auto changed = [](const Change& change) {
     TestFile file = small();
     change(file);
     return file.bytes();
   };
-  const Change seen_on_opening[] = {[](TestFile& file) { file.packets[1].count = 2; },
-                                    [](TestFile& file) { file.packets[3].count = 1; },
-                                    [](TestFile& file) { file.packets[0].end_us = 1; },
-                                    [](TestFile& file) { file.packets[5].begin_us -= 1; }};
-  for (const Change& change : seen_on_opening) {
-    expect_refused(changed(change), "in the table as it is");
-  }
-  const Change seen_when_read[] = {[](TestFile& file) { file.packets[0].count = 3; },
-                                   [](TestFile& file) { file.packets[0].begin_us -= 1; },
-                                   [](TestFile& file) { file.packets[5].begin_us += 1; },
+  const auto expect_read = [&](const std::string& bytes) {
+    const auto recording = open(bytes);
+    EXPECT_EQ(recording->events_in(0, 2).size(), 5u);
+    EXPECT_EQ(recording->frame_count(), 2);
+    EXPECT_THAT(recording->notes(), ElementsAre(HasSubstr("the table of packets is not used")));
+  };
+  expect_read(changed([](TestFile& file) { file.packets[0].count = 3; }));
+  expect_read(changed([](TestFile& file) { file.packets[0].begin_us -= 1; }));
+  const std::string whole = small().bytes();
+  expect_read(whole.substr(0, whole.size() - 20));
+  expect_read(whole + "rest");
+  // Seen when a later packet is read: its windows are refused.
+  const Change seen_when_read[] = {[](TestFile& file) { file.packets[5].begin_us += 1; },
                                    [](TestFile& file) { file.packets[5].end_us += 1; }};
   for (const Change& change : seen_when_read) {
-    expect_refused_when_read(changed(change), "in the table as it is");
+    EXPECT_THAT([&] { open(changed(change))->events_in(0, 2); }, Throws<InputError>());
   }
+  // After a crash: a place where no table came to be.
   TestFile file = small();
-  expect_refused(file.bytes() + "rest", "expected a sound table FTAB");
-  file.compression = 1;
-  expect_refused(file.bytes() + "rest", "got 4 bytes behind its end");
+  file.has_table = false;
+  std::string crashed = file.bytes();
+  crashed.replace(0, file.header(-1).size(), file.header(-2));
+  EXPECT_EQ(open(crashed)->events_in(0, 2).size(), 5u);
+  EXPECT_THAT(open(crashed)->notes(), ElementsAre(HasSubstr("no table of packets")));
 }
 
-TEST_F(Aedat4Test, RefusesTimesThatFallOrCannotBe) {
+// jAER's has the places of the packets' headers, and is not packed where they are.
+TEST_F(Aedat4Test, ReadsATableOfJaer) {
+  for (const int compression : {0, 1}) {
+    TestFile file = small();
+    file.compression = compression;
+    const std::string whole = file.bytes();
+    flatbuffers::FlatBufferBuilder builder;
+    std::vector<flatbuffers::Offset<aedat4::PacketEntry>> entries;
+    std::int64_t byte = std::ssize(file.header(-1));
+    for (const TestPacket& packet : file.packets) {
+      const std::string content = packed(packet.table, compression);
+      const aedat4::Packet place(packet.stream, static_cast<std::int32_t>(content.size()));
+      entries.push_back(aedat4::CreatePacketEntry(builder, byte, &place, packet.count,
+                                                  packet.begin_us, packet.end_us));
+      byte += 8 + std::ssize(content);
+    }
+    builder.FinishSizePrefixed(aedat4::CreatePacketTable(builder, builder.CreateVector(entries)),
+                               "FTAB");
+    const auto recording = open(whole.substr(0, static_cast<std::size_t>(byte)) + text_of(builder));
+    EXPECT_EQ(recording->events_in(0, 2).size(), 5u);
+    EXPECT_THAT(recording->notes(), IsEmpty());
+  }
+}
+
+TEST_F(Aedat4Test, RefusesWindowsWhoseTimesFallAndTimesThatCannotBe) {
+  for (const bool has_table : {true, false}) {
+    TestFile file = long_file(4);
+    file.has_table = has_table;
+    std::swap(file.packets[1], file.packets[2]);
+    const auto swapped = open(file);
+    EXPECT_EQ(swapped->event_span(), (std::array{0.0, 0.003999}));
+    EXPECT_EQ(swapped->events_in(-1, 0.0009).size(), 901u);
+    EXPECT_EQ(swapped->events_in(0.0031, 1).size(), 899u);
+    for (const double after_s : {0.0005, 0.0012, 0.0022}) {
+      EXPECT_THAT([&] { swapped->events_in(after_s, after_s + 0.0005); },
+                  ThrowsMessage<InputError>(AllOf(HasSubstr("expected times that never decrease"),
+                                                  HasSubstr(path_.string() + " (event "))));
+    }
+  }
   TestFile file = small();
   file.packets[0] = events_packet({{1'000'000, 0, 0, 1}, {999'999, 0, 0, 1}});
-  expect_refused(file.bytes(),
-                 "expected times that never decrease, got 999999 µs after 1000000 µs, in " +
-                     path_.string() + " (event 1)");
-  file.packets[0] = events_packet({{1'000'000, 0, 0, 1}, {1'000'002, 0, 0, 1}});
-  expect_refused(file.bytes(),
-                 "got 1000001 µs after 1000002 µs, in " + path_.string() + " (event 2)");
+  const auto fallen = open(file);
+  EXPECT_EQ(fallen->events_in(1.000001, 2).size(), 2u);
+  EXPECT_THAT([&] { fallen->events_in(0, 1); }, Throws<InputError>());
+  file.has_table = false;
   for (const std::int64_t time_us :
        {std::int64_t{-1}, std::int64_t{1} << 52, std::numeric_limits<std::int64_t>::max()}) {
     file.packets[0] = events_packet({{time_us, 0, 0, 1}});
     expect_refused(file.bytes(), "expected a time of 0..4503599627370495 µs, got");
   }
-  file = small();
-  std::swap(file.packets[1], file.packets[4]);
-  expect_refused(file.bytes(), "(frame 1)");
-  file = small();
-  file.packets[4].table = frame_table({.begin_us = 9, .end_us = 8});
-  expect_refused(file.bytes(), "expected an exposure that ends at 9 µs or later, got 8");
 }
 
 TEST_F(Aedat4Test, RefusesEventsBesideTheSensorAndOddPolarities) {
@@ -374,19 +411,82 @@ TEST_F(Aedat4Test, RefusesEventsBesideTheSensorAndOddPolarities) {
               ThrowsMessage<InputError>(HasSubstr("got 2, in " + path_.string() + " (event 0)")));
 }
 
-TEST_F(Aedat4Test, RefusesFramesThatDoNotFit) {
+TEST_F(Aedat4Test, LeavesOutFramesThatDoNotFit) {
   const std::pair<TestFrame, const char*> frames[] = {
-      {{.t_us = 1, .width = 3}, "expected a frame of 4x3 at 0, 0, got 3x3 at 0, 0"},
-      {{.t_us = 1, .left = 1}, "got 4x3 at 1, 0"},
-      {{.t_us = 1, .height = -3}, "got 4x-3"},
-      {{.t_us = 1, .format = 16}, "expected 36 bytes of pixels, got 12"},
-      {{.t_us = 1, .format = 2}, "expected pixels of OpenCV's type 0, 16 or 24, got 2"},
-      {{.t_us = 1, .pixels = {}}, "expected 12 bytes of pixels, got 0"}};
+      {{.t_us = 9, .width = 3}, "expected a frame of 4x3 at 0, 0, got 3x3 at 0, 0"},
+      {{.t_us = 9, .left = 1}, "got 4x3 at 1, 0"},
+      {{.t_us = 9, .height = -3}, "got 4x-3"},
+      {{.t_us = 9, .format = 16}, "expected 36 bytes of pixels, got 12"},
+      {{.t_us = 9, .format = 5},
+       "expected 1, 3 or 4 channels of 8 or 16 bits, got OpenCV's type 5"},
+      {{.t_us = 9, .pixels = {}}, "expected 12 bytes of pixels, got 0"},
+      {{.begin_us = 9, .end_us = 8}, "expected an exposure that ends at 9 µs or later, got 8"},
+      {{.t_us = 1}, "expected a frame after 0.000001 s, got one at 0.000001 s"},
+      {{.t_us = 0}, "got one at 0.000000 s"}};
   for (const auto& [frame, reason] : frames) {
     TestFile file;
-    file.packets = {{kFrameStream, frame_table(frame), 1}};
-    expect_refused(file.bytes(), reason);
+    file.packets = {{kFrameStream, frame_table({.t_us = 1}), 1},
+                    {kFrameStream, frame_table(frame), 1},
+                    {kFrameStream, frame_table({.t_us = 10}), 1},
+                    events_packet({{5, 0, 0, 1}})};
+    const auto recording = open(file);
+    ASSERT_EQ(recording->frame_count(), 2) << reason;
+    EXPECT_EQ(recording->frame_time_s(1), 10e-6);
+    EXPECT_EQ(recording->events_between(0, 1).size(), 1u);
+    EXPECT_THAT(recording->notes(),
+                ElementsAre(AllOf(HasSubstr("frames left out: 1"), HasSubstr(reason))));
+    file.packets.erase(file.packets.begin() + 2);
+    file.packets.erase(file.packets.begin());
+    if (frame.t_us == 9 || frame.end_us > 0) {
+      EXPECT_EQ(open(file)->frame_count(), 0);
+      EXPECT_THAT(open(file)->notes(), ElementsAre(HasSubstr(reason)));
+    }
   }
+}
+
+// As jAER writes them: the upper of two bytes, little-endian.
+TEST_F(Aedat4Test, TakesTheUpperBitsOfFramesOf16) {
+  TestFrame frame{.t_us = 5, .format = 2, .pixels = {}};
+  for (int i = 0; i < 12; ++i) {
+    frame.pixels.insert(frame.pixels.end(), {0xff, static_cast<std::uint8_t>(20 * i)});
+  }
+  TestFile file;
+  file.packets = {{kFrameStream, frame_table(frame), 1}};
+  const auto recording = open(file);
+  for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(recording->frame(0).pixels[i], 20 * i);
+  EXPECT_THAT(recording->notes(), ElementsAre(HasSubstr("of 16 bits the upper 8 are taken")));
+}
+
+constexpr const char* kTwoCameras = R"(<dv version="2.0"><node name="outInfo">
+  <node name="0"><attr key="typeIdentifier">EVTS</attr>
+    <node name="info"><attr key="sizeX">4</attr><attr key="sizeY">3</attr></node></node>
+  <node name="1"><attr key="typeIdentifier">FRME</attr></node>
+  <node name="4"><attr key="typeIdentifier">EVTS</attr></node>
+  <node name="5"><attr key="typeIdentifier">FRME</attr></node></node></dv>)";
+
+TEST_F(Aedat4Test, TakesTheFirstCameraOrTheOneThatIsNamed) {
+  TestFile file;
+  file.info = kTwoCameras;
+  file.packets = {events_packet({{5, 1, 1, 1}}),
+                  {1, frame_table({.t_us = 1}), 1},
+                  events_packet({{6, 2, 1, 1}, {7, 3, 1, 1}}),
+                  {5, frame_table({.t_us = 2}), 1}};
+  file.packets[2].stream = 4;
+  const auto first = open(file);
+  EXPECT_THAT(first->events_in(0, 1), ElementsAre(Event{1, 1, 5e-6, true}));
+  EXPECT_EQ(first->frame_time_s(0), 1e-6);
+  EXPECT_THAT(first->notes(),
+              ElementsAre(HasSubstr("of several streams of events (0, 4) the first is taken"),
+                          HasSubstr("of several streams of frames (1, 5) 1 is taken")));
+  RecordingOptions options{.stream = 4};
+  const auto named = [&] { return open_recording(path_, RecordingFormat::kAedat4, options); };
+  // Nothing tells this camera's size.
+  EXPECT_THAT(named, ThrowsMessage<InputError>(HasSubstr("\"sensor\": {\"width\"")));
+  options.sensor = ImageSize{3, 4};
+  EXPECT_EQ(named()->events_in(0, 1).size(), 2u);
+  EXPECT_EQ(named()->frame_time_s(0), 2e-6);
+  options.stream = 1;
+  EXPECT_THAT(named, ThrowsMessage<InputError>(HasSubstr("to be one of events, 0, 4, got 1")));
 }
 
 TEST_F(Aedat4Test, RefusesOtherHeaders) {
@@ -399,16 +499,11 @@ TEST_F(Aedat4Test, RefusesOtherHeaders) {
   file.compression = 5;
   expect_refused(file.header(-1), "expected a compression 0..4, got 5");
   file.compression = 0;
-  expect_refused(file.header(1), "expected a table of packets at a byte");
-  expect_refused(file.header(1 << 30), "expected a table of packets at a byte");
   const std::pair<const char*, const char*> infos[] = {
       {"<dv", "expected XML of the streams"},
       {"<dv/>", "expected a stream of events (EVTS), got none"},
       {R"(<dv><node name="outInfo"><node name="0"><attr key="typeIdentifier">EVTS</attr></node></node></dv>)",
-       "in 1..8192, got 0x0"},
-      {R"(<dv><node name="outInfo"><node name="0"><attr key="typeIdentifier">EVTS</attr></node>
-          <node name="4"><attr key="typeIdentifier">EVTS</attr></node></node></dv>)",
-       "expected one stream of EVTS, got several (0 and 4)"},
+       "expected the sensor's size in the file, or "},
       {R"(<dv><node name="outInfo"><node name="0"/><node name="0"/></node></dv>)",
        "expected streams of different numbers"}};
   for (const auto& [info, reason] : infos) {
@@ -422,8 +517,6 @@ TEST_F(Aedat4Test, RefusesBrokenPackets) {
   file.packets = {events_packet({{1, 0, 0, 1}})};
   file.packets[0].stream = 3;
   expect_refused(file.bytes(), "of stream 3");
-  file.packets[0].stream = kFrameStream;
-  expect_refused(file.bytes(), "expected a sound table FRME");
   file = small();
   const std::string whole = file.bytes();
   // With a table it is no matter of an unplugged camera.

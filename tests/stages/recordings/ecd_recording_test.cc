@@ -30,7 +30,6 @@ TEST(EcdEventLineTest, ParsesNumbersBetweenBlanks) {
     EXPECT_EQ(event.x, 96);
     EXPECT_EQ(event.y, 133);
     EXPECT_EQ(event.polarity, 0);
-    EXPECT_EQ(parse_ecd_event_time(line), 0.003811);
   }
 }
 
@@ -40,9 +39,6 @@ TEST(EcdEventLineTest, RefusesOtherLines) {
         "0.5 1 2 1x", "0.5x 1 2 1", "0.5 99999999999 2 1", "1e999 1 2 1", " 0.5 1 2 1"}) {
     EXPECT_THROW(parse_ecd_event(line), EventFault) << line;
   }
-  EXPECT_THROW(parse_ecd_event_time("time"), EventFault);
-  EXPECT_THROW(parse_ecd_event_time(""), EventFault);
-  EXPECT_THROW(parse_ecd_event_time("nan 1 2 1"), EventFault);
 }
 
 TEST(EcdEventLineTest, QuotesTheLineInPrintableCharacters) {
@@ -169,19 +165,35 @@ TEST_F(EcdEventFileTest, RefusesTimesThatFall) {
                   HasSubstr("got 2 s after 3 s, in " + path_.string() + " (line 3)")));
 }
 
-TEST_F(EcdEventFileTest, RefusesAStretchThatEndsBeforeItBegins) {
-  const EcdEventFile file = file_of("1 0 0 1\n2 0 0 1\n");
-  EXPECT_THAT(
-      [&] {
-        file.events(8, 0, EventCheck({1, 1}, 0, 9));
-      },
-      ThrowsMessage<InputError>(HasSubstr("times that never decrease")));
+TEST_F(EcdEventFileTest, RefusesStretchesThatTouchAFallAlone) {
+  const EcdEventFile file = file_of("1 0 0 1\n3 0 0 1\n2 0 0 1\n4 0 0 1\n5 0 0 1\n");
+  for (const auto& [after_s, until_s] : {std::pair(0.0, 1.5), {3.0, 4.0}, {4.0, 9.0}, {3.0, 9.0}}) {
+    EXPECT_NO_THROW(file.require_order(after_s, until_s)) << after_s;
+  }
+  for (const auto& [after_s, until_s] : {std::pair(0.0, 2.0), {2.5, 2.6}, {2.9, 9.0}, {0.0, 9.0}}) {
+    EXPECT_THAT([&] { file.require_order(after_s, until_s); },
+                ThrowsMessage<InputError>(
+                    HasSubstr("got 2 s after 3 s, in " + path_.string() + " (line 3)")));
+  }
+  EXPECT_EQ(between(file, 3, 9).size(), 2u);
+}
+
+// As v2e writes them.
+TEST_F(EcdEventFileTest, PassesOverCommentsBeforeTheEvents) {
+  const EcdEventFile file = file_of("#!events.txt\n# by v2e\n1 0 0 1\n2 1 0 1\n3 2 0 1\n");
+  EXPECT_EQ(file.span(), (std::array{1.0, 3.0}));
+  EXPECT_EQ(between(file, 0, 2).size(), 2u);
+  EXPECT_EQ(file.skip_lines(file.first_byte_after(2), -9), 22);
+  EXPECT_EQ(file_of("# none\n").span(), std::nullopt);
+  EXPECT_EQ(file_of("#").span(), std::nullopt);
+  EXPECT_THAT([&] { between(file_of("1 0 0 1\n# by v2e\n"), 0, 9); },
+              ThrowsMessage<InputError>(HasSubstr("(line 2)")));
 }
 
 TEST_F(EcdEventFileTest, RefusesFilesThatAreNoText) {
   for (const std::string& bytes : {std::string(100'000, '\0'), std::string(3 << 20, 'x')}) {
     const EcdEventFile file = file_of(bytes);
-    EXPECT_THROW(file.first_byte_after(1), InputError);
+    EXPECT_THROW(file.span(), InputError);
     EXPECT_THROW(file.events(0, static_cast<std::int64_t>(bytes.size()), EventCheck({1, 1}, 0, 9)),
                  InputError);
   }

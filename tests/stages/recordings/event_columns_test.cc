@@ -93,13 +93,40 @@ TEST_F(DsecTest, DoesWithoutIndexAndOffsetAndTakesTheSizeOfTheFile) {
   datasets_.erase("t_offset");
   datasets_["events/height"] = {{}, Numbers{3}};
   datasets_["events/width"] = {{}, Numbers{5}};
+  const auto told = open();
+  EXPECT_EQ(told->size(), (ImageSize{3, 4}));  // the manifest's
+  EXPECT_THAT(told->warnings(), ElementsAre(HasSubstr("a sensor of 5x3, the manifest's \"sensor\" "
+                                                      "is 4x3, which counts")));
+  options_.sensor.reset();
   const auto recording = open();
   EXPECT_EQ(recording->size(), (ImageSize{3, 5}));
   EXPECT_EQ(recording->events_in(0, 1).size(), 4u);
+  EXPECT_THAT(recording->warnings(), IsEmpty());
   datasets_["events/width"] = {{}, Numbers{0}};
   refuses("expected a sensor of 1 to");
   datasets_["events/width"] = {{3}, Numbers{5, 5, 5}};
   refuses("expected 1 whole number, got int64 [3]");
+}
+
+TEST_F(DsecTest, AsksForTheSizeUnlessTheFileIsDsecsOwn) {
+  options_.sensor.reset();
+  EXPECT_EQ(open()->size(), (ImageSize{480, 640}));
+  datasets_.erase("ms_to_idx");
+  refuses("\"sensor\": {\"width\"");
+  datasets_.erase("t_offset");
+  refuses("\"sensor\": {\"width\"");
+}
+
+TEST_F(DsecTest, WindowsThatTouchAFallAreRefusedAlone) {
+  datasets_.erase("ms_to_idx");
+  datasets_["events/t"] = {{5}, Numbers{0, 1000, 3000, 2000, 4000}};
+  const auto recording = open();
+  EXPECT_EQ(recording->events_in(9, 10.0015).size(), 2u);
+  EXPECT_EQ(recording->events_in(10.003, 11).size(), 1u);
+  EXPECT_THAT([&] { recording->events_in(10.001, 10.0025); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr("expected times that never decrease"),
+                                              HasSubstr("events.h5 (event 3)"))));
+  EXPECT_EQ(recording->event_span(), (std::array{10.0, 10.004}));
 }
 
 TEST_F(DsecTest, WithoutEventsThereIsNoTime) {

@@ -56,7 +56,8 @@ TEST(CompactEvents, HoldAnyNumbers) {
 class TestParts final : public EventParts {
  public:
   explicit TestParts(RecentEvents& recent) : EventParts("FILE", recent) {
-    for (const auto& times_s : parts) add_part(std::ssize(times_s), times_s.front());
+    for (const auto& times_s : parts)
+      add_part(std::ssize(times_s), times_s.front(), times_s.back());
   }
 
   std::vector<std::vector<double>> parts = {{1, 2, 2}, {3}, {5, 6}};
@@ -88,22 +89,16 @@ TEST(EventParts, AreReadWhereTheyAreAskedForAndOnce) {
   EXPECT_THAT(events.reads, ElementsAre(0, 1, 2));
 }
 
-TEST(EventParts, TellHowManyEventsAreAtOrBeforeATime) {
+TEST(EventParts, TellInWhichPartTheEventsBehindATimeBegin) {
   RecentEvents recent(100);
   const TestParts events(recent);
-  const std::pair<double, std::int64_t> expected[] = {{0.5, 0}, {1, 1}, {1.5, 1}, {2, 3}, {2.5, 3},
-                                                      {3, 4},   {4, 4}, {5, 5},   {6, 6}, {9, 6}};
-  for (const auto& [time_s, count] : expected) EXPECT_EQ(events.near(time_s), count) << time_s;
-  class NoParts final : public EventParts {
-   public:
-    explicit NoParts(RecentEvents& recent) : EventParts("FILE", recent) { add_part({}); }
-
-   private:
-    CompactEvents read_part(std::size_t) const override { throw std::logic_error("no part"); }
-  };
-  const NoParts none(recent);
-  EXPECT_EQ(none.count(), 0);
-  EXPECT_EQ(none.near(1), 0);
+  const std::pair<double, std::int64_t> expected[] = {{0.5, 0}, {1, 0}, {1.5, 0}, {2, 3}, {2.5, 3},
+                                                      {3, 4},   {4, 4}, {5, 4},   {6, 6}, {9, 6}};
+  for (const auto& [time_s, begin] : expected) {
+    EXPECT_EQ(events.order().block_after(time_s).begin, begin) << time_s;
+  }
+  EXPECT_EQ(events.order().span(), (std::array{1.0, 6.0}));
+  EXPECT_THAT(events.reads, IsEmpty());
 }
 
 TEST(EventParts, ThatAreNotAsTheyWereAreRefused) {

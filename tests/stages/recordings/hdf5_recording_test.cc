@@ -308,8 +308,6 @@ TEST_F(Hdf5RecordingTest, RefusesOtherShapesAndTypes) {
   refused(kTimes, {{2}, std::vector<double>{1, 2}}, "float64 [2]");
   refused(kTimes, {{3}, std::vector<std::int64_t>{1, 2, 3}}, "int64 [3]");
   refused(kTimes, {{3}, std::vector<double>{1, 2, 2}}, "2.000000 s");
-  refused(kIndex, {{2}, std::vector<std::int64_t>{1, 2}}, "int64 [2]");
-  refused(kIndex, {{3}, std::vector<double>{1, 2, 3}}, "float64 [3]");
   refused(kFlow, {{3, 2, 3, 4}, std::vector<float>(72)}, "float32 [3, 2, 3, 4]");
   refused(kFlow, {{2, 2, 3, 4}, std::vector<std::uint8_t>(48)}, "uint8 [2, 2, 3, 4]");
   datasets_[kFrames] = {{0, 3, 4}, std::vector<std::uint8_t>{}};

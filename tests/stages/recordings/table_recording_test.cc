@@ -140,13 +140,15 @@ TEST_F(TableRecordingTest, LabelsAndOtherArraysAreNoTables) {
 }
 
 TEST_F(TableRecordingTest, NamesWhatIsWrong) {
-  refuses("a.csv", "t,x,y\n", "expected a header line with t, x, y and p, got another");
+  refuses("a.csv", "t,x,y\n",
+          "expected a header line with t, x, y and p (\"columns\" in the manifest names others), "
+          "got another");
   refuses("b.csv", "", "expected a header line, got none");
   refuses("c.csv", "t,x,y,p\n1,2\n", "expected 4 fields, got 2, in");
   refuses("d.csv", "t,x,y,p\n1,2,1,1\n1,2,one,1\n", "expected a number of y, got another field");
   refuses("e.csv", "t,x,y,p\n1,2,1,1\n1,4,1,1\n", "got x = 4, y = 1");
   refuses("f.csv", "t,x,y,p\n1,2,1,1\n1,1.5,1,1\n", "got x = 1.5, y = 1");
-  refuses("g.csv", "t,x,y,p\n3,2,1,1\n2,2,1,1\n", "expected times that never decrease");
+  refuses("g.csv", "t,x,y,p\n3,2,1,1\ninf,2,1,1\n4,2,1,1\n", "got inf");
   refuses("h.csv", "t,x,y,p\n3,2,1,1\nnan,2,1,1\n", "expected a finite time, got nan");
   refuses("i.csv", "t,x,y,p\n3,2,1,0\n4,2,1,-1\n", "got -1 after 0");
   refuses("j.npy", structured({{5, 0, 2, 1}}) + "x", "expected 1 rows of 16 bytes");
@@ -162,7 +164,60 @@ TEST_F(TableRecordingTest, NamesWhatIsWrong) {
                             ""),
           "in the .npy header");
   options_.sensor.reset();
-  refuses("n.csv", "t,x,y,p\n3,2,1,0\n", "expected the sensor's size as \"sensor\"");
+  refuses("n.csv", "t,x,y,p\n3,2,1,0\n", "expected the sensor's size in the file, or ");
+}
+
+TEST_F(TableRecordingTest, IsSortedByTimeAndSaysSo) {
+  testing::write_file(folder_ / "a.csv", "t,x,y,p\n7,3,0,0\n7,1,1,1\n5,0,2,1\n");
+  holds_the_events("a.csv");
+  EXPECT_THAT(open("a.csv")->notes(),
+              ElementsAre(AllOf(HasSubstr("first at event 2"), HasSubstr("sorted by time"))));
+  testing::write_file(folder_ / "b.csv", "t,x,y,p\n5,0,2,1\n7,1,1,1\n");
+  EXPECT_THAT(open("b.csv")->notes(), ElementsAre());
+}
+
+TEST_F(TableRecordingTest, MetavisionsCsvHasNoHeader) {
+  testing::write_file(folder_ / "a.csv", "%geometry:4,3\n0,2,1,5\n3,0,0,7\n1,1,1,7\n");
+  holds_the_events("a.csv");
+  options_.sensor.reset();
+  holds_the_events("a.csv");
+  testing::write_file(folder_ / "b.csv", "0,2,1,5\n3,0,0,7\n1,1,1,7\n");
+  EXPECT_THAT([&] { open("b.csv"); }, ThrowsMessage<InputError>(HasSubstr("the sensor's size")));
+  options_.sensor = ImageSize{3, 4};
+  holds_the_events("b.csv");
+  testing::write_file(folder_ / "c.csv", "%geometry:4,3\n0,2,1,5\n3,x,0,7\n");
+  EXPECT_THAT([&] { open("c.csv"); }, ThrowsMessage<InputError>(HasSubstr("(line 3)")));
+}
+
+TEST_F(TableRecordingTest, TellsWhatItsTimesCount) {
+  const auto table = [&](const std::string& times, const std::string& t = "t") {
+    std::string text = t + ",x,y,p\n";
+    for (std::size_t at = 0; at < times.size(); at = times.find(' ', at) + 1) {
+      text += times.substr(at, times.find(' ', at) - at) + ",0,0,1\n";
+      if (times.find(' ', at) == std::string::npos) break;
+    }
+    testing::write_file(folder_ / "t.csv", text);
+    options_.columns.t = t;
+    return *open("t.csv")->event_span();
+  };
+  EXPECT_EQ(table("0 2000000"), (std::array{0.0, 2.0}));
+  EXPECT_THAT(open("t.csv")->notes(), ElementsAre());
+  EXPECT_EQ(table("0 0.25 2"), (std::array{0.0, 2.0}));
+  EXPECT_THAT(open("t.csv")->notes(),
+              ElementsAre(AllOf(HasSubstr("seconds"), HasSubstr("decimals"))));
+  EXPECT_EQ(table("1700000000000000000 1700000002000000000"),
+            (std::array{1'700'000'000.0, 1'700'000'002.0}));
+  EXPECT_EQ(table("0 2000000000", "t_ns"), (std::array{0.0, 2.0}));
+  EXPECT_EQ(table("0 2000", "time_ms"), (std::array{0.0, 2.0}));
+  EXPECT_EQ(table("0 2", "t_s"), (std::array{0.0, 2.0}));
+  const auto refused = [&](const std::string& times, const std::string& what) {
+    EXPECT_THAT([&] { table(times); },
+                ThrowsMessage<InputError>(AllOf(HasSubstr("expected \"unit\""), HasSubstr(what))));
+  };
+  refused("0 300000000000", "us (then 2 events take 300000 s) or ns (300 s)");
+  refused("0.5 300000000", "s (then 2 events take 3e+08 s) or us (300 s)");
+  options_.columns.tick_s = 1e-9;
+  EXPECT_EQ(table("0 300000000000"), (std::array{0.0, 300.0}));
 }
 
 TEST_F(TableRecordingTest, AFileIsReadAgainWhenItIsOpenedAgain) {

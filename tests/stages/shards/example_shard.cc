@@ -59,7 +59,7 @@ void add_box(ShardSample& to, int class_id, const Rectangle& source, const Recta
   box.xyxy = source;
   box.ignore = class_id == 1;
   to.annotation.boxes.push_back(box);
-  to.labels.boxes.push_back({clipped, half(source), box.ignore});
+  to.labels.boxes.push_back({clipped, half(source), box.ignore, {}});
 }
 
 void add_person(ShardSample& to, const Person& person) {
@@ -155,6 +155,12 @@ ExampleShard example_shard(StoredType type, int deflate_level) {
   first.annotation.boxes[0].box3d = {1.5f, 1.6f, 3.9f, -2, 1.7f, 20, 0.1f};
   first.annotation.boxes[0].track_id = 7;
   first.annotation.boxes[0].difficulty = 1;
+  Outline& outline = first.annotation.boxes[0].outline;  // with a hole
+  outline = {{{{2, 2}, {8.5, 2}, {8.5, 9}, {2, 9}}, {{4, 4}, {4, 6}, {6, 6}, {6, 4}}}};
+  first.labels.boxes[0].outline = outline;
+  for (auto& ring : first.labels.boxes[0].outline.rings) {
+    for (Point& corner : ring) corner = {corner.x / 2, corner.y / 2};
+  }
   // P' of M = [1/2 0 -1/4; 0 1/2 -1/4]: rows 1/2 r1 - 1/4 r3, 1/2 r2 - 1/4 r3, r3.
   first.annotation.projection = {700, 0, 8, 40, 0, 700, 6, 2, 0, 0, 1, 4};
   first.labels.projection = {350, 0, 3.75, 19, 0, 350, 2.75, 0, 0, 0, 1, 4};
@@ -178,6 +184,7 @@ ExampleShard example_shard(StoredType type, int deflate_level) {
   cut.pair.previous.video_frame = 10;
   cut.pair.next.video_frame = 12;
   add_box(cut, 0, {10, -3, 17, 6}, {5, 0, 8, 3});
+  cut.pair.objects = {ImageMotion{0.5, -2.25, 1.5, 0.984375}};
   add(shard, cut, volume(3, size));
 
   ShardSample person = sample(4);  // of a still

@@ -277,9 +277,9 @@ void replace(hid_t file, const char* name, const Value& value) {
 
 using Names = std::vector<std::string>;
 
-const Names kFeatures{"tiles",     "times",      "origin",       "motion",
-                      "threshold", "projection", "difficulty",   "person_boxes",
-                      "joints3d",  "camera",     "joint_aliases"};
+const Names kFeatures{"tiles",      "times",      "origin",       "motion",        "threshold",
+                      "projection", "difficulty", "outlines",     "object_motion", "person_boxes",
+                      "joints3d",   "camera",     "joint_aliases"};
 
 TEST_F(ShardCheck, FeaturesAreThoseOfTheColumns) {
   write(testing::example_shard());
@@ -341,10 +341,12 @@ TEST_F(ShardCheck, WrongShapesAndTypesAreFound) {
   change([](hid_t file) {
     replace(file, "/valid", H5T_STD_U8LE, {6});
     replace(file, "/labels/boxes/xyxy", H5T_IEEE_F64LE, {3, 5});
+    replace(file, "/labels/boxes/outline", H5T_IEEE_F64LE, {3});
     replace(file, "/labels/poses/scale", H5T_IEEE_F32LE, {3});
   });
   EXPECT_THAT(faults(),
               ElementsAre(HasSubstr("expected shape [3, 4] of /labels/boxes/xyxy, got [3, 5]"),
+                          HasSubstr("/labels/boxes/outline"),
                           HasSubstr("expected type float64 of /labels/poses/scale"),
                           HasSubstr("expected shape [5] of /valid, got [6]")));
 }
@@ -389,7 +391,7 @@ TEST_F(ShardCheck, AStillsBoxIsCutToWhatIsSeenOfTheImage) {
   sample.annotation.boxes.resize(1);
   sample.annotation.boxes[0].class_id = 0;
   sample.annotation.boxes[0].xyxy = {5, 1, 13, 8};
-  sample.labels.boxes = {{{1.6, 1, 8, 4}, {1.6, 0.5, 8, 4}, false}};
+  sample.labels.boxes = {{{1.6, 1, 8, 4}, {1.6, 0.5, 8, 4}, false, {}}};
   write(example);
   EXPECT_THAT(faults(), IsEmpty());
   sample.labels.boxes[0].clipped.top = 0.5;
@@ -491,6 +493,39 @@ TEST_F(ShardCheck, NanInALabelIsFound) {
   example.samples[0].labels.boxes[1].clipped.top = std::numeric_limits<double>::quiet_NaN();
   write(example);
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("xyxy of box 1")));
+}
+
+TEST_F(ShardCheck, AnOutlineApartFromItsBoxIsFound) {
+  testing::ExampleShard example = testing::example_shard();
+  Outline& outline = example.samples[0].labels.boxes[0].outline;  // over [1 1 4.25 4.5]
+  outline = {{{{4.25, 0}, {6, 0}, {6, 1}}}};
+  write(example);
+  EXPECT_THAT(faults(), IsEmpty()) << "it touches it";
+  outline = {{{{4.5, 0}, {6, 0}, {6, 1}}}};
+  write(example);
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr(
+                            "expected outline of box 0 to lie over xyxy_unclipped, got another "
+                            "place (sample 0, 000000)")));
+}
+
+TEST_F(ShardCheck, TextsThatAreNoOutlinesAreFound) {
+  for (std::string text : {"x", "[]", "[[1,1,2,2]]", "[[1,1,2,2,3]]", "[[0,0,1,0,nan,1]]",
+                           "[[0,0,1,0,1e99,1]]", "[[0,0,1,0,1,1]", "[[0,0,1,0,1,1]] "}) {
+    write(testing::example_shard());
+    change([&](hid_t file) {
+      const hid_t dataset = H5Dopen2(file, "/labels/boxes/outline", H5P_DEFAULT);
+      const hid_t type = H5Dget_type(dataset);
+      const hvl_t rows[] = {{text.size(), text.data()}, {0, nullptr}, {0, nullptr}};
+      EXPECT_GE(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows), 0);
+      H5Tclose(type);
+      H5Dclose(dataset);
+    });
+    EXPECT_THAT(faults(), ElementsAre(HasSubstr(
+                              "expected outline of box 0 to be rings of corners as JSON, got "
+                              "another text (sample 0, 000000)")))
+        << text;
+    EXPECT_TRUE(ShardReader(shard_).sample(0).labels.boxes[0].outline.empty());
+  }
 }
 
 TEST_F(ShardCheck, InfinityInAnyLabelIsFound) {

@@ -92,7 +92,12 @@ class ShardInH5py(unittest.TestCase):
         self.assertEqual(file["pairs/action"].asstr()[:].tolist(),
                          ["", "Walking-1", "Walking-1", "Walking-1", "Walking-1"])
         self.assertEqual(file["labels/boxes/difficulty"][:].tolist(), [1, -1, -1])
+        self.assertEqual([bytes(outline) for outline in file["labels/boxes/outline"]],
+                         [b"[[1,1,4.25,1,4.25,4.5,1,4.5],[2,2,2,3,3,3,3,2]]", b"", b""])
         np.testing.assert_array_equal(file["pairs/motion"][:], [[np.nan] * 4] * 4 + [[-1.5, 0.25, 0.75, 1.0078125]])
+        motion = file["labels/boxes/motion"]
+        np.testing.assert_array_equal(motion[:], [[np.nan] * 4] * 2 + [[0.5, -2.25, 1.5, 0.984375]])
+        self.assertEqual(motion.attrs["columns"].tolist(), ["x_px", "y_px", "angle_deg", "scale"])
         np.testing.assert_array_equal(file["pairs/threshold"][:], [np.nan] * 4 + [0.3125])
         self.assertEqual(file["pairs/motion"].attrs["columns"].tolist(), ["x_px", "y_px", "angle_deg", "scale"])
         np.testing.assert_array_equal(file["pairs/next_time_s"][:], [1.2, np.nan, 1.2, 1.2, 1.2])

@@ -51,6 +51,7 @@ void expect_same(const VolumeLabels& got, const VolumeLabels& expected) {
     EXPECT_EQ(got.boxes[i].clipped, expected.boxes[i].clipped);
     EXPECT_EQ(got.boxes[i].unclipped, expected.boxes[i].unclipped);
     EXPECT_EQ(got.boxes[i].ignore, expected.boxes[i].ignore);
+    EXPECT_EQ(got.boxes[i].outline, expected.boxes[i].outline);
   }
   ASSERT_EQ(got.persons.size(), expected.persons.size());
   for (std::size_t i = 0; i < got.persons.size(); ++i) {
@@ -143,6 +144,47 @@ TEST(ShardRoundTrip, ASourceWithoutLabels) {
   expect_same(reader.header(), example.header);
   expect_same(reader.sample(0), example.samples[0]);
   EXPECT_EQ(reader.volume(0), example.volumes[0]);
+}
+
+TEST(ShardRoundTrip, OutlinesOfEverySizeComeBackInFloat32) {
+  const TemporaryFolder folder;
+  ExampleShard example = example_shard();
+  VolumeBox& box = example.samples[3].labels.boxes[0];
+  auto& ring = box.outline.rings.emplace_back();
+  constexpr int kCorners = 100'000;
+  for (int i = 0; i < kCorners; ++i) {
+    const double angle = 2 * M_PI * i / kCorners;
+    ring.push_back({6 + 3 * std::cos(angle), 1 + 1e6 * std::sin(angle)});
+  }
+  example.samples[0].labels.boxes[1].outline = {{{{0, 0}, {1e-9, 0}, {0, 1.0 / 3}}}};
+  write_shard(folder.path(), example);
+  const ShardReader reader(folder / example.header.name);
+  for (const int slot : {0, 3}) {
+    const auto& boxes = example.samples[static_cast<std::size_t>(slot)].labels.boxes;
+    const ShardSample got = reader.sample(slot);
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      Outline expected = boxes[i].outline;
+      for (auto& corners : expected.rings) {
+        for (Point& corner : corners) {
+          corner = {static_cast<float>(corner.x), static_cast<float>(corner.y)};
+        }
+      }
+      EXPECT_TRUE(got.labels.boxes[i].outline == expected) << slot << " " << i;
+    }
+  }
+}
+
+TEST(ShardRoundTrip, AShardWithoutOutlinesHasNoColumnOfThem) {
+  const TemporaryFolder folder;
+  ExampleShard example = example_shard();
+  example.samples[0].labels.boxes[0].outline = {};
+  const CommitRecord record = write_shard(folder.path(), example);
+  EXPECT_THAT(record.contents.optional_columns,
+              ::testing::Not(::testing::Contains("/labels/boxes/outline")));
+  const ShardReader reader(folder / example.header.name);
+  EXPECT_THAT(reader.header().features, ::testing::Not(::testing::Contains("outlines")));
+  EXPECT_TRUE(reader.sample(0).labels.boxes[0].outline.empty());
+  EXPECT_TRUE(reader.sample(0).annotation.boxes[0].outline.empty());
 }
 
 TEST(ShardRoundTrip, MoreRowsThanAChunkOfAColumn) {

@@ -43,8 +43,9 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
       ElementsAre("/events/tiles", "/events/statistics/generated_fraction", "/pairs/prev_time_s",
                   "/pairs/next_time_s", "/pairs/subject", "/pairs/action", "/pairs/camera",
                   "/pairs/drive", "/pairs/motion", "/pairs/threshold", "/labels/projection",
-                  "/labels/projection_source", "/labels/boxes/difficulty", "/labels/poses/box",
-                  "/labels/poses/box_source", "/labels/poses/joints3d_mm", "/labels/poses/camera",
+                  "/labels/projection_source", "/labels/boxes/difficulty", "/labels/boxes/outline",
+                  "/labels/boxes/motion", "/labels/poses/box", "/labels/poses/box_source",
+                  "/labels/poses/joints3d_mm", "/labels/poses/camera",
                   "/labels/poses/camera_source", "/labels/poses/camera_distortion"));
 }
 
@@ -135,7 +136,8 @@ TEST_F(ShardSummary, TextSaysWhatIsInTheShard) {
 TEST_F(ShardSummary, TextSaysWhatIsInASample) {
   const std::string first = describe_sample(reader_, 0);
   EXPECT_THAT(first, HasSubstr("kitti/prev_2/000000_02.png, frame 10\n"));
-  EXPECT_THAT(first, HasSubstr("Car [1 1 4.25 4.5], source [2 2 8.5 9], track 7\n"));
+  EXPECT_THAT(first,
+              HasSubstr("Car [1 1 4.25 4.5], source [2 2 8.5 9], outline of 8 corners, track 7\n"));
   EXPECT_THAT(first, HasSubstr("DontCare [0 0 0.5 0.5], source [0 0 1 1], ignore\n"));
   EXPECT_THAT(first, HasSubstr("nose (1.5 1.75), visible\n"));
   EXPECT_THAT(first, HasSubstr("0.2 s"));
@@ -178,6 +180,8 @@ TEST_F(ShardSummary, JsonHoldsTheSame) {
   const auto first = nlohmann::json::parse(sample_json(reader_, 0));
   EXPECT_EQ(first["boxes"][0]["xyxy"], (nlohmann::json{1, 1, 4.25, 4.5}));
   EXPECT_EQ(first["boxes"][0]["class"], "Car");
+  EXPECT_EQ(first["boxes"][0]["outline"], "[[1,1,4.25,1,4.25,4.5,1,4.5],[2,2,2,3,3,3,3,2]]");
+  EXPECT_EQ(first["boxes"][1]["outline"], "");
   EXPECT_EQ(first["joint_names"][0], "nose");
   EXPECT_EQ(first["persons"][1]["joints_source"][0], (nlohmann::json{3.5, 4}));
   EXPECT_EQ(first["persons"][0]["head_box"], (nlohmann::json{-1, -1, -1, -1}));

@@ -390,7 +390,71 @@ TEST_F(WithoutFramesTest, NothingIsGuessed) {
   testing::write_file(folder_ / "table.csv", "t,x,y,p\n");
   EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("expected events or frames")));
   spec_.recording.sensor.reset();
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("\"sensor\" in the manifest")));
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("\"sensor\": {")));
+}
+
+TEST_F(WithoutFramesTest, AnEventAtAWindowsBeginIsNotInIt) {
+  // Events each millisecond of DSEC's clock, labels each 10 ms at an event's time: ten are in each.
+  std::string table = "t,x,y,p\n", labels = kLabelHeader;
+  constexpr std::int64_t kStart_us = 51'648'500'652;
+  for (int ms = 0; ms < 400; ++ms) {
+    table += std::to_string(kStart_us + 1000 * ms) + ",0,0,1\n";
+    if (ms % 10 != 0 || ms == 0) continue;
+    const std::int64_t label_us = kStart_us + 1000 * ms;
+    labels += fmt::format("{}.{:06d},0,0,1,1,car,\n", label_us / 1'000'000, label_us % 1'000'000);
+  }
+  testing::write_file(folder_ / "table.csv", table);
+  testing::write_file(folder_ / "labels.csv", labels);
+  spec_.annotations = "labels.csv";
+  spec_.recording.columns.tick_s = 1e-6;
+  spec_.window.duration_s = 0.01;
+  for (const LabelPlace place : {LabelPlace::kEnd, LabelPlace::kMiddle}) {
+    spec_.window.label = place;
+    const auto dataset = open();
+    for (std::size_t i = 0; i < 39; ++i) EXPECT_EQ(events(*dataset, i).size(), 10u) << i;
+  }
+}
+
+// HDF5 that is cut, RAW of a kind that is not read, AEDAT of another version.
+TEST_F(RecordingDatasetTest, TellsOfRecordingsThatCannotBeRead) {
+  testing::write_hdf5(folder_ / "all/a.h5", testing::small_mvsec());
+  const std::string whole = read_text_file(folder_ / "all/a.h5");
+  testing::write_file(folder_ / "all/b.h5", whole.substr(0, whole.size() / 2));
+  testing::write_file(folder_ / "all/c.raw", "% evt 4.0\n% end\n");
+  testing::write_file(folder_ / "all/d.aedat", "#!AER-DAT3.1\r\n");
+  testing::write_file(folder_ / "all/e.raw", "% evt 3.0\n% end\n");  // of no known size
+  testing::write_file(folder_ / "all/notes.txt", "no recording");
+  spec_.root = "all";
+  const auto dataset = open();
+  EXPECT_THAT(ids(*dataset), ElementsAre("a/0000000001.500000", "a/0000000002.000000"));
+  EXPECT_THAT(dataset->notes(), ElementsAre("1 entry left out in all: notes.txt"));
+  const Dataset::Unreadable unreadable = dataset->unreadable();
+  EXPECT_EQ(unreadable.of, 5);
+  EXPECT_THAT(unreadable.reasons,
+              ElementsAre(AllOf(HasSubstr("b.h5"), HasSubstr("truncated")),
+                          AllOf(HasSubstr("c.raw"), HasSubstr("2.0, 2.1 or 3.0")),
+                          AllOf(HasSubstr("d.aedat"), HasSubstr("another version than 4.0")),
+                          AllOf(HasSubstr("e.raw"), HasSubstr("the sensor's size"))));
+  for (const auto& [root, reason] :
+       {std::pair("all/b.h5", "truncated"), {"all/c.raw", "2.0, 2.1 or 3.0"},
+        {"all/e.raw", "the sensor's size"}, {"all/notes.txt", "a file of another kind"}}) {
+    spec_.root = root;
+    EXPECT_THAT([&] { open(); },
+                ThrowsMessage<InputError>(AllOf(HasSubstr(reason), HasSubstr(root))));
+  }
+}
+
+TEST_F(RecordingDatasetTest, ATableBesideARecordingIsNoLabels) {
+  testing::write_file(folder_ / "drive.csv", "0,0,1,1250000\n");
+  const auto dataset = open();
+  EXPECT_EQ(ids(*dataset).size(), 2u);
+  EXPECT_THAT(dataset->notes(), ElementsAre(HasSubstr("drive.csv")));
+  testing::write_hdf5(folder_ / "all/drive.h5", testing::small_mvsec());
+  testing::write_file(folder_ / "all/drive.csv", "0,0,1,1250000\n");
+  spec_.root = "all";
+  EXPECT_EQ(ids(*open()), ids(*dataset));
+  EXPECT_THAT(open()->notes(), Contains(HasSubstr("left out, since the recording is there in "
+                                                  "another file: all/drive.csv")));
 }
 
 /// Windows of 50,000 events, one each microsecond, that several threads ask for.

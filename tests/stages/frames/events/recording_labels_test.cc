@@ -229,6 +229,9 @@ TEST_F(RecordingLabelsTest, NpyHasPropheseesBoxes) {
   labels = read("a_bbox.npy", text);
   EXPECT_THAT(labels.class_names, ElementsAre("two wheeler", "car"));
   EXPECT_THAT(read("b_bbox.npy", boxes({})).annotations, IsEmpty());
+  EXPECT_THAT(recording_label_companions(folder_ / "a_bbox.npy"),
+              ElementsAre(folder_ / "label_map_dictionary.json"));
+  EXPECT_THAT(recording_label_companions(folder_ / "a.csv"), IsEmpty());
 }
 
 TEST_F(RecordingLabelsTest, NpyIsStrict) {

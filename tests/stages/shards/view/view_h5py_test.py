@@ -50,6 +50,9 @@ class View(unittest.TestCase):
         self.assertEqual(set(columns), expected)
         for name, column in columns.items():
             parts = [values(shard[name]) for shard in shards if name in shard]
+            if name == "labels/boxes/outline":  # of the first shard alone
+                self.assertEqual(values(column), [*parts[0], *[b""] * (len(column) - len(parts[0]))])
+                continue
             if name in OFFSETS:
                 rows = np.concatenate([np.diff(part) for part in parts])
                 np.testing.assert_array_equal(column, np.concatenate([[0], np.cumsum(rows)]))

@@ -1,0 +1,77 @@
+#include "stages/recordings/detail/event_order.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "manifests/values/faults.h"
+#include "stages/recordings/detail/event_check.h"
+
+namespace eventgan {
+
+void EventOrder::add_other(double time_s, std::int64_t place) {
+  if (!std::isfinite(time_s)) return;
+  const double before_s = latest_s_;
+  latest_s_ = std::max(latest_s_, time_s);
+  earliest_s_ = std::min(earliest_s_, time_s);
+  any_ = true;
+  if (std::exchange(is_unread_, false)) falls_.back().until_s = latest_s_;
+  if (time_s < before_s) add_fall({time_s, before_s, place, before_s, time_s});
+}
+
+void EventOrder::add_unreadable(std::exception_ptr error) {
+  add_fall({latest_s_, kInfinity, 0, latest_s_, latest_s_, std::move(error)});
+  is_unread_ = true;
+}
+
+void EventOrder::add_all(std::span<const double> times_s, std::int64_t first) {
+  constexpr std::int64_t kEventsPerBlock = std::int64_t{1} << 13;
+  for (const double time_s : times_s) {
+    add(time_s, first);
+    if (++first % kEventsPerBlock == 0) end_block(first);
+  }
+  end_block(first);
+}
+
+/// Falls end at ever later times, so that only the last ones can touch a new one.
+void EventOrder::add_fall(Fall fall) {
+  constexpr std::size_t kMost = std::size_t{1} << 16;  // beyond it they are taken together
+  while (!falls_.empty() && (falls_.back().until_s >= fall.from_s || falls_.size() == kMost)) {
+    const double from_s = std::min(falls_.back().from_s, fall.from_s), until_s = fall.until_s;
+    fall = std::move(falls_.back());
+    fall.from_s = from_s;
+    fall.until_s = std::max(fall.until_s, until_s);
+    falls_.pop_back();
+  }
+  falls_.push_back(std::move(fall));
+}
+
+void EventOrder::end_block(std::int64_t end) {
+  if (end == (blocks_.empty() ? 0 : blocks_.back().end)) return;
+  blocks_.push_back({end, latest_s_});
+}
+
+EventOrder::Places EventOrder::block_after(double time_s) const {
+  const auto block = std::ranges::upper_bound(blocks_, time_s, {}, &Block::latest_s);
+  const std::int64_t begin = block == blocks_.begin() ? 0 : std::prev(block)->end;
+  return {begin, block == blocks_.end() ? begin : block->end};
+}
+
+const EventOrder::Fall* EventOrder::fall_in(double after_s, double until_s) const {
+  const auto fall = std::ranges::upper_bound(falls_, after_s, {}, &Fall::until_s);
+  if (fall != falls_.end() && fall->from_s <= until_s) return &*fall;
+  return nullptr;
+}
+
+std::optional<std::array<double, 2>> EventOrder::span() const {
+  if (!any_) return std::nullopt;
+  return std::array{earliest_s_, latest_s_};
+}
+
+void refuse_fall(const EventOrder::Fall& fall) {
+  if (fall.unread) std::rethrow_exception(fall.unread);
+  check_event_time(fall.before_s, fall.after_s);
+  throw EventFault("expected times that never decrease, got others");
+}
+
+}  // namespace eventgan
