@@ -23,6 +23,7 @@
 #include "stages/frames/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/frame_selection.h"
+#include "stages/frames/index_mask.h"
 #include "stages/frames/source_folders.h"
 
 namespace eventgan {
@@ -46,17 +47,6 @@ struct MaskWork {
   OutlineCounts outlines = {};
 };
 
-/// Where in the folder of masks a frame's is.
-fs::path mask_name(const SourceRoot& root, const LabelledFrame& frame) {
-  const std::string above = root.written("") + "/";
-  const std::string& path = frame.frame.path;
-  fs::path name =
-      path.starts_with(above) ? fs::path(path.substr(above.size())) : fs::path(path).filename();
-  name.replace_extension();
-  if (frame.frame.video_frame >= 0) name /= fmt::format("{:06}", frame.frame.video_frame);
-  return name += ".png";
-}
-
 /// The sources of frames, open, each with the folder of its masks.
 std::vector<OutlinedSource> open_sources(const JobManifest& manifest, const fs::path& out) {
   std::vector<OutlinedSource> sources;
@@ -72,6 +62,11 @@ std::vector<OutlinedSource> open_sources(const JobManifest& manifest, const fs::
       source.folder /= others == 0 ? name : name + "-" + std::to_string(others + 1);
     }
     SourceSpec spec = *source.spec;
+    // The masks that this is to make, or to go on with, are not its own input.
+    if (spec.outlines && fs::weakly_canonical(resolve(manifest, *spec.outlines)) ==
+                             fs::weakly_canonical(fs::absolute(source.folder))) {
+      spec.outlines.reset();
+    }
     source.dataset = open_dataset(spec, manifest.directory);
   }
   return sources;
@@ -82,12 +77,12 @@ std::vector<MaskWork> list_work(const JobManifest& manifest,
   std::vector<MaskWork> works;
   std::map<fs::path, std::string> images;  // by mask
   for (const OutlinedSource& source : sources) {
-    const SourceRoot root(source.spec->root, manifest.directory);
+    const std::string root = SourceRoot(source.spec->root, manifest.directory).written("");
     for (LabelledFrame& frame : select_frames(source.dataset->labelled_frames(), *source.spec,
                                               manifest.directory, manifest.seed)
                                     .frames) {
       MaskWork work{.source = &source, .frame = std::move(frame)};
-      work.mask = source.folder / mask_name(root, work.frame);
+      work.mask = source.folder / mask_name(root, work.frame.frame) += ".png";
       const auto [other, is_first] = images.emplace(work.mask, work.frame.frame.path);
       if (!is_first) {
         work.fault = "expected one image of " + work.mask.string() + ", got " + other->second +
@@ -123,15 +118,17 @@ void draw(const Outline& outline, std::uint16_t number, ImageSize size,
   }
 }
 
-/// The image's boxes as numbers, nearer ones over farther ones.
-std::vector<std::uint16_t> draw_all(const std::vector<Box>& boxes, ImageSize size) {
-  std::vector<std::size_t> order(boxes.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return boxes[i].xyxy.bottom; });
+/// The objects by their numbers in the annotation, nearer ones over farther ones.
+std::vector<std::uint16_t> draw_all(Annotation& annotation, ImageSize size) {
+  const std::vector<Box*> boxes = boxes_as_annotated(annotation);
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    if (boxes[i] != nullptr && !boxes[i]->ignore) order.push_back(i);
+  }
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return boxes[i]->xyxy.bottom; });
   std::vector<std::uint16_t> indices(size.pixel_count());
   for (const std::size_t i : order) {
-    if (boxes[i].ignore) continue;
-    draw(boxes[i].outline, static_cast<std::uint16_t>(i + 1), size, indices);
+    draw(boxes[i]->outline, static_cast<std::uint16_t>(i + 1), size, indices);
   }
   return indices;
 }
@@ -152,16 +149,16 @@ void make_mask(const JobManifest& manifest, const FrameDecoder& decoder, MaskWor
   const Outcome<ColourFrame> image = decoder.decode(
       work.frame.frame, spec.every, orientation_of(spec.dataset), manifest.image.range);
   if (is_fault(image)) return fail(image.fault().reason);
-  std::vector<Box>& boxes = annotation->boxes;
-  constexpr std::size_t kMostBoxes = 65535;
-  if (boxes.size() > kMostBoxes) {
-    return fail("expected at most " + std::to_string(kMostBoxes) + " boxes, got " +
-                std::to_string(boxes.size()) + ", in " +
+  const std::size_t objects = annotation->boxes.size() + annotation->left_out_at.size();
+  if (objects > kMostMaskObjects) {
+    return fail("expected at most " + std::to_string(kMostMaskObjects) + " boxes, got " +
+                std::to_string(objects) + ", in " +
                 work.source->dataset->label_place(work.frame.label_key));
   }
-  work.outlines = cut_out_missing({image->size, image->bgr.data()}, boxes);
+  work.outlines = cut_out_missing({image->size, image->bgr.data()}, annotation->boxes);
   fs::create_directories(work.mask.parent_path());
-  write_file_atomically(work.mask, encode_index_png(image->size, draw_all(boxes, image->size)));
+  write_file_atomically(work.mask,
+                        encode_index_png(image->size, draw_all(*annotation, image->size)));
 }
 
 /// As a manifest in that folder may name another one.

@@ -48,7 +48,12 @@ const std::vector<OutlinedImage>& images_of(const std::string& name) {
   if (!images.empty()) return images;
   SourceSpec spec;
   spec.root = "images";
-  spec.labels = LabelSpec{LabelFormat::kCoco, "instances.json"};
+  if (name == "coco256") {
+    spec.labels = LabelSpec{LabelFormat::kCoco, "instances.json"};
+  } else {
+    spec.labels = LabelSpec{LabelFormat::kCsv, "boxes.csv"};
+    spec.outlines = "masks";
+  }
   return images = read_images(spec, testing::shared_data() / "labelled_frames" / name);
 }
 
