@@ -99,7 +99,11 @@ void settle_motion(const PairSpec& spec, const PairKey& key, const std::vector<B
   if (!pair.motion || !spec.stills) return;
   const bool image_rests = *pair.motion == ImageMotion();
   const auto& objects = spec.stills->objects;
-  const auto moves_alone = [](const Box& box) { return !box.ignore && !box.outline.empty(); };
+  const auto moves_alone = [](const Box& box) {
+    const Rectangle& edges = box.xyxy;
+    const bool can_be_cut_out = edges.left < edges.right && edges.top < edges.bottom;
+    return !box.ignore && (!box.outline.empty() || can_be_cut_out);
+  };
   pair.objects.clear();
   if (!objects || std::ranges::none_of(boxes, moves_alone)) {
     if (image_rests) pair.motion = draw_moving(*spec.stills, key.pair().keyed("motion"));
