@@ -389,7 +389,8 @@ class PngFile {
     image.indices.resize(image.size.pixel_count());
     const bool is_wide = image.bits == 16;
     run_guarded(escape_, [&] {
-      png_set_packing(png_);  // a byte for each index
+      png_set_packing(png_);                      // a byte for each index
+      png_set_check_for_invalid_index(png_, -1);  // no colour is looked up
       png_set_strip_alpha(png_);
       if constexpr (std::endian::native == std::endian::little) png_set_swap(png_);
       png_set_interlace_handling(png_);
