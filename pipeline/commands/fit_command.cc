@@ -89,12 +89,6 @@ int run_fit(const FitArguments& arguments) {
   const CameraSensor sensor = fit.sensor(
       arguments.name, program_version() + " fit of " + names + ": " +
                           origin_text(fit, std::filesystem::path(arguments.weights).filename()));
-  if (!arguments.out.empty() && !sensor.threshold && !sensor.noise) {
-    throw InputError(
-        "expected recordings that tell a threshold or the noise, got neither: nothing is written "
-        "to " +
-        arguments.out);
-  }
   const std::string document = to_document(sensor);
   std::cout << to_text(fit);
   if (!arguments.out.empty() && !sensor.threshold && !sensor.noise) {
