@@ -146,10 +146,6 @@ std::string source_text(const SourceSpec& spec, const SourceSummary& summary,
                         by_gap_text(summary.pairs_by_gap));
     if (spec.pairs.stills) {
       text += fmt::format("  stills under a drawn motion: {}\n", pairs_of(summary));
-      if (spec.pairs.stills->objects) {
-        text +=
-            "  objects move on their own; those without an outline are cut out of their boxes\n";
-      }
     }
     if (!spec.pairs.stills || summary.unpaired > 0) text += unpaired_text(spec, summary, unpaired);
   }
