@@ -41,6 +41,7 @@ class WrappedDataset : public Dataset {
   }
   std::vector<std::string> notes() const override { return dataset_->notes(); }
   std::vector<std::string> warnings() const override { return dataset_->warnings(); }
+  Unreadable unreadable() const override { return dataset_->unreadable(); }
 
  protected:
   explicit WrappedDataset(std::unique_ptr<Dataset> dataset) : dataset_(std::move(dataset)) {}
