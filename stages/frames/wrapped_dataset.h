@@ -2,6 +2,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +24,12 @@ class WrappedDataset : public Dataset {
   Outcome<Annotation> annotation(const std::string& label_key) const override {
     return dataset_->annotation(label_key);
   }
+  Outcome<MadePair> made_pair(const std::string& label_key) const override {
+    return dataset_->made_pair(label_key);
+  }
+  std::optional<ImageSize> made_size(const std::string& label_key) const override {
+    return dataset_->made_size(label_key);
+  }
   ImageSize sensor_size(const std::string& label_key) const override {
     return dataset_->sensor_size(label_key);
   }
@@ -41,6 +48,7 @@ class WrappedDataset : public Dataset {
   }
   std::vector<std::string> notes() const override { return dataset_->notes(); }
   std::vector<std::string> warnings() const override { return dataset_->warnings(); }
+  Unreadable unreadable() const override { return dataset_->unreadable(); }
 
  protected:
   explicit WrappedDataset(std::unique_ptr<Dataset> dataset) : dataset_(std::move(dataset)) {}
