@@ -62,6 +62,10 @@ void list_pairs(Fields& fields, PairSpec& spec) {
   stills.find("motion", spec.stills, objects(list_motion),
               "the motion from the one image to the other, about the image's centre, in pixels of "
               "the image as stored. Each number is drawn uniformly.");
+  stills.find("frames", spec.clip_frames, integers(2, 1000),
+              "makes each image a sequence of so many labelled frames, frames_per_second apart (20 "
+              "unless given), in which image and objects move on with the motion as that from one "
+              "frame to the next.");
   const auto side =
       fields.find("side", spec.side, words(kSideWords),
                   "Where the pair lies. before: it ends with the labelled frame. after: it starts "

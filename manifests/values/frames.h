@@ -76,6 +76,13 @@ struct ImageMotion {
   bool operator==(const ImageMotion&) const = default;
 };
 
+/// Where the image and the objects of a still are in a frame of a clip that is made of it, from
+/// where they are in the still: an object moves on its own first, then as the image does.
+struct StillPose {
+  ImageMotion image = {};
+  std::vector<std::optional<ImageMotion>> objects = {};  ///< as FramePair::objects
+};
+
 /// Two frames of one sequence, `previous` before `next`, and the labelled frame they belong to. Of
 /// events: the begin and the end of a window, as the recording's last frames at or before them.
 struct FramePair {
@@ -93,6 +100,8 @@ struct FramePair {
   /// motion before `motion` is added, about the box's centre; none of a box that does not: what
   /// lies in it moves as the image does. Empty: no box does.
   std::vector<std::optional<ImageMotion>> objects = {};
+  /// Of two frames of a clip made of a still (PairSpec::clip_frames), both poses; else empty.
+  std::vector<StillPose> poses = {};
 
   /// NaN if either time is unknown.
   double gap_s() const { return next.time_s - previous.time_s; }

@@ -92,6 +92,9 @@ struct PairSpec {
   std::optional<double> max_gap_s = std::nullopt;
   /// Pairs of single images, with kBefore or kAfter and kOne; none: of two frames of a sequence.
   std::optional<StillsSpec> stills = std::nullopt;
+  /// With `stills`: each becomes a clip of so many labelled frames, 2..1000, made when they are
+  /// read, whose pairs are of frames that follow each other.
+  std::optional<int> clip_frames = std::nullopt;
 };
 
 /// Labels of one's own for the images or videos of a `frames` source.
@@ -145,10 +148,10 @@ struct SourceSpec {
   std::optional<std::string> devkit;    ///< kitti_object: object devkit, whose mapping leads to raw
   std::optional<std::string>
       annotations;  ///< mpii, mpii_list, human36m: the annotation file or folder
-  std::optional<std::string> sequences;     ///< mpii, mpii_list: the folder of video frames
-  std::optional<Human36mLayout> layout;     ///< human36m only, and required there
-  std::optional<double> frames_per_second;  ///< frames: for gap_s where the files do not tell
-  std::optional<LabelSpec> labels;          ///< frames
+  std::optional<std::string> sequences;      ///< mpii, mpii_list: the folder of video frames
+  std::optional<Human36mLayout> layout;      ///< human36m only, and required there
+  std::optional<double> frames_per_second;   ///< frames: for gap_s where the files do not tell
+  std::optional<LabelSpec> labels;           ///< frames
   std::optional<std::string> outlines = {};  ///< of frames: folder of index masks
   SelectionSpec selection;
   PairSpec pairs;

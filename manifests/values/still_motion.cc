@@ -67,6 +67,42 @@ AffineMap object_to_labelled(ImageSize source, const FramePair& pair, const Imag
                  compose(compose(moved_on, moved_back), inverse(map_of(motion, middle, u))));
 }
 
+bool moves_alone(const Box& box) { return !box.ignore && !box.outline.empty(); }
+
+ClipWindow clip_window(ImageSize image) {
+  const int x = image.width / 8, y = image.height / 8;
+  return {x, y, {image.height - 2 * y, image.width - 2 * x}};
+}
+
+AffineMap image_in_clip(ImageSize image, const StillPose& pose) {
+  return map_of(pose.image, centre_of(image));
+}
+
+AffineMap object_in_clip(ImageSize image, const StillPose& pose, const ImageMotion& object,
+                         const Box& box) {
+  return compose(image_in_clip(image, pose), map_of(object, centre_of(box.xyxy)));
+}
+
+namespace {
+
+ImageMotion motion_between(const ImageMotion& from, const ImageMotion& to, double u) {
+  const auto at = [u](double a, double b) { return a + u * (b - a); };
+  return {at(from.x_px, to.x_px), at(from.y_px, to.y_px), at(from.angle_deg, to.angle_deg),
+          from.scale * std::pow(to.scale / from.scale, u)};
+}
+
+}  // namespace
+
+StillPose pose_between(const StillPose& from, const StillPose& to, double u) {
+  StillPose pose{motion_between(from.image, to.image, u), from.objects};
+  for (std::size_t k = 0; k < pose.objects.size(); ++k) {
+    if (pose.objects[k] && to.objects.at(k)) {
+      pose.objects[k] = motion_between(*from.objects[k], *to.objects[k], u);
+    }
+  }
+  return pose;
+}
+
 namespace {
 
 ImageMotion draw(const std::array<double, 2>& translation_px, double rotation_deg, double scale,
@@ -99,24 +135,151 @@ void settle_motion(const PairSpec& spec, const PairKey& key, const std::vector<B
   if (!pair.motion || !spec.stills) return;
   const bool image_rests = *pair.motion == ImageMotion();
   const auto& objects = spec.stills->objects;
-  const auto moves_alone = [](const Box& box) {
+  // What has no outline is cut out of its box, if that has an area.
+  const auto may_move = [](const Box& box) {
     const Rectangle& edges = box.xyxy;
-    const bool can_be_cut_out = edges.left < edges.right && edges.top < edges.bottom;
-    return !box.ignore && (!box.outline.empty() || can_be_cut_out);
+    return moves_alone(box) ||
+           (!box.ignore && edges.left < edges.right && edges.top < edges.bottom);
   };
   pair.objects.clear();
-  if (!objects || std::ranges::none_of(boxes, moves_alone)) {
+  if (!objects || std::ranges::none_of(boxes, may_move)) {
     if (image_rests) pair.motion = draw_moving(*spec.stills, key.pair().keyed("motion"));
     return;
   }
   for (std::size_t k = 0; k < boxes.size(); ++k) {
     auto& motion = pair.objects.emplace_back();
-    if (!moves_alone(boxes[k])) continue;
+    if (!may_move(boxes[k])) continue;
     const CounterRandom random = key.pair().keyed("objects").keyed(std::to_string(k));
     const bool rests = !image_rests && random.uniform(kRests) < objects->rests;
     motion = rests ? ImageMotion()
                    : draw(objects->translation_px, objects->rotation_deg, objects->scale, random);
   }
+}
+
+namespace {
+
+/// How far a path leads from its start before it turns back.
+struct PathLimits {
+  double radius_px;
+  double angle_deg;
+  double log_scale;
+};
+
+/// Motions that add up, a frame at a time.
+class Path {
+ public:
+  /// `step`: the first frame's; its direction, pace and turns change from there.
+  Path(const ImageMotion& step, const CounterRandom& random, const PathLimits& limits)
+      : random_(random),
+        limits_(limits),
+        speed_px_(std::hypot(step.x_px, step.y_px)),
+        heading_(std::atan2(step.y_px, step.x_px)),
+        angle_step_(step.angle_deg),
+        scale_step_(std::log(step.scale)) {}
+
+  const ImageMotion& at() const { return at_; }
+
+  void advance() {
+    constexpr double kTurnChange = 0.05, kMostTurn = 0.15, kSteer = 0.5, kEase = 0.4;  // rad, 1
+    constexpr double kPauses = 0.03;
+    constexpr std::uint64_t kLeastPause = 3, kPauseChoices = 10;  // frames
+    turn_ = std::clamp(turn_ + kTurnChange * (2 * draw() - 1), -kMostTurn, kMostTurn);
+    const bool begins = draw() < kPauses;
+    const std::uint64_t length = kLeastPause + random_.below(count_++, kPauseChoices);
+    if (pause_ > 0)
+      --pause_;
+    else if (begins)
+      pause_ = length;
+    pace_ += kEase * ((pause_ > 0 ? 0.0 : 1.0) - pace_);
+    heading_ += turn_;
+    if (std::hypot(at_.x_px, at_.y_px) > limits_.radius_px) {  // the shorter way round to the start
+      const double home = std::atan2(-at_.y_px, -at_.x_px);
+      const double off = std::remainder(home - heading_, 2 * std::numbers::pi);
+      heading_ += std::clamp(off, -kSteer, kSteer);
+    }
+    at_.x_px += pace_ * speed_px_ * std::cos(heading_);
+    at_.y_px += pace_ * speed_px_ * std::sin(heading_);
+    const auto swing = [&](double place, double limit, double& step) {
+      if (std::abs(place) > limit && place * step > 0) step = -step;
+      return place + pace_ * step;
+    };
+    at_.angle_deg = swing(at_.angle_deg, limits_.angle_deg, angle_step_);
+    at_.scale = std::exp(swing(std::log(at_.scale), limits_.log_scale, scale_step_));
+  }
+
+ private:
+  double draw() { return random_.uniform(count_++); }
+
+  CounterRandom random_;
+  std::uint64_t count_ = 0;
+  PathLimits limits_;
+  double speed_px_, heading_, angle_step_, scale_step_;
+  double turn_ = 0;
+  double pace_ = 1;
+  std::uint64_t pause_ = 0;
+  ImageMotion at_;
+};
+
+/// The pose's image, drawn back towards the still until its clip's window sees nothing beyond it.
+ImageMotion held(const ImageMotion& motion, ImageSize image) {
+  const ClipWindow window = clip_window(image);
+  const double right = window.x + window.size.width - 1, bottom = window.y + window.size.height - 1;
+  constexpr int kTries = 20;
+  for (int i = kTries; i > 0; --i) {
+    const ImageMotion part = motion_between({}, motion, double(i) / kTries);
+    const AffineMap back = inverse(image_in_clip(image, {part}));
+    const std::vector<Point> corners{{double(window.x), double(window.y)},
+                                     {right, double(window.y)},
+                                     {double(window.x), bottom},
+                                     {right, bottom}};
+    if (std::ranges::all_of(corners, [&](Point corner) {
+          const Point at = mapped(back, corner);
+          return at.x >= 0 && at.y >= 0 && at.x <= image.width - 1 && at.y <= image.height - 1;
+        })) {
+      return part;
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& still,
+                                  const std::vector<Box>& boxes, ImageSize image, int frames) {
+  const double side = std::min(image.height, image.width);
+  const PathLimits of_image{0.07 * side, 2, 0.02}, of_object{0.3 * side, 10, 0.15};
+  const bool any_moves = spec.objects && std::ranges::any_of(boxes, moves_alone);
+  const bool image_rests = any_moves && draw_motion(spec, still) == ImageMotion();
+  std::optional<Path> path;
+  if (!image_rests) {
+    path.emplace(draw_moving(spec, still.keyed("motion")), still.keyed("motion").keyed("clip"),
+                 of_image);
+  }
+  std::vector<std::optional<Path>> paths(boxes.size());
+  StillPose pose{{}, std::vector<std::optional<ImageMotion>>(any_moves ? boxes.size() : 0)};
+  for (std::size_t k = 0; k < pose.objects.size(); ++k) {
+    if (!moves_alone(boxes[k])) continue;
+    pose.objects[k] = ImageMotion();
+    const CounterRandom random = still.keyed("objects").keyed(std::to_string(k));
+    const auto& objects = *spec.objects;
+    if (!image_rests && random.uniform(kRests) < objects.rests) continue;
+    paths[k].emplace(draw(objects.translation_px, objects.rotation_deg, objects.scale, random),
+                     random.keyed("clip"), of_object);
+  }
+  std::vector<StillPose> poses{pose};
+  for (int i = 0; i < frames; ++i) {
+    if (path) {
+      path->advance();
+      pose.image = held(path->at(), image);
+    }
+    for (std::size_t k = 0; k < pose.objects.size(); ++k) {
+      if (!paths[k]) continue;
+      paths[k]->advance();
+      pose.objects[k] = paths[k]->at();
+    }
+    poses.push_back(pose);
+  }
+  return poses;
 }
 
 }  // namespace eventgan

@@ -36,6 +36,32 @@ AffineMap image_to_labelled(ImageSize source, const FramePair& pair, double u);
 AffineMap object_to_labelled(ImageSize source, const FramePair& pair, const ImageMotion& object,
                              const Box& box, double u);
 
+/// The part of a still that the frames of its clip show: without an eighth of it on each side.
+struct ClipWindow {
+  int x = 0;
+  int y = 0;
+  ImageSize size;
+};
+ClipWindow clip_window(ImageSize image);
+
+/// Where a point of the still lies in a frame of its clip, as part of the image or of the object of
+/// a box; in pixels of the whole image, of which the frame is clip_window.
+AffineMap image_in_clip(ImageSize image, const StillPose& pose);
+AffineMap object_in_clip(ImageSize image, const StillPose& pose, const ImageMotion& object,
+                         const Box& box);
+
+/// The pose at u of the time from one frame to the next.
+StillPose pose_between(const StillPose& from, const StillPose& to, double u);
+
+/// The poses of a still's clip, `frames` + 1 of them; the first is the still itself. Speeds are
+/// drawn as the motions of single pairs are; directions change slowly, and now and then a thing
+/// pauses. The image stays where clip_window sees nothing beyond it. Pure.
+std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& still,
+                                  const std::vector<Box>& boxes, ImageSize image, int frames);
+
+/// Whether the object of a box can move on its own: it has an outline, and is not to be ignored.
+bool moves_alone(const Box& box);
+
 /// The image's motion of a still's pair; none at all (the identity) of as many as `spec` lets rest.
 /// The seed draws each number on its own, so that the limits of one do not change the others.
 ImageMotion draw_motion(const StillsSpec& spec, const CounterRandom& pair);

@@ -145,7 +145,9 @@ std::string source_text(const SourceSpec& spec, const SourceSummary& summary,
     text += fmt::format("  pairs            {}{}\n", pairs_of(summary),
                         by_gap_text(summary.pairs_by_gap));
     if (spec.pairs.stills) {
-      text += fmt::format("  stills under a drawn motion: {}\n", pairs_of(summary));
+      text += spec.pairs.clip_frames
+                  ? fmt::format("  clips of stills, {} frames each\n", *spec.pairs.clip_frames)
+                  : fmt::format("  stills under a drawn motion: {}\n", pairs_of(summary));
     }
     if (!spec.pairs.stills || summary.unpaired > 0) text += unpaired_text(spec, summary, unpaired);
   }

@@ -89,10 +89,15 @@ void SampleStages::read(SampleMessage& message) const try {
   message.sample.pair = planned.pair;
   message.sample.source_to_volume.fill(std::numeric_limits<double>::quiet_NaN());
   Outcome<Annotation> annotation = datasets_[source]->annotation(planned.label_key);
-  const std::vector<Box> boxes = is_fault(annotation) ? std::vector<Box>() : annotation->boxes;
+  std::vector<Box> boxes = is_fault(annotation) ? std::vector<Box>() : annotation->boxes;
   settle_motion(manifest_.sources[source].pairs, key_of(message), boxes, message.sample.pair);
-  if (!planned.fault.empty()) {
-    message.fail(planned.fault);
+  Outcome<MadePair> made = datasets_[source]->made_pair(planned.label_key);
+  if (!is_fault(made) && !made->poses.empty()) {
+    message.sample.pair.poses = std::move(made->poses);
+    boxes = std::move(made->boxes);
+  }
+  if (!planned.fault.empty() || is_fault(made)) {
+    message.fail(planned.fault.empty() ? made.fault().reason : planned.fault);
   } else if (has_events(kind)) {
     read_events(message, *datasets_[source]);
   } else {

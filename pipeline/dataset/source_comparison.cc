@@ -25,6 +25,7 @@
 #include "pipeline/runtime/errors.h"
 #include "stages/frames/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/still_clips.h"
 #include "stages/labels/label_mapping.h"
 #include "stages/shards/shard_rows.h"
 #include "stages/shards/shard_tables.h"
@@ -116,6 +117,7 @@ SourceComparison::SourceComparison(JobManifest manifest,
       notes_.push_back("labels of source " + source.root + " not compared: " + error_line(error));
     }
   }
+  make_clips(manifest_, datasets_);
   number_classes(manifest_.sources, datasets_, stored);
 }
 
@@ -180,9 +182,12 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
     return {"expected the annotation that the shard holds, got none: " + read.fault().reason};
   }
   ImageSizes& sizes = dataset.image_sizes() ? *dataset.image_sizes() : sizes_;
+  const auto made = dataset.made_size(planned.label_key);
   const Outcome<ImageSize> size =
-      has_events(kind) ? Outcome<ImageSize>(dataset.sensor_size(planned.label_key))
-                       : sizes.of(resolve(manifest_, stored.pair.next.path), orientation_of(kind));
+      made ? Outcome<ImageSize>(*made)
+      : has_events(kind)
+          ? Outcome<ImageSize>(dataset.sensor_size(planned.label_key))
+          : sizes.of(resolve(manifest_, stored.pair.next.path), orientation_of(kind));
   if (!is_fault(size) && *size != stored.source_size) {
     return {"expected a source size of " + to_string(*size) + " as in " + stored.pair.next.path +
             ", got " + to_string(stored.source_size)};

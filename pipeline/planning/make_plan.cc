@@ -24,6 +24,7 @@
 #include "stages/frames/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/frame_selection.h"
+#include "stages/frames/still_clips.h"
 
 namespace eventgan {
 namespace {
@@ -35,6 +36,7 @@ struct Window {
 };
 
 Window window(const PairSpec& spec, int gap) {
+  if (spec.clip_frames) return spec.side == PairSide::kBefore ? Window{-1, 0, 1} : Window{0, 1, 0};
   if (spec.stills) return {0, 0, spec.side == PairSide::kBefore ? 1.0 : 0.0};
   switch (spec.side) {
     case PairSide::kBefore:
@@ -119,7 +121,7 @@ PairChoiceResult choose_one(const Dataset& dataset, const LabelledFrame& frame,
   const CounterRandom random =
       PairKey{seed, to_string(source.dataset), frame.sample_id, key}.pair();
   result.samples.push_back(std::move(choices[random.below(0, choices.size())]));
-  if (source.pairs.stills) {
+  if (source.pairs.stills && !source.pairs.clip_frames) {
     FramePair& pair = result.samples.back().pair;
     pair.motion = draw_motion(*source.pairs.stills, random);
     forget_moved_time(pair);
@@ -263,6 +265,7 @@ class SizeProbe {
                         const PlannedSample& sample) {
     if (manifest_.image.size) return *manifest_.image.size;
     if (has_events(source.dataset)) return dataset.sensor_size(sample.label_key);
+    if (const auto made = dataset.made_size(sample.label_key)) return *made;
     const ImageOrientation orientation = orientation_of(source.dataset);
     ImageSizes& sizes = dataset.image_sizes() ? *dataset.image_sizes() : sizes_;
     for (const FrameRef* frame : {&sample.pair.next, &sample.pair.previous}) {
@@ -478,6 +481,7 @@ void open_datasets(const JobManifest& manifest, const PlanningOptions& options,
     datasets.push_back(open_dataset(source, manifest.directory));
     phase.advance();
   }
+  make_clips(manifest, datasets);
   number_classes(manifest.sources, datasets);
 }
 

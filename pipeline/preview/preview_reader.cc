@@ -169,9 +169,20 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
   const DatasetRow* const dataset = find_dataset(header.dataset);
   const ImageOrientation orientation =
       dataset == nullptr ? ImageOrientation::kStored : orientation_of(dataset->value);
+  // Of a clip (PairSpec::clip_frames) the shard has no poses.
+  const FramePair& frames = sample.pair;
+  const bool is_made = !state_->has_events && !frames.motion &&
+                       frames.previous.path == frames.next.path &&
+                       frames.previous.video_frame == frames.next.video_frame &&
+                       frames.previous.index != frames.next.index;
+  if (is_made) {
+    state_->warnings.push_back("expected stored frames, got those of a clip made of " +
+                               frames.next.path + ", which are not shown (" + sample.sample_id +
+                               ")");
+  }
   const auto frame = [&](const FrameRef& which) {
     // Of events there may be no frames, or none yet.
-    if (!sample.valid || (state_->has_events && which.video_frame < 0)) {
+    if (!sample.valid || is_made || (state_->has_events && which.video_frame < 0)) {
       return std::vector<std::uint8_t>();
     }
     return frame_image(

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,12 @@ struct EventWindow {
   void tell_times(FramePair& pair) const;
 };
 
+/// What the frames of a pair are made of, if they are not stored: of a clip made of a still.
+struct MadePair {
+  std::vector<Box> boxes = {};        ///< of the still
+  std::vector<StillPose> poses = {};  ///< as FramePair::poses; empty: the frames are stored
+};
+
 class ImageSizes;  // stages/frames/decoding/frame_decoder.h
 
 /// A labelled frame dataset on disk: which frames are labelled, which lie beside them, and what
@@ -74,6 +81,14 @@ class Dataset {
 
   /// Reads one annotation. A fault if it is malformed ("expected X, got Y, in PATH:LINE").
   virtual Outcome<Annotation> annotation(const std::string& label_key) const = 0;
+
+  /// Of the pair of a labelled frame, what its frames are made of. A fault if it cannot be told.
+  virtual Outcome<MadePair> made_pair(const std::string& /*label_key*/) const { return MadePair(); }
+
+  /// The size of a labelled frame that is made; none: it is stored, and that of its file.
+  virtual std::optional<ImageSize> made_size(const std::string& /*label_key*/) const {
+    return std::nullopt;
+  }
 
   /// Of a dataset of events (has_events), in which every "labelled frame" is a window: its
   /// paired frames -1 and 1 are the window's begin and end, always present, and no other is. Their

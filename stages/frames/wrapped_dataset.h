@@ -2,6 +2,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +23,12 @@ class WrappedDataset : public Dataset {
   }
   Outcome<Annotation> annotation(const std::string& label_key) const override {
     return dataset_->annotation(label_key);
+  }
+  Outcome<MadePair> made_pair(const std::string& label_key) const override {
+    return dataset_->made_pair(label_key);
+  }
+  std::optional<ImageSize> made_size(const std::string& label_key) const override {
+    return dataset_->made_size(label_key);
   }
   ImageSize sensor_size(const std::string& label_key) const override {
     return dataset_->sensor_size(label_key);

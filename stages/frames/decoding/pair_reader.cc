@@ -181,7 +181,7 @@ Outcome<PreparedPair> PairReader::still(const FramePair& pair, ImageOrientation 
 
 void PairReader::expect(const FramePair& pair, ImageOrientation orientation) const {
   for (const FrameRef* frame : {&pair.previous, &pair.next}) {
-    if (pair.motion && frame == &pair.next) break;  // both are one image
+    if ((pair.motion || !pair.poses.empty()) && frame == &pair.next) break;  // both are one image
     if (frame->video_frame >= 0 || images_->has(name_of(*frame, orientation))) continue;
     files_->expect(base_ / frame->path);
   }
@@ -190,7 +190,7 @@ void PairReader::expect(const FramePair& pair, ImageOrientation orientation) con
 Outcome<PreparedPair> PairReader::read(const FramePair& pair, ImageOrientation orientation,
                                        std::int64_t still_stride,
                                        const std::vector<Box>& boxes) const {
-  if (pair.motion) return still(pair, orientation, still_stride, boxes);
+  if (pair.motion || !pair.poses.empty()) return still(pair, orientation, still_stride, boxes);
   const auto outcome = frames(pair, orientation);
   if (is_fault(outcome)) return outcome.fault();
   const auto& [previous, next] = *outcome;

@@ -80,6 +80,30 @@ cv::Mat scaled_grey(const Resizable& whole, const Placement& placement, const Im
   return blurred;
 }
 
+const cv::Mat& checked_still(const cv::Mat& image) {
+  if (std::max(image.rows, image.cols) <= kMostStillSide) return image;
+  throw std::invalid_argument("expected a still of at most " + std::to_string(kMostStillSide) +
+                              " pixels a side, got " +
+                              to_string(ImageSize{image.rows, image.cols}));
+}
+
+/// How far the map moves a corner at most: of an affine one no point between them moves farther.
+double farthest(const AffineMap& map, const Rectangle& around) {
+  double most = 0;
+  for (const Point corner : {Point{around.left, around.top},
+                             {around.right, around.top},
+                             {around.left, around.bottom},
+                             {around.right, around.bottom}}) {
+    const Point moved = mapped(map, corner);
+    most = std::max(most, std::hypot(moved.x - corner.x, moved.y - corner.y));
+  }
+  return most;
+}
+
+// How far an object goes on behind another beyond its outline: in a frame that nobody labels, as it
+// would; in one with labels of its own, not beyond these.
+constexpr double kFarthestBehind_px = 40, kLabelled_px = 0;
+
 /// A still that moves from the previous frame of its pair to the next.
 class MovingStill {
  public:
@@ -89,7 +113,7 @@ class MovingStill {
         image_(image),
         pair_(pair),
         boxes_(boxes),
-        layers_(checked(image), objects()) {}
+        layers_(checked_still(image), objects(), kFarthestBehind_px) {}
 
   /// The frame at u, 0 previous to 1 next; it may be the image itself. Thread safe.
   cv::Mat at(double u) const {
@@ -115,13 +139,6 @@ class MovingStill {
   }
 
  private:
-  static const cv::Mat& checked(const cv::Mat& image) {
-    if (std::max(image.rows, image.cols) <= kMostStillSide) return image;
-    throw std::invalid_argument("expected a still of at most " + std::to_string(kMostStillSide) +
-                                " pixels a side, got " +
-                                to_string(ImageSize{image.rows, image.cols}));
-  }
-
   AffineMap image_map(double u) const {
     return u == moved_end() ? moved_to_labelled(size_, pair_) : image_to_labelled(size_, pair_, u);
   }
@@ -131,19 +148,6 @@ class MovingStill {
     const ImageMotion& motion = *pair_.objects[k];
     return motion == ImageMotion() ? image_map(u)
                                    : object_to_labelled(size_, pair_, motion, boxes_.at(k), u);
-  }
-
-  /// How far the map moves a corner at most: of an affine one no point between them moves farther.
-  static double farthest(const AffineMap& map, const Rectangle& around) {
-    double most = 0;
-    for (const Point corner : {Point{around.left, around.top},
-                               {around.right, around.top},
-                               {around.left, around.bottom},
-                               {around.right, around.bottom}}) {
-      const Point moved = mapped(map, corner);
-      most = std::max(most, std::hypot(moved.x - corner.x, moved.y - corner.y));
-    }
-    return most;
   }
 
   /// What moves on its own, and what may hide it. The one place that asks for outlines.
@@ -165,6 +169,69 @@ class MovingStill {
 
   ImageSize size_;
   cv::Mat image_;
+  FramePair pair_;
+  std::vector<Box> boxes_;
+  StillLayers layers_;
+};
+
+/// Two frames of a clip that is made of a still, and what is between them.
+class ClipFrames {
+ public:
+  ClipFrames(const cv::Mat& image, const FramePair& pair, const std::vector<Box>& boxes)
+      : size_{image.rows, image.cols},
+        window_(clip_window(size_)),
+        pair_(pair),
+        boxes_(boxes),
+        layers_(checked_still(image), objects(), kLabelled_px) {}
+
+  /// The frame at u, 0 previous to 1 next. Thread safe.
+  cv::Mat at(double u) const {
+    const StillPose pose = pose_between(pair_.poses.at(0), pair_.poses.at(1), u);
+    std::vector<AffineMap> objects(pose.objects.size());
+    for (std::size_t k = 0; k < objects.size(); ++k) {
+      if (is_object(k)) objects[k] = inverse(object_map(pose, k));
+    }
+    return layers_.frame(inverse(image_in_clip(size_, pose)), objects)(
+        cv::Rect(window_.x, window_.y, window_.size.width, window_.size.height));
+  }
+
+  double displacement_px() const {
+    const StillPose &before = pair_.poses.at(0), &after = pair_.poses.at(1);
+    const auto moves = [](const AffineMap& from, const AffineMap& to, const Rectangle& around) {
+      return farthest(compose(to, inverse(from)), around);
+    };
+    double most = moves(image_in_clip(size_, before), image_in_clip(size_, after),
+                        {-0.5, -0.5, size_.width - 0.5, size_.height - 0.5});
+    for (std::size_t k = 0; k < pair_.poses[0].objects.size(); ++k) {
+      if (!is_object(k)) continue;
+      most = std::max(most, moves(object_map(before, k), object_map(after, k), boxes_[k].xyxy));
+    }
+    return most;
+  }
+
+ private:
+  bool is_object(std::size_t k) const {
+    return k < boxes_.size() && pair_.poses.at(0).objects.at(k).has_value() &&
+           !boxes_[k].outline.empty();
+  }
+
+  AffineMap object_map(const StillPose& pose, std::size_t k) const {
+    return object_in_clip(size_, pose, *pose.objects.at(k), boxes_.at(k));
+  }
+
+  /// All that hides anything may move any distance within a clip, and what it hides is the same in
+  /// all of its pairs.
+  std::vector<StillObject> objects() const {
+    const double far_px = size_.width + size_.height;
+    std::vector<StillObject> objects;
+    for (std::size_t k = 0; k < pair_.poses.at(0).objects.size(); ++k) {
+      if (is_object(k)) objects.push_back({k, boxes_[k].outline, boxes_[k].xyxy.bottom, far_px});
+    }
+    return objects;
+  }
+
+  ImageSize size_;
+  ClipWindow window_;
   FramePair pair_;
   std::vector<Box> boxes_;
   StillLayers layers_;
@@ -217,8 +284,14 @@ PreparedFrame prepare_frame(const ImageView& frame, const ImageSpec& spec) {
 std::array<PreparedFrame, 2> prepare_still(const ColourView& image, const FramePair& pair,
                                            const ImageSpec& spec, const std::vector<Box>& boxes) {
   return unless_refused([&] {
-    const Placement placement = place(image.size, spec, pair);
     const Resizable still = grey_if_first(image, spec);
+    if (!pair.poses.empty()) {
+      const Placement placement = place(clip_window(image.size).size, spec);
+      const ClipFrames clip(still.image, pair, boxes);
+      return std::array{prepare({clip.at(0), still.channels}, placement, spec),
+                        prepare({clip.at(1), still.channels}, placement, spec)};
+    }
+    const Placement placement = place(image.size, spec, pair);
     const MovingStill moving(still.image, pair, boxes);
     std::array<PreparedFrame, 2> frames = {
         prepare({moving.at(moving.moved_end()), still.channels}, placement, spec),
@@ -237,32 +310,44 @@ ColourFrame move_still(const ColourFrame& image, const FramePair& pair,
   });
 }
 
+namespace {
+
+/// `Moving`: MovingStill or ClipFrames. The image lives as long as what tells its frames.
+template <class Moving>
+FramesBetween between_of(ColourFrame image, const FramePair& pair, const ImageSpec& spec,
+                         const std::vector<Box>& boxes, const Placement& placement) {
+  struct Kept {
+    ColourFrame image;
+    Resizable still;
+    Moving moving;
+    Kept(ColourFrame frame, const FramePair& pair, const ImageSpec& spec,
+         const std::vector<Box>& boxes)
+        : image(std::move(frame)),
+          still(grey_if_first({image.size, image.bgr.data()}, spec)),
+          moving(still.image, pair, boxes) {}
+  };
+  const auto kept = std::make_shared<const Kept>(std::move(image), pair, spec, boxes);
+  return {[kept, spec, placement](double u) {
+            return unless_refused([&] {
+              PreparedFrame frame =
+                  prepare({kept->moving.at(u), kept->still.channels}, placement, spec);
+              return GreyImage{visible_part(placement).size, std::move(frame.grey)};
+            });
+          },
+          kept->moving.displacement_px() * std::max(placement.scale_x(), placement.scale_y())};
+}
+
+}  // namespace
+
 FramesBetween frames_between(ColourFrame image, const FramePair& pair, const ImageSpec& spec,
                              const std::vector<Box>& boxes) {
   return unless_refused([&] {
-    struct Kept {
-      ColourFrame image;
-      Placement placement;
-      Channels channels;
-      MovingStill moving;
-      Kept(ColourFrame frame, const FramePair& pair, const ImageSpec& spec,
-           const std::vector<Box>& boxes)
-          : image(std::move(frame)),
-            placement(place(image.size, spec, pair)),
-            channels(grey_if_first({image.size, image.bgr.data()}, spec).channels),
-            moving(grey_if_first({image.size, image.bgr.data()}, spec).image, pair, boxes) {}
-    };
-    const auto kept = std::make_shared<const Kept>(std::move(image), pair, spec, boxes);
-    const Placement& placement = kept->placement;
-    return FramesBetween{
-        [kept, spec](double u) {
-          return unless_refused([&] {
-            PreparedFrame frame =
-                prepare({kept->moving.at(u), kept->channels}, kept->placement, spec);
-            return GreyImage{visible_part(kept->placement).size, std::move(frame.grey)};
-          });
-        },
-        kept->moving.displacement_px() * std::max(placement.scale_x(), placement.scale_y())};
+    if (!pair.poses.empty()) {
+      const Placement placement = place(clip_window(image.size).size, spec);
+      return between_of<ClipFrames>(std::move(image), pair, spec, boxes, placement);
+    }
+    const Placement placement = place(image.size, spec, pair);
+    return between_of<MovingStill>(std::move(image), pair, spec, boxes, placement);
   });
 }
 

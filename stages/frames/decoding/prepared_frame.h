@@ -78,8 +78,9 @@ inline constexpr int kMostStillSide = 32766;
 /// Both frames of a still's pair, which has a motion, previous first: the image itself at
 /// `pair.label_position`, and the image moved as move_still does, both without the borders that
 /// only one of them shows (placement.h). Where grey is made before resizing the grey image is
-/// moved. Throws as above, also if too little would be left or a side is beyond kMostStillSide.
-/// Thread safe.
+/// moved. Of a clip (FramePair::poses), both are what its window shows of the image as it is then,
+/// and boxes are those of the still. Throws as above, also if too little would be left or a side is
+/// beyond kMostStillSide. Thread safe.
 std::array<PreparedFrame, 2> prepare_still(const ColourView& image, const FramePair& pair,
                                            const ImageSpec& spec,
                                            const std::vector<Box>& boxes = {});

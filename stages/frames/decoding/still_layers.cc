@@ -125,8 +125,8 @@ void lay_over(const cv::Mat& colour, const cv::Mat& cover, cv::Mat frame) {
 
 }  // namespace
 
-StillLayers::StillLayers(const cv::Mat& image, std::vector<StillObject> objects)
-    : background_(image) {
+StillLayers::StillLayers(const cv::Mat& image, std::vector<StillObject> objects, double behind_px)
+    : behind_px_(behind_px), background_(image) {
   const auto moves = [](const StillObject& object) { return object.reach_px > 0; };
   if (std::ranges::none_of(objects, moves)) return;
   std::ranges::stable_sort(objects, {}, &StillObject::lower_edge);
@@ -188,7 +188,7 @@ void StillLayers::fill_layer(std::size_t number, const cv::Mat& image, const cv:
   for (std::size_t i = number; i < layers_.size(); ++i) {
     reach_px = std::max(reach_px, layers_[i].reach_px);
   }
-  reach_px += layer.reach_px + kSlack_px;
+  reach_px = std::min(reach_px + layer.reach_px + kSlack_px, behind_px_);
   const cv::Rect around = grown(layer.area, static_cast<int>(std::ceil(reach_px)), owner);
   if (cv::countNonZero(owner(around) > code) > 0) {
     cv::Mat mask(around.size(), CV_8UC1, cv::Scalar(0));

@@ -60,6 +60,10 @@ TEST_F(PlanSummary, CountsStills) {
   EXPECT_EQ(nlohmann::json::parse(
                 plan_summary_json(manifest_, job_, estimate_, 2))["sources"][0]["stills"],
             3);
+  manifest_.sources[0].pairs.clip_frames = 21;
+  EXPECT_THAT(plan_text(manifest_, job_, estimate_, 2),
+              ::testing::HasSubstr("  clips of stills, 21 frames each\n"));
+  manifest_.sources[0].pairs.clip_frames.reset();
   job_.plan.sources[0].unpaired = 6;
   EXPECT_THAT(plan_text(manifest_, job_, estimate_, 2), ::testing::HasSubstr("no paired frame"));
 }

@@ -442,6 +442,45 @@ TEST_F(MakePlanOfStills, EveryLabelledFrameIsPairedWithItself) {
   }
 }
 
+TEST_F(MakePlanOfStills, EachBecomesAClipOfPairsThatFollowEachOther) {
+  source().pairs.clip_frames = 3;
+  source().frames_per_second = 10;
+  for (const PairSide side : {PairSide::kBefore, PairSide::kAfter}) {
+    source().pairs.side = side;
+    const Plan clips = plan();
+    EXPECT_EQ(clips.sources[0].pairs_by_gap, (std::map<int, std::int64_t>{{1, 12}}));
+    EXPECT_EQ(clips.sources[0].unpaired, 0);
+    int number = 0;
+    for (const PlannedShard& shard : clips.shards) {
+      for (const PlannedSample& sample : shard.samples) {
+        const FramePair& pair = sample.pair;
+        EXPECT_FALSE(pair.motion);
+        EXPECT_EQ(pair.previous.path, pair.next.path);
+        EXPECT_EQ(pair.previous.index, number % 3);
+        EXPECT_EQ(pair.next.index, number % 3 + 1);
+        EXPECT_EQ(pair.label_index, side == PairSide::kBefore ? number % 3 + 1 : number % 3);
+        EXPECT_NEAR(pair.gap_s(), 0.1, 1e-12);
+        ++number;
+      }
+    }
+    EXPECT_EQ(number, 12);
+  }
+}
+
+TEST_F(MakePlanOfStills, AsManyImagesRestAsTheManifestSays) {
+  source().pairs.stills->rests = 1;
+  EXPECT_EQ(motions(plan()), std::vector<ImageMotion>(4));
+}
+
+TEST_F(MakePlanOfStills, SaysHowManyObjectsCanMoveOnTheirOwn) {
+  source().pairs.stills->objects.emplace();
+  EXPECT_THAT(plan().sources[0].notes,
+              ::testing::Contains(::testing::AllOf(
+                  ::testing::HasSubstr("0 of 0 boxes have an outline and move on their own (of 4 "
+                                       "labelled frames looked at)"),
+                  ::testing::HasSubstr("everything moves as the image does"))));
+}
+
 TEST_F(MakePlanOfStills, MotionsAreDrawnWithinTheirLimitsAndFillThem) {
   for (int i = 4; i < 300; ++i) {
     testing::write_flat_image(folder_ / "clip" / fmt::format("f_{:03}.png", i), {1, 1}, 1);

@@ -24,8 +24,9 @@ struct StillObject {
 /// mirrored at the object's edge.
 class StillLayers {
  public:
-  /// `image`: [y, x] uint8 of one channel or three; shared, and left as it is.
-  StillLayers(const cv::Mat& image, std::vector<StillObject> objects);
+  /// `image`: [y, x] uint8 of one channel or three; shared, and left as it is. `behind_px`: how far
+  /// a farther object may go on beyond its outline where nearer ones hide it.
+  StillLayers(const cv::Mat& image, std::vector<StillObject> objects, double behind_px);
 
   /// The image as it is once the background and every object (by box; those of other boxes are not
   /// looked at) have moved; the maps lead from the frame that is wanted to the image. What moves is
@@ -49,6 +50,7 @@ class StillLayers {
   void fill_layer(std::size_t layer, const cv::Mat& image, const cv::Mat& owner);
   cv::Rect seen_in(const Layer& layer, const AffineMap& map) const;
 
+  double behind_px_;
   cv::Mat background_;         ///< filled where objects move away
   std::vector<Layer> layers_;  ///< farther ones first
 };
