@@ -75,16 +75,6 @@ TEST_F(RowDifferences, AreOfOutlinesThatLieElsewhere) {
   EXPECT_THAT(found(expected_), IsEmpty());
 }
 
-TEST_F(RowDifferences, OriginalsThatLookLikeOutlinesAreComparedByteForByte) {
-  example_.samples[0].annotation.original = "[[0,0,1,0,1,1]]";
-  stored_ = {};
-  append_row(example_.header, example_.samples[0], stored_);
-  expected_ = example_.samples[0];
-  EXPECT_THAT(found(expected_), IsEmpty());
-  expected_.annotation.original = "[[0,0,1,0,1,1.0]]";
-  EXPECT_THAT(found(expected_), ElementsAre(HasSubstr("/labels/original")));
-}
-
 TEST_F(RowDifferences, OtherBytesAreToldAlone) {
   expected_.annotation.original += "\n";
   expected_.annotation.boxes.clear();
