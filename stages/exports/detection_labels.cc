@@ -208,7 +208,13 @@ std::string coco_box(const CocoPlace& place, const Rectangle& box, bool is_crowd
   json["area"] = std::ranges::count(mask.pixels, 1);
   const bool has_holes =
       std::ranges::any_of(outline.rings, [](const Ring& ring) { return twice_area(ring) < 0; });
-  const bool is_plain = !has_holes && mask == mask_of(outline, volume, FillRule::kByTurns);
+  const auto is_filled_once = [&](const Ring& ring) {
+    const Outline part{{ring}};
+    return mask_of(part, volume) == mask_of(part, volume, FillRule::kByTurns);
+  };
+  // Parts may overlap each other, but none itself.
+  const bool is_plain = !has_holes && (mask == mask_of(outline, volume, FillRule::kByTurns) ||
+                                       std::ranges::all_of(outline.rings, is_filled_once));
   json["segmentation"] = !is_plain || is_crowd ? Json{{"size", {volume.height, volume.width}},
                                                       {"counts", compressed(run_lengths(mask))}}
                                                : Json::parse(outline_text(outline));

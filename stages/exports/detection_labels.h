@@ -22,7 +22,7 @@ std::string yolo_line(int class_number, const Rectangle& box, ImageSize volume);
 /// "class x1 y1 x2 y2 ...": the corners as shares of the volume's width and height, 9 decimals,
 /// each within 0..1. It is one ring, as YOLO has it: from each of the outline's rings a bridge
 /// without width leads to the next one and back, so that a reader that fills by turns (even-odd)
-/// covers what the outline does; one whose parts overlap is that of its mask. `outline` lies within
+/// covers what the outline does; one whose parts overlap, or one itself, is that of its mask. `outline` lies within
 /// the volume and is not empty.
 std::string yolo_outline_line(int class_number, const Outline& outline, ImageSize volume);
 
@@ -69,7 +69,7 @@ struct CocoPlace {
 /// An entry for a box: `bbox` is left, top, width, height. Without an outline, `area` is that of
 /// the box. With one, which lies within the volume, `area` is the number of pixels that it covers,
 /// and `segmentation` its parts as polygons, or the mask as compressed run lengths where it has
-/// holes or is a crowd's.
+/// holes, a part that overlaps itself, or is a crowd's.
 std::string coco_box(const CocoPlace& place, const Rectangle& box, bool is_crowd,
                      const Outline& outline, ImageSize volume);
 

@@ -25,7 +25,8 @@ inline constexpr std::size_t kMostMaskObjects = 1000;
 /// single object have, it is object 1. A value; reading it from several threads is safe.
 class IndexMask {
  public:
-  /// A fault names the file as `written`, and is one of a mask of too many objects, too.
+  /// A fault names the file as `written`, and is one of a mask of too many objects, or of
+  /// corners of their outlines, too.
   static Outcome<IndexMask> read(const std::filesystem::path& file, const std::string& written);
 
   ImageSize size() const { return image_.size; }
@@ -33,8 +34,12 @@ class IndexMask {
   bool has_palette() const { return image_.has_palette; }
   /// Those of objects, ascending.
   const std::vector<int>& indices() const { return indices_; }
+  /// One object, white (255) on black.
+  bool is_white() const { return is_white_; }
   /// The edges of the object's pixels.
   Outline outline(int index) const;
+  /// Which share of the object's pixels has its centre in the area.
+  double share_in(int index, const Rectangle& area) const;
 
  private:
   explicit IndexMask(IndexImage image);
@@ -43,7 +48,10 @@ class IndexMask {
     int top, bottom, left, right;
   };
 
+  const Extent& extent(int index) const;
+
   IndexImage image_;
+  bool is_white_ = false;
   std::vector<int> indices_;
   std::vector<Extent> extents_;  ///< one of each of indices_
 };
@@ -59,9 +67,9 @@ std::filesystem::path mask_name(const std::string& root, const FrameRef& frame);
 
 /// Gives each box that has no outline that of its object: number k is of the k-th box that the
 /// annotation has, counted from 1, be it left out or not. A fault where the mask cannot be read, is
-/// of another size than the image, has a number that no box has, or pixels of one that lie all
-/// outside its box. The mask is read only if a box is without outline. `written` is its file, and
-/// `place` the label's, in messages.
+/// of another size than the image, white alone beside several boxes, has a number that no box has,
+/// or one of whose pixels a quarter and more lie outside its box. The mask is read only if a box is
+/// without outline. `written` is its file, and `place` the label's, in messages.
 std::optional<SampleFault> give_outlines(const std::filesystem::path& file,
                                          const std::string& written, ImageSize image,
                                          const std::string& place, Annotation& annotation);

@@ -114,6 +114,12 @@ Outline read_run_lengths(StrictObject object, ImageSize image) {
     }
   }
   const auto mask = runs ? mask_of(*runs, image) : std::nullopt;
+  const std::size_t corners = mask ? corner_count(mask->pixels, image) : 0;
+  if (corners > kMostCorners) {
+    counts.fault("a mask of at most " + std::to_string(kMostCorners) + " corners",
+                 std::to_string(corners));
+    return {};
+  }
   if (mask) return outline_of(*mask);
   counts.fault("run lengths of " + std::to_string(image.pixel_count()) + " pixels", "others");
   return {};
@@ -126,7 +132,7 @@ Outline read_segmentation(StrictObject& object, ImageSize image) {
   if (!segmentation->is_array()) return read_run_lengths(segmentation->object(), image);
   std::vector<std::vector<Point>> parts;
   for (const StrictValue& part : segmentation->elements()) parts.push_back(read_polygon(part));
-  return outline_of_parts(std::move(parts));
+  return outline_of_parts(parts);
 }
 
 /// COCO has 0 or 1; many tools write false or true.
@@ -208,7 +214,9 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
     }
   }
   box.outline = read_segmentation(object, image);
-  const auto sides = find_given(object, "bbox");
+  auto sides = find_given(object, "bbox");
+  const bool is_told = sides && !(sides->is_array() && sides->elements().empty());
+  if (!is_told && !box.outline.empty()) sides.reset();
   box.xyxy = !sides && !box.outline.empty() ? bounds(box.outline)
                                             : read_bbox(sides ? *sides : object.at("bbox"));
   if (const auto crowd = find_given(object, "iscrowd")) box.ignore = read_flag(*crowd);

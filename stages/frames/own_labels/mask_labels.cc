@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <unordered_set>
 #include <utility>
@@ -9,6 +10,7 @@
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/outlines.h"
+#include "stages/base/files/sha256.h"
 #include "stages/frames/index_mask.h"
 #include "stages/frames/own_labels/detail/file_per_image.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
@@ -30,6 +32,9 @@ const LabelFiles kMaskFiles{.extension = ".png",
 // to leave out.
 constexpr int kMotsClass = 1000;
 constexpr int kMotsIgnored = 10 * kMotsClass;
+bool is_of_mots(int index) {
+  return (index >= kMotsClass && index < 3 * kMotsClass) || index == kMotsIgnored;
+}
 
 class MaskLabels : public FilePerImage {
  public:
@@ -37,6 +42,7 @@ class MaskLabels : public FilePerImage {
       : FilePerImage(spec, base, std::move(labelled), kMaskFiles), is_mots_(find_mots()) {
     schema_.class_names = is_mots_ ? std::vector<std::string>{"car", "pedestrian", "ignore_region"}
                                    : std::vector<std::string>{"object"};
+    if (is_mots_) notes_.push_back("masks read as MOTS': 1000 class + instance, 10000 is ignored");
     meanings_["masks"] = is_mots_ ? "1000 class + instance" : "objects";
     for (std::size_t i = 0; i < labels().size(); ++i) {
       const bool in_folder = source().frames[i].name.find('/') != std::string::npos;
@@ -44,24 +50,32 @@ class MaskLabels : public FilePerImage {
     }
   }
 
-  Outcome<Annotation> annotation(const std::string& label_key) const override {
+  Outcome<Annotation> annotation(const std::string& label_key) const override try {
     const std::string place = label_place(label_key);
-    const Outcome<IndexMask> mask = IndexMask::read(root().on_disk(label_key), place);
+    const fs::path file = root().on_disk(label_key);
+    const Outcome<IndexMask> mask = IndexMask::read(file, place);
     if (is_fault(mask)) return mask.fault();
     const Outcome<ImageSize> size = image_size(label_key, mask->size());
     if (is_fault(size)) return size.fault();
     Annotation annotation;
     annotation.original = dump_json(
-        nlohmann::json{{"mask", label_key}, {"objects", mask->indices()}}, JsonLayout::kLine);
+        nlohmann::json{
+            {"mask", label_key}, {"objects", mask->indices()}, {"sha256", sha256_of_file(file)}},
+        JsonLayout::kLine);
     for (const int index : mask->indices()) {
       Box box;
       if (is_mots_) {
-        box.ignore = index == kMotsIgnored;
-        box.class_id = box.ignore ? 2 : index / kMotsClass - 1;
-        if (box.class_id < 0 || box.class_id > (box.ignore ? 2 : 1)) {
+        if (!is_of_mots(index)) {
           return SampleFault{"expected MOTS' numbers, 1000 to 2999 and 10000, got " +
                              std::to_string(index) + ", in " + place};
         }
+        box.ignore = index == kMotsIgnored;
+        box.class_id = box.ignore ? 2 : index / kMotsClass - 1;
+      } else if (mask->bits() == 16 && index >= kMotsClass) {
+        return SampleFault{
+            "expected numbers below 1000, since the first mask's are not MOTS' (1000 class + "
+            "instance), got " +
+            std::to_string(index) + ", in " + place};
       }
       if (is_mots_ || of_sequences_.contains(label_key)) box.track_id = index;
       if (box.ignore) box.track_id = -1;
@@ -70,19 +84,18 @@ class MaskLabels : public FilePerImage {
       add_box(box, *size, place, annotation);
     }
     return annotation;
+  } catch (const std::runtime_error& error) {  // of a file that is gone between two reads of it
+    return SampleFault{error.what()};
   }
 
  private:
-  /// By the first masks, of which one has objects.
+  /// By the first mask that has objects.
   bool find_mots() const {
-    constexpr int kMost = 20;
-    int looked_at = 0;
     for (const FrameLabel& label : labels()) {
       if (label.key.empty()) continue;
-      if (looked_at++ == kMost) break;
       const auto mask = IndexMask::read(root().on_disk(label.key), label_place(label.key));
       if (is_fault(mask) || mask->indices().empty()) continue;
-      return mask->bits() == 16 && mask->indices().front() >= kMotsClass;
+      return mask->bits() == 16 && std::ranges::all_of(mask->indices(), is_of_mots);
     }
     return false;
   }
@@ -91,9 +104,9 @@ class MaskLabels : public FilePerImage {
   std::unordered_set<std::string> of_sequences_;  ///< label_keys
 };
 
-/// Whether some of the PNGs in a folder, or in folders of it, are masks of objects. Those in
-/// "Annotations" have palettes, as DAVIS' have: others there are of classes.
-bool has_index_masks(const fs::path& masks, const std::vector<std::string>& folders) {
+/// Whether some of the PNGs in a folder beside images, or in folders of it, are masks of objects.
+/// Those in "Annotations" have palettes, as DAVIS' have: others there are of classes.
+bool has_index_masks(const fs::path& masks, const FoundFrames& frames) {
   constexpr std::size_t kMost = 5;
   std::vector<fs::path> files;
   const auto add = [&](const fs::path& folder) {
@@ -102,11 +115,14 @@ bool has_index_masks(const fs::path& masks, const std::vector<std::string>& fold
     }
   };
   add(masks);
-  for (const std::string& folder : folders) {
+  for (const std::string& folder : frames.folders) {
     if (files.size() < kMost) add(masks / folder);
   }
-  const bool needs_palette = std::ranges::any_of(
-      masks, [](const fs::path& part) { return in_small_letters(part.string()) == kOfDavis; });
+  // What is above images and masks may have any name.
+  const auto own = std::ranges::mismatch(masks, frames.root).in1;
+  const bool needs_palette = std::any_of(own, masks.end(), [](const fs::path& part) {
+    return in_small_letters(part.string()) == kOfDavis;
+  });
   return std::ranges::any_of(files, [&](const fs::path& file) {
     const auto mask = IndexMask::read(file, "");
     return !is_fault(mask) && !mask->indices().empty() && (mask->has_palette() || !needs_palette);
@@ -115,8 +131,7 @@ bool has_index_masks(const fs::path& masks, const std::vector<std::string>& fold
 
 std::optional<fs::path> find_masks(const FoundFrames& frames, std::vector<std::string>&) {
   const fs::path masks = find_label_files(frames, kMaskFiles);
-  if (masks.empty() || masks == frames.root || !has_index_masks(masks, frames.folders))
-    return std::nullopt;
+  if (masks.empty() || masks == frames.root || !has_index_masks(masks, frames)) return std::nullopt;
   return masks;
 }
 

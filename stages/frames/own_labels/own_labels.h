@@ -188,18 +188,18 @@ extern const LabelReader kCocoReader;
 /// A line is "class xc yc w h", shares of the image's width and height from its left and upper
 /// edge; with kpt_shape [J, 2 or 3] "class xc yc w h" and J times "px py [v]", v as COCO's; a joint
 /// at 0, 0 without v is not annotated. Joints are named by data.yaml's kpt_names, by COCO's names
-/// if there are 17, else "0", "1", ... "class x1 y1 x2 y2 ..."
-/// is an outline (segmentation), and the box is what is around it; it may stand among others.
+/// if there are 17, else "0", "1", ... "class x1 y1 x2 y2 ..." is an
+/// outline (segmentation), and the box is what is around it; it may stand among others.
 extern const LabelReader kYoloReader;
 
 /// Pascal VOC's XML files (parse_voc_labels): found as YOLO's texts are, with the last folder
 /// "JPEGImages" or "images" replaced by "Annotations", or in annotations/xmls, labels, xml. All are
-/// read at opening, since classes are
-/// numbered by their names' order, as with MOT's and tables' labels; an image without boxes has a
-/// file without <object>. Edges count from LabelSpec::edges_from; else from 0 where a box of the
-/// source begins there, as none of VOC's own can, and from 1 where none does. A note tells. Of a
-/// file in a folder beside SegmentationObject the mask there of its name, if there is one, has the
-/// outlines, number k that of the k-th <object> (give_outlines).
+/// read at opening, since classes are numbered by their names' order, as with MOT's and tables'
+/// labels; an image without boxes has a file without <object>. Edges count from
+/// LabelSpec::edges_from; else from 0 where a box of the source begins there, as none of VOC's own
+/// can, and from 1 where none does. A note tells. Of a file in a folder beside SegmentationObject
+/// the mask there of its name, if there is one, has the outlines, number k that of the k-th
+/// <object> (give_outlines).
 extern const LabelReader kVocReader;
 
 /// A table (parse_csv_labels): `path` is the file; images are named as by COCO's file_name. The
@@ -210,9 +210,10 @@ extern const LabelReader kCsvReader;
 /// found as YOLO's texts are, with the last folder "images", "JPEGImages", "img1", "imgs" or
 /// "image_02" replaced by "masks", "instances" or "Annotations". Each object is a box, the bounds
 /// of its outline, of the class "object". In folders of images, which are a sequence each, and in
-/// videos the number is the track. Masks of 16 bits whose numbers begin at 1000 are MOTS': 1000
-/// class + instance, where class 1 is car and 2 pedestrian; 10000 is a region to ignore.
-/// Annotation::original is {"mask": FILE, "objects": [NUMBER, ...]}.
+/// videos the number is the track. Masks of 16 bits, of which the first with objects has numbers of
+/// MOTS alone, are MOTS': 1000 class + instance, where class 1 is car and 2 pedestrian; 10000 is a
+/// region to ignore. In others of 16 bits a number from 1000 on is a fault. Annotation::original is
+/// {"mask": FILE, "objects": [NUMBER, ...], "sha256": OF THE FILE}.
 extern const LabelReader kMasksReader;
 
 /// Every format's, in the order of kLabelFormats.

@@ -141,23 +141,33 @@ TEST_F(DraftManifest, NamesLabelsOfOnesOwn) {
 
 TEST_F(DraftManifest, NamesMasksThatFitTheBoxes) {
   FoundSource source = images("walk/images", {{4, 5}, {4, 5}});
-  testing::write_file(folder_ / "walk/boxes.csv",
-                      "image,class,left,top,right,bottom\n0.png,car,0,0,2,2\n1.png,,,,,\n");
   source.labels = {LabelFormat::kCsv, folder_ / "walk/boxes.csv", folder_ / "walk/masks"};
-  std::vector<int> pixels(20);
-  pixels[6] = 1;
-  testing::write_index_image(folder_ / "walk/masks/0.png", {4, 5}, pixels);
-  const ManifestDraft made = draft({source});
+  const auto drafted = [&](const std::string& rows, const std::vector<int>& pixels) {
+    testing::write_file(folder_ / "walk/boxes.csv",
+                        "image,class,left,top,right,bottom\n" + rows + "1.png,,,,,\n");
+    testing::write_index_image(folder_ / "walk/masks/0.png", {4, 5}, pixels);
+    return draft({source});
+  };
+  const std::string one = "0.png,car,0,0,2,2\n", two = one + "0.png,car,2,0,5,4\n";
+  const std::vector<int> both{1, 1, 0, 2, 2, 1, 1, 2, 2, 2, 0, 0, 2, 2, 2, 0, 0, 2, 2, 0};
+  const ManifestDraft made = drafted(two, both);
   EXPECT_EQ(read(made).sources[0].outlines, "walk/masks");
   EXPECT_THAT(made.findings,
               Contains("outlines: index masks, in " + (folder_ / "walk/masks").string()));
-  pixels[6] = 2;
-  testing::write_index_image(folder_ / "walk/masks/0.png", {4, 5}, pixels);
-  const ManifestDraft without = draft({source});
-  EXPECT_FALSE(read(without).sources[0].outlines);
-  EXPECT_THAT(without.findings,
-              Contains(HasSubstr("masks left out, since they do not fit the boxes: expected "
-                                 "numbers of the 1 box in walk/boxes.csv#0.png, got 2, in ")));
+
+  const auto expect_none = [&](const ManifestDraft& without, const std::string& why) {
+    EXPECT_FALSE(read(without).sources[0].outlines);
+    EXPECT_THAT(without.findings,
+                Contains(HasSubstr("masks left out, since they do not fit the boxes: " + why)));
+  };
+  expect_none(drafted(one, both),
+              "expected numbers of the 1 box in walk/boxes.csv#0.png, got 2, in ");
+  // A pixel of a box, and a mask of both that has the number of the first.
+  std::vector<int> pixels(20);
+  pixels[6] = 1;
+  expect_none(drafted(one, pixels), "expected pixels all over the boxes, got an overlap of 0.25");
+  expect_none(drafted(two, {1, 1, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}),
+              "expected a number for each box, got one beside 2 boxes");
 }
 
 TEST_F(DraftManifest, OfARecordingTakesItsEvents) {

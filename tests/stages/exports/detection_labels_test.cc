@@ -221,6 +221,13 @@ TEST(CocoBox, ARingThatOverlapsItselfIsRunLengths) {
   }
 }
 
+TEST(CocoBox, PartsThatOverlapAreTwoPolygons) {
+  const Outline outline{{{{0, 0}, {4, 0}, {4, 4}, {0, 4}}, {{2, 2}, {6, 2}, {6, 6}, {2, 6}}}};
+  const Json json = Json::parse(coco_box({1, 1, 1}, {0, 0, 6, 6}, false, outline, {6, 6}));
+  EXPECT_EQ(json["segmentation"].size(), 2u);
+  EXPECT_EQ(json["area"], 16 + 16 - 4);
+}
+
 TEST(YoloOutlineLine, CoversWhatAnyMaskDoes) {
   std::mt19937 random(3);
   for (int trial = 0; trial < 30; ++trial) {

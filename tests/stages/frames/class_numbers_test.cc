@@ -87,6 +87,8 @@ class TellingDataset final : public Dataset {
   const std::vector<LabelledFrame>& labelled_frames() const override { return frames_; }
   PairedFrame paired_frame(const LabelledFrame&, int) const override { return {}; }
   Outcome<Annotation> annotation(const std::string&) const override { return Annotation(); }
+  Outcome<MadePair> made_pair(const std::string&) const override { return SampleFault{"made"}; }
+  std::optional<ImageSize> made_size(const std::string&) const override { return ImageSize{3, 4}; }
   ImageSize sensor_size(const std::string&) const override { return {3, 4}; }
   Outcome<EventWindow> events(const std::string&) const override { return EventWindow{{3, 4}, {}}; }
   ImageSizes* image_sizes() const override { return &sizes_; }
@@ -111,6 +113,8 @@ TEST_F(ClassNumbers, ChangeNothingElseThatADatasetSays) {
   number_classes(sources_, datasets_);
   for (const auto& dataset : datasets_) {
     EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("car", "person"));
+    EXPECT_TRUE(is_fault(dataset->made_pair("")));
+    EXPECT_EQ(dataset->made_size(""), (ImageSize{3, 4}));
     EXPECT_EQ(dataset->sensor_size(""), (ImageSize{3, 4}));
     EXPECT_EQ(dataset->events("")->sensor, (ImageSize{3, 4}));
     EXPECT_NE(dataset->image_sizes(), nullptr);

@@ -81,6 +81,18 @@ TEST(IndexMask, ThatIsNoneIsAFault) {
   EXPECT_EQ(fault("a.png"), "expected at most 1000 objects, got 1001, in masks/a.png");
 }
 
+TEST(IndexMask, OfTooManyCornersIsAFault) {
+  const testing::TemporaryFolder folder;
+  // 501 x 1001 pixels of a checkerboard, of which 250'751 have four corners each.
+  std::vector<int> board(501 * 1001);
+  for (std::size_t i = 0; i < board.size(); i += 2) board[i] = 1;
+  testing::write_index_image(folder / "a.png", {501, 1001}, board);
+  const auto read = IndexMask::read(folder / "a.png", "a.png");
+  ASSERT_TRUE(is_fault(read));
+  EXPECT_EQ(read.fault().reason,
+            "expected at most 1000000 corners of outlines, got 1003004, in a.png");
+}
+
 /// Images with a table of boxes, and masks.
 class Outlines : public ::testing::Test {
  protected:
@@ -194,11 +206,31 @@ TEST_F(Outlines, AMaskThatDoesNotFitIsAFault) {
   write_mask("1.png", {1, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0});
   EXPECT_EQ(fault(), "expected numbers of the 2 boxes in boxes.csv#1.png, got 3, in masks/1.png");
   write_mask("1.png", {1, 0, 0, 0, 0, 0, 2, 2, 0, 0, 0, 0, 0, 0, 0});
-  EXPECT_EQ(fault(),
-            "expected pixels of number 2 in the box from (3, 0) to (5, 3) of boxes.csv#1.png, got "
-            "them from (1, 1) to (3, 2), in masks/1.png");
+  EXPECT_EQ(
+      fault(),
+      "expected most pixels of number 2 in the box from (3, 0) to (5, 3) of boxes.csv#1.png, got "
+      "them from (1, 1) to (3, 2), in masks/1.png");
   testing::write_file(folder_ / "masks/1.png", "no PNG");
   EXPECT_EQ(fault(), "expected a PNG, got a file of another kind, in masks/1.png");
+}
+
+TEST_F(Outlines, AMaskOfAllObjectsOrOfClassesIsAFault) {
+  add_images({"1.png"});
+  write_mask("1.png", {255, 255, 0, 0, 0, 0, 0, 0, 255, 255, 0, 0, 0, 0, 0});
+  EXPECT_EQ(fault(),
+            "expected a number for each of the 2 boxes in boxes.csv#1.png, got white (255) alone, "
+            "in masks/1.png");
+  // Number 1 has 2 columns in its box, 2 in the 2 pixels (and 0.1) beside it, and 2 beyond.
+  testing::write_flat_image(folder_ / "images/1.png", {3, 9}, 9);
+  write_mask("1.png",
+             {1, 1, 0, 1, 0, 1, 1, 0, 0, 1, 1, 1, 1, 0, 1, 1, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0},
+             {3, 9});
+  EXPECT_THAT(fault(), HasSubstr("expected most pixels of number 1 in the box from (0, 0) to (2, "
+                                 "3) of boxes.csv#1.png, got them from (0, 0) to (7, 3)"));
+  write_mask("1.png",
+             {1, 1, 0, 1, 0, 1, 0, 0, 0, 1, 1, 1, 1, 0, 1, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0},
+             {3, 9});
+  EXPECT_EQ(fault(), "no fault") << "9 of 11";
 }
 
 TEST_F(Outlines, AFolderWithoutAnyIsRefused) {

@@ -90,8 +90,27 @@ TEST_F(CocoOutlines, RunLengthsGoDownTheColumns) {
   EXPECT_THAT(box(R"("bbox": [0, 0, 5, 4], "iscrowd": 1, "segmentation": )" + plain).ignore, true);
 }
 
+TEST_F(CocoOutlines, RunLengthsOfTooManyCornersAreAFault) {
+  // A checkerboard, since the height is odd: 350,850 squares.
+  testing::write_flat_image(folder_ / "images/1.png", {701, 1001}, 7);
+  std::string counts = "1";
+  for (int i = 1; i < 701 * 1001; ++i) counts += ",1";
+  testing::write_file(folder_ / "instances.json",
+                      R"({"images": [{"id": 7, "file_name": "1.png", "height": 701, "width": 1001}],
+          "categories": [{"id": 3, "name": "person"}],
+          "annotations": [{"id": 17, "image_id": 7, "category_id": 3, "bbox": [0, 0, 9, 9],
+          "segmentation": {"size": [701, 1001], "counts": [)" +
+                          counts + "]}}]}");
+  SourceSpec spec;
+  spec.root = "images";
+  spec.labels = LabelSpec{LabelFormat::kCoco, "instances.json"};
+  const auto read = open_frames_dataset(spec, folder_.path())->annotation("7");
+  ASSERT_TRUE(is_fault(read));
+  EXPECT_THAT(read.fault().reason, HasSubstr("a mask of at most 1000000 corners, got 1403400"));
+}
+
 TEST_F(CocoOutlines, ABoxWithoutSidesIsAroundItsOutline) {
-  for (const char* none : {"", R"("bbox": null, )"}) {
+  for (const char* none : {"", R"("bbox": null, )", R"("bbox": [], )"}) {
     const Box read =
         box(std::string(none) + R"("segmentation": [[1, 0.5, 4.25, 2, 2, 3], [0, 1, 1, 2, 0, 2]])");
     EXPECT_EQ(read.xyxy, (Rectangle{0, 0.5, 4.25, 3}));

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "manifests/values/outlines.h"
+#include "stages/base/files/sha256.h"
 #include "stages/frames/find_source.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "tests/testing/image_file.h"
@@ -60,7 +61,8 @@ TEST_F(MaskLabels, AreABoxAnObject) {
   EXPECT_THAT(dataset->labelled_frames(), SizeIs(1));
   EXPECT_THAT(dataset->notes(), ElementsAre(HasSubstr("no label for 1 of 2 frames in masks")));
   const Annotation read = annotation(*dataset);
-  EXPECT_EQ(read.original, R"({"mask":"FudanPed00001.png","objects":[3,8]})");
+  EXPECT_EQ(read.original, R"({"mask":"FudanPed00001.png","objects":[3,8],"sha256":")" +
+                               sha256_of_file(folder_ / "masks/FudanPed00001.png") + "\"}");
   ASSERT_THAT(read.boxes, SizeIs(2));
   EXPECT_EQ(read.boxes[0].xyxy, (Rectangle{1, 0, 3, 2}));
   EXPECT_EQ(read.boxes[1].xyxy, (Rectangle{3, 1, 5, 3}));
@@ -110,6 +112,27 @@ TEST_F(MaskLabels, OfMotsHaveClasses) {
     EXPECT_EQ(fault(*dataset), "expected MOTS' numbers, 1000 to 2999 and 10000, got " +
                                    std::to_string(other) + ", in instances/0000/000000.png");
   }
+}
+
+TEST_F(MaskLabels, AreMotsByTheFirstMaskWithObjects) {
+  for (int i = 10; i < 40; ++i) {
+    add("image_02/0/" + std::to_string(i) + ".png", "instances/0/" + std::to_string(i) + ".png",
+        std::vector<int>(15), IndexPng::kGrey16);
+  }
+  std::vector<int> pixels(15);
+  pixels[4] = 10000;
+  testing::write_index_image(folder_ / "instances/0/39.png", kMaskedImage, pixels,
+                             IndexPng::kGrey16);
+  const auto mots = open("image_02", "instances");
+  EXPECT_THAT(mots->notes(), ElementsAre("masks read as MOTS': 1000 class + instance, 10000 is "
+                                         "ignored"));
+  EXPECT_TRUE(annotation(*mots, 29).boxes.at(0).ignore);
+  pixels[4] = 65535;  // of no class of theirs
+  testing::write_index_image(folder_ / "instances/0/10.png", kMaskedImage, pixels,
+                             IndexPng::kGrey16);
+  EXPECT_EQ(fault(*open("image_02", "instances")),
+            "expected numbers below 1000, since the first mask's are not MOTS' (1000 class + "
+            "instance), got 65535, in instances/0/10.png");
 }
 
 TEST_F(MaskLabels, OfAnotherSizeAreAFault) {
@@ -185,6 +208,9 @@ TEST_F(MaskLabels, AreFoundBesideImages) {
   // Grey ones there are of classes; and images beside images are no masks.
   add("ade/images/1.png", "ade/annotations/1.png", two_);
   EXPECT_FALSE(find_sources(folder_ / "ade").front().labels);
+  add("annotations/fudan/images/1.png", "annotations/fudan/masks/1.png", two_);
+  found = find_sources(folder_ / "annotations/fudan").front();
+  ASSERT_TRUE(found.labels) << "what is above is called anything";
   add("flat/1.png", "", {});
   EXPECT_FALSE(find_sources(folder_ / "flat").front().labels);
   add("colours/images/1.png", "", {});
