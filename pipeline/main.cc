@@ -56,6 +56,7 @@ int main(int argc, char** argv) {
 
   int exit_code = eventgan::kFailed;
   eventgan::add_init_command(app, exit_code);
+  eventgan::add_outline_command(app, exit_code);
   eventgan::add_convert_command(app, exit_code);
   eventgan::add_plan_command(app, exit_code);
   eventgan::add_status_command(app, exit_code);

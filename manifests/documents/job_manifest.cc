@@ -42,9 +42,10 @@ void list_motion(Fields& fields, StillsSpec& spec) {
               "The gap of the pair, which the generator's training knows as so many frames.");
   fields.find(
       "objects", spec.objects, objects(list_object_motion),
-      "gives each object with an outline a motion of its own, before the image's is added: "
-      "nearer objects (whose boxes reach lower) cover farther ones, and what they uncover is "
-      "filled from around it. Without it everything moves as the image does.");
+      "gives each object a motion of its own, before the image's is added: nearer objects "
+      "(whose boxes reach lower) cover farther ones, and what they uncover is filled from around "
+      "it. One whose labels have no outline is cut out of its box. Without it everything moves as "
+      "the image does.");
   fields.find("rests", spec.rests, numbers(0, 1),
               "Share of the pairs whose image does not move, as before a camera at rest; of those "
               "alone that have an object that does. Default: 0.5 with objects, else 0.");

@@ -75,7 +75,8 @@ struct StillsSpec {
   double rotation_deg = 2;                     ///< most, either way, 0..45
   double scale = 0.03;                         ///< most, larger or smaller: 1 ± scale, 0..0.5
   int frames = 1;                              ///< the pair's gap_frames, 1..6
-  /// Of objects with an outline; none: they move as the image does.
+  /// Of objects with an outline, their labels' or cut out of their boxes; none: they move as the
+  /// image does.
   std::optional<ObjectMotionSpec> objects = std::nullopt;
   /// Share of the pairs whose image does not move, 0..1; none: 0.5 with `objects`, else 0.
   std::optional<double> rests = std::nullopt;

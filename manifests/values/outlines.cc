@@ -5,13 +5,22 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <functional>
+#include <iterator>
 #include <limits>
+#include <numeric>
+#include <unordered_map>
 #include <utility>
 
 namespace eventgan {
 namespace {
 
 using Ring = std::vector<Point>;
+
+/// The first pixel whose centre does not lie left of x (above it, in a column).
+int first_pixel(double x, int width) {
+  return static_cast<int>(std::clamp(std::ceil(x - 0.5), 0.0, double(width)));
+}
 
 /// Where an edge crosses the line through the centres of a row: left of which, and whether it
 /// begins (clockwise, upwards) or ends a part.
@@ -25,17 +34,11 @@ template <class Visit>
 void cross_rows(Point from, Point to, int height, const Visit& visit) {
   const int winding = from.y > to.y ? 1 : -1;
   if (winding > 0) std::swap(from, to);  // downwards, so that both ways round give the same places
-  const double first = std::max(std::ceil(from.y - 0.5), 0.0);
-  const double last = std::min(std::ceil(to.y - 0.5), double(height));
-  for (int row = static_cast<int>(first); row < last; ++row) {
+  const int last = first_pixel(to.y, height);
+  for (int row = first_pixel(from.y, height); row < last; ++row) {
     const double share = (row + 0.5 - from.y) / (to.y - from.y);
     visit(row, Crossing{from.x + share * (to.x - from.x), winding});
   }
-}
-
-/// The first pixel whose centre does not lie left of x.
-int first_pixel(double x, int width) {
-  return static_cast<int>(std::clamp(std::ceil(x - 0.5), 0.0, double(width)));
 }
 
 /// Follows the edges of a mask's pixels with these on its right hand.
@@ -48,7 +51,7 @@ class EdgeTracer {
     for (int y = 0; y < mask_.size.height; ++y) {
       for (int x = 0; x < mask_.size.width; ++x) {
         // Every ring has an edge that runs to the right, the upper one of a pixel.
-        if (covered(x, y) && !covered(x, y - 1) && !passed_[index(x, y)]) {
+        if (mask_.pixels[index(x, y)] != 0 && !covered(x, y - 1) && !passed_[index(x, y)]) {
           found.rings.push_back(ring_from(x, y));
         }
       }
@@ -112,20 +115,137 @@ double twice_area(const Ring& ring) {
   return sum;
 }
 
-Outline outline_of_parts(std::vector<std::vector<Point>> parts) {
+bool has_area(const Ring& ring) {
+  for (std::size_t i = 2; i < ring.size(); ++i) {
+    const Point a{ring[i - 1].x - ring[0].x, ring[i - 1].y - ring[0].y};
+    const Point b{ring[i].x - ring[0].x, ring[i].y - ring[0].y};
+    if (a.x * b.y != b.x * a.y) return true;
+  }
+  return false;
+}
+
+namespace {
+
+struct CornerHash {
+  std::size_t operator()(const Point& corner) const {
+    const std::hash<double> hash;
+    return hash(corner.x) * 31 + hash(corner.y);
+  }
+};
+
+/// What a ring consists of: a loop wherever it comes back to a corner. Lines there and back are
+/// none, and nor is what lies between lines from each of three parts or more to the next.
+std::vector<Ring> loops_of(const Ring& ring) {
+  std::vector<Ring> loops;
+  Ring path;
+  std::vector<bool> has_loop;  // begins at this corner of the path
+  std::unordered_map<Point, std::size_t, CornerHash> places;
+  const auto keep = [&](Ring loop) {
+    const bool is_kept = has_area(loop);
+    if (is_kept) loops.push_back(std::move(loop));
+    return is_kept;
+  };
+  std::size_t count = ring.size();
+  while (count > 1 && ring[count - 1] == ring[0]) --count;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto [known, is_new] = places.try_emplace(ring[i], path.size());
+    if (is_new) {
+      path.push_back(ring[i]);
+      has_loop.push_back(false);
+      continue;
+    }
+    const std::size_t place = known->second;
+    const auto begin = path.begin() + static_cast<std::ptrdiff_t>(place);
+    if (keep({begin, path.end()})) has_loop[place] = true;
+    for (auto corner = begin + 1; corner != path.end(); ++corner) places.erase(*corner);
+    path.resize(place + 1);
+    has_loop.resize(place + 1);
+  }
+  if (std::ranges::find(has_loop, false) != has_loop.end()) keep(std::move(path));
+  return loops;
+}
+
+/// Whether the loop's first edge, and so all of it if they do not cross, lies within the other.
+bool lies_in(const Ring& loop, const Ring& other) {
+  const Point at{(loop[0].x + loop[1].x) / 2, (loop[0].y + loop[1].y) / 2};
+  bool is_within = false;
+  for (std::size_t i = 0; i < other.size(); ++i) {
+    const Point& a = other[i];
+    const Point& b = other[(i + 1) % other.size()];
+    if ((a.y > at.y) == (b.y > at.y)) continue;
+    if (a.x + (at.y - a.y) / (b.y - a.y) * (b.x - a.x) > at.x) is_within = !is_within;
+  }
+  return is_within;
+}
+
+/// Turns loops that lie in no other to run clockwise, and with them what lies within.
+void turn_clockwise(std::vector<Ring>& loops) {
+  constexpr std::size_t kMost = 300;  // compared with each other: of more, the most area decides
+  std::vector<double> areas;
+  double sum = 0;
+  for (const Ring& loop : loops) sum += areas.emplace_back(twice_area(loop));
+  const bool are_alike = std::ranges::all_of(areas, [](double area) { return area >= 0; }) ||
+                         std::ranges::all_of(areas, [](double area) { return area <= 0; });
+  std::vector<bool> turned(loops.size(), sum < 0);
+  for (std::size_t i = 0; !are_alike && loops.size() <= kMost && i < loops.size(); ++i) {
+    double widest = areas[i];
+    for (std::size_t j = 0; j < loops.size(); ++j) {
+      if (std::abs(areas[j]) > std::abs(widest) && lies_in(loops[i], loops[j])) widest = areas[j];
+    }
+    turned[i] = widest < 0;
+  }
+  for (std::size_t i = 0; i < loops.size(); ++i) {
+    if (turned[i]) std::ranges::reverse(loops[i]);
+  }
+}
+
+}  // namespace
+
+Outline outline_of_parts(const std::vector<std::vector<Point>>& parts) {
   Outline outline;
-  for (Ring& ring : parts) {
-    const double area = twice_area(ring);
-    if (ring.size() < kLeastCorners || area == 0) continue;
-    if (area < 0) std::reverse(ring.begin(), ring.end());
-    outline.rings.push_back(std::move(ring));
+  for (const Ring& part : parts) {
+    std::vector<Ring> loops = loops_of(part);
+    turn_clockwise(loops);
+    std::ranges::move(loops, std::back_inserter(outline.rings));
   }
   return outline;
 }
 
+std::size_t corner_count(const Outline& outline) {
+  std::size_t count = 0;
+  for (const Ring& ring : outline.rings) count += ring.size();
+  return count;
+}
+
+template <class Pixel>
+std::size_t corner_count(const std::vector<Pixel>& pixels, ImageSize size) {
+  const auto at = [&](int y, int x) {
+    return y < 0 || x < 0 || y == size.height || x == size.width
+               ? Pixel{0}
+               : pixels[std::size_t(y) * std::size_t(size.width) + std::size_t(x)];
+  };
+  std::size_t count = 0;
+  for (int y = 0; y <= size.height; ++y) {
+    std::array<Pixel, 4> around{};  // the pixels around a place where four meet, row by row
+    for (int x = 0; x <= size.width; ++x) {
+      around = {around[1], at(y - 1, x), around[3], at(y, x)};
+      for (std::size_t i = 0; i < 4; ++i) {
+        // A pixel has a corner there if its two neighbours are alike: both its own, and not the
+        // one across, or both not.
+        const Pixel own = around[i];
+        const bool left = around[i ^ 1] == own, up = around[i ^ 2] == own;
+        if (own != 0 && left == up && (!left || around[i ^ 3] != own)) ++count;
+      }
+    }
+  }
+  return count;
+}
+template std::size_t corner_count(const std::vector<std::uint8_t>& pixels, ImageSize size);
+template std::size_t corner_count(const std::vector<std::uint16_t>& pixels, ImageSize size);
+
 Outline outline_of(const GreyImage& mask) { return EdgeTracer(mask).trace(); }
 
-GreyImage mask_of(const Outline& outline, ImageSize size) {
+GreyImage mask_of(const Outline& outline, ImageSize size, FillRule rule) {
   GreyImage mask{size, std::vector<std::uint8_t>(size.pixel_count())};
   std::vector<std::vector<Crossing>> rows(static_cast<std::size_t>(size.height));
   for (const Ring& ring : outline.rings) {
@@ -141,7 +261,7 @@ GreyImage mask_of(const Outline& outline, ImageSize size) {
     int winding = 0;
     for (std::size_t i = 0; i + 1 < rows[y].size(); ++i) {
       winding += rows[y][i].winding;
-      if (winding == 0) continue;
+      if (winding == 0 || (rule == FillRule::kByTurns && winding % 2 == 0)) continue;
       const int begin = first_pixel(rows[y][i].x, size.width);
       std::fill(row + begin, row + std::max(begin, first_pixel(rows[y][i + 1].x, size.width)),
                 std::uint8_t{1});
@@ -180,18 +300,23 @@ std::vector<std::uint32_t> run_lengths(const GreyImage& mask) {
 }
 
 std::optional<GreyImage> mask_of(const std::vector<std::uint32_t>& runs, ImageSize size) {
-  const std::size_t count = size.pixel_count();
-  GreyImage mask{size, std::vector<std::uint8_t>(count)};
+  if (std::accumulate(runs.begin(), runs.end(), std::uint64_t{0}) != size.pixel_count()) {
+    return std::nullopt;
+  }
+  GreyImage mask{size, std::vector<std::uint8_t>(size.pixel_count())};
+  const auto width = std::size_t(size.width), height = std::size_t(size.height);
   std::size_t done = 0;
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    if (runs[i] > count - done) return std::nullopt;
-    const std::size_t end = done + runs[i];
-    for (; done < end; ++done) {
-      const std::size_t x = done / std::size_t(size.height), y = done % std::size_t(size.height);
-      mask.pixels[y * std::size_t(size.width) + x] = i % 2;
+  for (std::size_t i = 0; i < runs.size(); done += runs[i], ++i) {
+    if (i % 2 == 0 || runs[i] == 0) continue;
+    std::size_t x = done / height, y = done % height;
+    for (std::uint32_t left = runs[i]; left > 0; --left) {
+      mask.pixels[y * width + x] = 1;
+      if (++y < height) continue;
+      y = 0;
+      ++x;
     }
   }
-  return done == count ? std::optional(std::move(mask)) : std::nullopt;
+  return mask;
 }
 
 std::string compressed(const std::vector<std::uint32_t>& runs) {

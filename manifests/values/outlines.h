@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -14,18 +15,36 @@ namespace eventgan {
 /// Twice the area within a ring that runs clockwise as one sees it, minus that of another.
 double twice_area(const std::vector<Point>& ring);
 
-/// An outline of parts that may overlap and have no holes, as COCO and YOLO write them: each ring
-/// is turned to run clockwise. Rings of fewer than three corners or without area are left out.
-Outline outline_of_parts(std::vector<std::vector<Point>> parts);
+/// Whether its corners do not all lie on one line.
+bool has_area(const std::vector<Point>& ring);
+
+/// An outline of parts that may overlap, each a ring, as COCO and YOLO write them, and whichever
+/// way they run. A ring that comes back to a corner is several: where a line joins parts or leads
+/// to a hole, be it there and back or from each part to the next one, the line is no part of the
+/// outline. A ring that lies in no other one of its part is turned to run clockwise, and those in
+/// it with it. Rings without area are left out.
+Outline outline_of_parts(const std::vector<std::vector<Point>>& parts);
+
+/// Outlines of an image that have more corners are noise, and take more memory than it is worth.
+inline constexpr std::size_t kMostCorners = 1'000'000;
+
+std::size_t corner_count(const Outline& outline);
+
+/// How many corners the outlines of all numbers but 0 have together; `pixels` is [y, x].
+template <class Pixel>  // std::uint8_t or std::uint16_t
+std::size_t corner_count(const std::vector<Pixel>& pixels, ImageSize size);
 
 /// The edges of the pixels of `mask` that are not 0, exactly: its rings have whole coordinates, and
 /// pixels that touch at a corner alone lie in rings of their own.
 Outline outline_of(const GreyImage& mask);
 
+/// What rings cover: what they wind around at all, or an odd number of times (even-odd).
+enum class FillRule { kNonZero, kByTurns };
+
 /// [y, x] uint8: 1 where the outline covers the pixel's centre, else 0; what lies outside `size` is
 /// left out. A centre that lies on an edge belongs to the part right of it or below it, so that
 /// outlines side by side cover each pixel once. mask_of(outline_of(mask), mask.size) == mask.
-GreyImage mask_of(const Outline& outline, ImageSize size);
+GreyImage mask_of(const Outline& outline, ImageSize size, FillRule rule = FillRule::kNonZero);
 
 /// The least rectangle around all corners; {0, 0, 0, 0} of an empty outline.
 Rectangle bounds(const Outline& outline);
@@ -37,7 +56,7 @@ std::vector<std::uint32_t> run_lengths(const GreyImage& mask);
 /// The mask with these run lengths; none if they do not sum up to the number of its pixels.
 std::optional<GreyImage> mask_of(const std::vector<std::uint32_t>& runs, ImageSize size);
 
-/// COCO's text of run lengths: from the third on, each is less the one two before it; five bits a
+/// COCO's text of run lengths: from the fourth on, each is less the one two before it; five bits a
 /// character, the lowest first, 32 where more follow, plus 48.
 std::string compressed(const std::vector<std::uint32_t>& runs);
 

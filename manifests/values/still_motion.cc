@@ -135,14 +135,20 @@ void settle_motion(const PairSpec& spec, const PairKey& key, const std::vector<B
   if (!pair.motion || !spec.stills) return;
   const bool image_rests = *pair.motion == ImageMotion();
   const auto& objects = spec.stills->objects;
+  // What has no outline is cut out of its box, if that has an area.
+  const auto may_move = [](const Box& box) {
+    const Rectangle& edges = box.xyxy;
+    return moves_alone(box) ||
+           (!box.ignore && edges.left < edges.right && edges.top < edges.bottom);
+  };
   pair.objects.clear();
-  if (!objects || std::ranges::none_of(boxes, moves_alone)) {
+  if (!objects || std::ranges::none_of(boxes, may_move)) {
     if (image_rests) pair.motion = draw_moving(*spec.stills, key.pair().keyed("motion"));
     return;
   }
   for (std::size_t k = 0; k < boxes.size(); ++k) {
     auto& motion = pair.objects.emplace_back();
-    if (!moves_alone(boxes[k])) continue;
+    if (!may_move(boxes[k])) continue;
     const CounterRandom random = key.pair().keyed("objects").keyed(std::to_string(k));
     const bool rests = !image_rests && random.uniform(kRests) < objects->rests;
     motion = rests ? ImageMotion()

@@ -67,9 +67,9 @@ bool moves_alone(const Box& box);
 ImageMotion draw_motion(const StillsSpec& spec, const CounterRandom& pair);
 
 /// Gives a planned still what its labels decide: FramePair::objects, of boxes that have an outline
-/// and are not to be ignored; and to an image that was to rest, if no object moves before it, the
-/// motion that it would have had, since a sensor would see nothing. Pure; does nothing to other
-/// pairs.
+/// or an area to cut it out of, and are not to be ignored; and to an image that was to rest, if no
+/// object moves before it, the motion that it would have had, since a sensor would see nothing.
+/// Pure; does nothing to other pairs.
 void settle_motion(const PairSpec& spec, const PairKey& key, const std::vector<Box>& boxes,
                    FramePair& pair);
 

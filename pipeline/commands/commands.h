@@ -18,6 +18,7 @@ void add_init_command(CLI::App& app, int& exit_code);
 void add_inspect_command(CLI::App& app, int& exit_code);
 void add_preview_command(CLI::App& app, int& exit_code);
 void add_report_command(CLI::App& app, int& exit_code);
+void add_outline_command(CLI::App& app, int& exit_code);
 void add_export_command(CLI::App& app, int& exit_code);
 void add_make_demo_command(CLI::App& app, int& exit_code);
 void add_import_weights_command(CLI::App& app, int& exit_code);

@@ -123,6 +123,7 @@ void SampleStages::read_frames(SampleMessage& message, const std::vector<Box>& b
     message.fail(prepared.fault().reason);
   } else {
     message.prepared = std::move(*prepared);
+    message.outlines = message.prepared.outlines;
     take_placement(message);
   }
 }

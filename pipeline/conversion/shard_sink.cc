@@ -128,6 +128,14 @@ void ShardSink::open(const PlannedShard& shard) {
   add_write_seconds(start_ns, record_);
 }
 
+std::vector<std::string> ShardSink::notes() const {
+  std::vector<std::string> notes = left_out_.notes();
+  if (outlines_ != OutlineCounts()) {
+    notes.push_back("outlines of objects that move on their own: " + to_text(outlines_));
+  }
+  return notes;
+}
+
 void ShardSink::add(const SampleMessage& message) {
   if (message.failed() && job_.manifest.errors.policy == ErrorPolicy::kFail) {
     throw TooManyFaults("errors.policy is \"fail\": " + message.sample.fault);
@@ -141,6 +149,7 @@ void ShardSink::add(const SampleMessage& message) {
     ++record_.valid;
   }
   left_out_.add(message.sample.annotation.left_out);
+  outlines_ += message.outlines;
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     record_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }

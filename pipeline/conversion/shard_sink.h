@@ -44,8 +44,9 @@ class ShardSink final : public SampleSink {
   bool closed() const override;
 
   const std::vector<CommittedShard>& committed() const { return committed_; }
-  /// What a person should know of the labels of all samples that were added: boxes left out.
-  std::vector<std::string> notes() const { return left_out_.notes(); }
+  /// What a person should know of the labels of all samples that were added: boxes left out, and
+  /// whence the outlines are of objects that move on their own.
+  std::vector<std::string> notes() const;
 
  private:
   const ConversionJob& job_;
@@ -57,6 +58,7 @@ class ShardSink final : public SampleSink {
   std::unique_ptr<ShardWriter> writer_;  // of the shard under way
   CommitRecord record_;                  // of the shard under way
   BoxesLeftOut left_out_;
+  OutlineCounts outlines_;
 };
 
 }  // namespace eventgan

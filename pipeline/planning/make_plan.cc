@@ -293,7 +293,7 @@ void note_narrow_values(const JobManifest& manifest, const SourceSpec& spec,
       range->low, range->high, spec.root));
 }
 
-/// Of objects that are to move on their own: how many can, as far as some labels tell.
+/// Of objects that are to move on their own: how many have an outline, as far as some labels tell.
 void note_outlines(const SourceSpec& spec, const Dataset& dataset,
                    const std::vector<LabelledFrame>& frames, SourceSummary& summary) {
   constexpr std::size_t kMostFrames = 200;
@@ -308,10 +308,13 @@ void note_outlines(const SourceSpec& spec, const Dataset& dataset,
       outlined += !box.ignore && !box.outline.empty();
     }
   }
-  summary.notes.push_back(fmt::format(
-      "{} of {} have an outline and move on their own (of {} looked at){}, in {}", outlined,
-      count_text(boxes, "box"), count_text(std::int64_t(looked_at), "labelled frame"),
-      outlined > 0 ? "" : ": everything moves as the image does", spec.root));
+  const char* const others = boxes == 0         ? ": everything moves as the image does"
+                             : boxes > outlined ? ", the others are cut out of their boxes"
+                                                : "";
+  summary.notes.push_back(
+      fmt::format("objects move on their own: {} of {} (of {} looked at) have an outline{}, in {}",
+                  outlined, count_text(boxes, "box"),
+                  count_text(std::int64_t(looked_at), "labelled frame"), others, spec.root));
 }
 
 struct PlannedSource {

@@ -14,6 +14,7 @@
 #include "manifests/values/words.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_guard.h"
+#include "stages/frames/decoding/cut_out.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/recordings/recording.h"
@@ -78,10 +79,10 @@ std::vector<std::uint8_t> frame_image(const Outcome<ColourFrame>& decoded, const
   }
   try {
     const Placement placement = place(sample.source_size, image, sample.pair);
-    return place_colour(is_moved(frame, sample.pair)
-                            ? move_still(colour, sample.pair, sample.annotation.boxes)
-                            : colour,
-                        placement);
+    if (!is_moved(frame, sample.pair)) return place_colour(colour, placement);
+    std::vector<Box> boxes = sample.annotation.boxes;
+    if (!sample.pair.objects.empty()) cut_out_missing({colour.size, colour.bgr.data()}, boxes);
+    return place_colour(move_still(colour, sample.pair, boxes), placement);
   } catch (const std::exception& error) {  // a still whose motion no plan has drawn
     warnings.push_back(error.what() + (", in " + frame.path) + " (" + sample.sample_id + ")");
     return {};

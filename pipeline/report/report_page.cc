@@ -208,7 +208,7 @@ std::string origin(const Survey& survey, const PageContext& context) {
                            to_string(source.pairs.side), stills->translation_px[0],
                            stills->translation_px[1], stills->rotation_deg, stills->scale,
                            stills->frames,
-                           stills->objects ? "; objects with an outline move on their own" : ""));
+                           stills->objects ? "; objects move on their own" : ""));
       continue;
     }
     html += fact("source",

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <iterator>
+#include <set>
 #include <span>
 #include <stdexcept>
 #include <string_view>
@@ -27,16 +28,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Bytes of a file, or of all files of a folder.
-/// Of the file with the events and of what is read beside it.
+/// Of the file with the events and of what is read beside it; of a folder, which has images, of all
+/// files in it and below.
 std::string recording_hash(const fs::path& path, const RecordingSpec& spec) {
   const fs::path events = event_file(fs::absolute(path).lexically_normal(), spec.options);
-  std::vector<fs::path> files = event_companions(events, spec.format, spec.options);
-  if (files.empty()) return sha256_of_file(events);
-  files.insert(files.begin(), events);
+  std::set<fs::path> files;
+  if (fs::is_directory(path)) {
+    for (const auto& entry : fs::recursive_directory_iterator(path)) {
+      if (entry.is_regular_file()) files.insert(entry.path());
+    }
+  } else {
+    const auto beside = event_companions(events, spec.format, spec.options);
+    if (beside.empty()) return sha256_of_file(events);
+    files.insert(beside.begin(), beside.end());
+    files.insert(events);
+  }
   std::string listing;
   for (const fs::path& file : files) {
-    listing += file.filename().string() + '\t' + sha256_of_file(file) + '\n';
+    listing +=
+        file.lexically_relative(events.parent_path()).string() + '\t' + sha256_of_file(file) + '\n';
   }
   return sha256_hex(listing);
 }
@@ -66,8 +76,8 @@ std::map<std::string, std::string> training_settings(
   }
   const std::vector<fs::path> folders = texture_folders(manifest);
   std::vector<fs::path> textures = texture_files(folders);
-  textures.erase(std::unique(textures.begin(), textures.end()),
-                 textures.end());  // of a folder in another
+  // Those of a folder in another are there twice.
+  textures.erase(std::unique(textures.begin(), textures.end()), textures.end());
   for (std::size_t i = 0; i < folders.size(); ++i) {
     settings["textures " + std::to_string(i)] = textures_hash(folders[i], textures);
   }

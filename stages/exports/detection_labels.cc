@@ -29,26 +29,6 @@ namespace {
 
 using Ring = std::vector<Point>;
 
-/// Whether filling by turns (even-odd) covers the same pixels.
-bool is_covered_by_turns(const Outline& outline, ImageSize volume) {
-  GreyImage turns{volume, std::vector<std::uint8_t>(volume.pixel_count())};
-  for (Ring ring : outline.rings) {
-    const Rectangle around = bounds(Outline{{ring}});  // small, if there are many rings
-    const int left = static_cast<int>(around.left), top = static_cast<int>(around.top);
-    const int right = std::min(static_cast<int>(around.right) + 1, volume.width);
-    const int bottom = std::min(static_cast<int>(around.bottom) + 1, volume.height);
-    for (Point& corner : ring) corner = {corner.x - left, corner.y - top};
-    const GreyImage mask = mask_of(Outline{{std::move(ring)}}, {bottom - top, right - left});
-    for (int y = top; y < bottom; ++y) {
-      for (int x = left; x < right; ++x) {
-        turns.pixels[std::size_t(y) * std::size_t(volume.width) + std::size_t(x)] ^=
-            mask.pixels[std::size_t(y - top) * std::size_t(right - left) + std::size_t(x - left)];
-      }
-    }
-  }
-  return turns == mask_of(outline, volume);
-}
-
 /// Where a bridge between two rings begins and ends: the nearest corners, of very long rings of
 /// some of them.
 std::pair<std::size_t, std::size_t> bridge(const Ring& from, const Ring& to) {
@@ -99,8 +79,9 @@ Ring joined(const std::vector<Ring>& rings) {
 }  // namespace
 
 std::string yolo_outline_line(int class_number, const Outline& outline, ImageSize volume) {
-  const bool is_plain = is_covered_by_turns(outline, volume);
-  const Ring ring = joined(is_plain ? outline.rings : outline_of(mask_of(outline, volume)).rings);
+  const GreyImage mask = mask_of(outline, volume);
+  const bool is_plain = mask == mask_of(outline, volume, FillRule::kByTurns);
+  const Ring ring = joined(is_plain ? outline.rings : outline_of(mask).rings);
   std::string line = fmt::format("{}", class_number);
   for (const Point& corner : ring) {
     line += fmt::format(" {:.9f} {:.9f}", std::clamp(corner.x / volume.width, 0.0, 1.0),
@@ -227,7 +208,8 @@ std::string coco_box(const CocoPlace& place, const Rectangle& box, bool is_crowd
   json["area"] = std::ranges::count(mask.pixels, 1);
   const bool has_holes =
       std::ranges::any_of(outline.rings, [](const Ring& ring) { return twice_area(ring) < 0; });
-  json["segmentation"] = has_holes || is_crowd ? Json{{"size", {volume.height, volume.width}},
+  const bool is_plain = !has_holes && mask == mask_of(outline, volume, FillRule::kByTurns);
+  json["segmentation"] = !is_plain || is_crowd ? Json{{"size", {volume.height, volume.width}},
                                                       {"counts", compressed(run_lengths(mask))}}
                                                : Json::parse(outline_text(outline));
   return dump_json(json);

@@ -48,10 +48,9 @@ IndexMask::IndexMask(IndexImage image) : image_(std::move(image)) {
 }
 
 Outcome<IndexMask> IndexMask::read(const fs::path& file, const std::string& written) try {
-  constexpr std::size_t kMostObjects = 1000;
   IndexMask mask(decode_index_image(open_image_file(file)));
-  if (mask.indices_.size() <= kMostObjects) return mask;
-  return SampleFault{"expected at most " + std::to_string(kMostObjects) + " objects, got " +
+  if (mask.indices_.size() <= kMostMaskObjects) return mask;
+  return SampleFault{"expected at most " + std::to_string(kMostMaskObjects) + " objects, got " +
                      std::to_string(mask.indices_.size()) + ", in " + written};
 } catch (const std::runtime_error& error) {
   return SampleFault{std::string(error.what()) + ", in " + written};
@@ -78,9 +77,6 @@ Outline IndexMask::outline(int index) const {
   return outline;
 }
 
-namespace {
-
-/// The boxes of an annotation as it has them; null for one that was left out.
 std::vector<Box*> boxes_as_annotated(Annotation& annotation) {
   std::vector<Box*> boxes;
   for (Box& box : annotation.boxes) boxes.push_back(&box);
@@ -89,6 +85,18 @@ std::vector<Box*> boxes_as_annotated(Annotation& annotation) {
   }
   return boxes;
 }
+
+fs::path mask_name(const std::string& root, const FrameRef& frame) {
+  const std::string& path = frame.path;
+  fs::path name = path.starts_with(root + "/") ? fs::path(path.substr(root.size() + 1))
+                  : path == root               ? fs::path(path).filename()
+                                               : fs::path(path);
+  name.replace_extension();
+  if (frame.video_frame >= 0) name /= std::to_string(frame.video_frame);
+  return name;
+}
+
+namespace {
 
 std::string corners_text(const Rectangle& box) {
   return fmt::format("({:g}, {:g}) to ({:g}, {:g})", box.left, box.top, box.right, box.bottom);
@@ -210,13 +218,8 @@ class OutlinedDataset final : public WrappedDataset {
     std::map<std::string, int> images;  // of one bare name
     std::vector<std::pair<fs::path, const LabelledFrame*>> named;
     for (const LabelledFrame& labelled : labelled_frames()) {
-      const auto& [path, index, video_frame, time_s] = labelled.frame;
-      if (index == kAbsentFrame) continue;
-      fs::path below = path.starts_with(root + "/") ? fs::path(path.substr(root.size() + 1))
-                       : path == root               ? fs::path(path).filename()
-                                                    : fs::path(path);
-      below.replace_extension();
-      if (video_frame >= 0) below /= std::to_string(video_frame);
+      if (labelled.frame.index == kAbsentFrame) continue;
+      fs::path below = mask_name(root, labelled.frame);
       ++images[below.filename().string()];
       named.emplace_back(std::move(below), &labelled);
     }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -15,13 +16,16 @@
 
 namespace eventgan {
 
+/// A mask of more objects is none.
+inline constexpr std::size_t kMostMaskObjects = 1000;
+
 /// A mask in which each pixel has the number of its object, as Pascal VOC, DAVIS and Penn-Fudan
 /// have them: a PNG, grey or with a palette, whose colours say nothing. 0 is background. In masks
 /// of 8 bits 255 is void, of no object; but in a grey one that has no other number, as masks of a
 /// single object have, it is object 1. A value; reading it from several threads is safe.
 class IndexMask {
  public:
-  /// A fault names the file as `written`, and is one of a mask of over 1000 objects, too.
+  /// A fault names the file as `written`, and is one of a mask of too many objects, too.
   static Outcome<IndexMask> read(const std::filesystem::path& file, const std::string& written);
 
   ImageSize size() const { return image_.size; }
@@ -43,6 +47,15 @@ class IndexMask {
   std::vector<int> indices_;
   std::vector<Extent> extents_;  ///< one of each of indices_
 };
+
+/// The boxes of an annotation as it has them, the k-th of number k + 1 in its mask; null for one
+/// that was left out.
+std::vector<Box*> boxes_as_annotated(Annotation& annotation);
+
+/// What a frame's mask is called in the folder of masks, without its ending: the image's path below
+/// the source's root, which `root` is as the manifest writes it; of a video's frame its own number
+/// below that, without zeros before it.
+std::filesystem::path mask_name(const std::string& root, const FrameRef& frame);
 
 /// Gives each box that has no outline that of its object: number k is of the k-th box that the
 /// annotation has, counted from 1, be it left out or not. A fault where the mask cannot be read, is

@@ -126,7 +126,7 @@ Outline clip(const Outline& outline, const Rectangle& area) {
     cut = cut_ring(cut, &Point::x, area.left, -1);
     cut = cut_ring(cut, &Point::y, area.bottom, 1);
     cut = cut_ring(cut, &Point::y, area.top, -1);
-    if (twice_area(cut) != 0) clipped.rings.push_back(std::move(cut));
+    if (has_area(cut)) clipped.rings.push_back(std::move(cut));
   }
   return clipped;
 }
@@ -282,8 +282,7 @@ VolumeBox map(const Box& box, const Placement& placement) {
   const Rectangle area = area_of(placement);
   const Rectangle clipped = clip(unclipped, area);
   Outline outline = to_volume(placement, box.outline);
-  const bool is_gone =
-      is_empty(clipped) || (!outline.empty() && is_empty(clip(bounds(outline), area)));
+  const bool is_gone = is_empty(clipped) || (!outline.empty() && clip(outline, area).empty());
   return {clipped, unclipped, box.ignore || is_gone, std::move(outline)};
 }
 
@@ -329,6 +328,12 @@ std::optional<SampleFault> map_all(const std::vector<Label>& labels, const char*
 Outcome<VolumeLabels> map_labels(const Annotation& annotation, const Placement& placement,
                                  const std::string& where) {
   VolumeLabels labels;
+  std::size_t corners = 0;
+  for (const Box& box : annotation.boxes) corners += corner_count(box.outline);
+  if (corners > kMostCorners) {
+    return SampleFault{text("expected at most ", kMostCorners, " corners of outlines, got ",
+                            corners, ", in ", where)};
+  }
   if (auto fault = map_all(annotation.boxes, "box", placement, where, labels.boxes)) return *fault;
   if (auto fault = map_all(annotation.persons, "person", placement, where, labels.persons)) {
     return *fault;

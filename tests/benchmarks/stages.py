@@ -9,7 +9,7 @@ from measuring.cores import pin_to
 from measuring.report import Section, Table, number
 
 PROGRAMS = "eventgan_*_benchmark"
-OF_OTHER_PARTS = {"eventgan_engine_benchmark"}
+OF_OTHER_PARTS = {"eventgan_engine_benchmark", "eventgan_cut_out_benchmark"}
 # Google Benchmark's own arguments. Its repetitions are interleaved over all benchmarks of a program.
 ARGUMENTS = {
     "full": ["--benchmark_min_time=0.3", "--benchmark_repetitions=5"],

@@ -45,7 +45,7 @@ class CommandLine(program.InFolder):
         out, _ = run("--help")
         for command in ["init", "convert", "plan", "status", "retry", "finalize", "verify", "inspect", "preview",
                         "make-demo", "import-weights", "calibrate", "simulate", "train", "realism", "fit", "tradeoff",
-                        "export", "report"]:
+                        "export", "report", "outline"]:
             self.assertIn(command, out)
             self.assertIn("Usage", run(command, "--help")[0])
 

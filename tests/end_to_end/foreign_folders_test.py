@@ -23,7 +23,7 @@ ON_FOLDERS = {
 }
 ON_SHARDS = {"inspect": [], "preview": ["--out", "{scratch}/images"]}
 # Those that are given a document.
-ON_DOCUMENTS = {"convert": [], "plan": [], "train": [], "simulate": [],
+ON_DOCUMENTS = {"convert": [], "plan": [], "train": [], "simulate": [], "outline": ["--out", "{scratch}/masks"],
                 "calibrate": ["--out", "{scratch}/w.safetensors"], "tradeoff": ["--out", "{scratch}/tradeoff"]}
 OTHERS = {"init": ["--out", "{scratch}/manifest.json"], "realism": [], "fit": ["--out", "{scratch}/sensor.json"],
           "import-weights": ["{scratch}/weights.safetensors"]}

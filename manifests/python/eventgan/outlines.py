@@ -28,10 +28,12 @@ def rings(outline: bytes) -> list[np.ndarray]:
     """
     try:
         # as 32 bits, which have been written in as few digits as tell them apart
-        found = [np.array(ring, np.float32).reshape(-1, 2).astype(np.float64) for ring in json.loads(outline or b"[]")]
-    except (TypeError, ValueError):
-        found = [np.empty((0, 2))]
-    if not all(len(ring) >= 3 and np.isfinite(ring).all() for ring in found):
+        read = [np.array(ring) for ring in json.loads(outline or b"[]")]
+        found = [ring.astype(np.float32).reshape(-1, 2).astype(np.float64) for ring in read if ring.dtype.kind in "if"]
+        is_sound = len(found) == len(read)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        is_sound = False
+    if not is_sound or not all(len(ring) >= 3 and np.isfinite(ring).all() for ring in found):
         raise ValueError(f"expected rings [[x, y, x, y, ...], ...] of 3 corners or more, got {outline[:80]!r}")
     return found
 
@@ -64,17 +66,16 @@ def mask(outline: bytes, size: tuple[int, int]) -> np.ndarray:
     left, top = np.clip(np.floor(corners.min(0)), 0, size[::-1]).astype(np.int64)
     right, bottom = np.clip(np.ceil(corners.max(0)), 0, size[::-1]).astype(np.int64)
     width = right - left + 1
-    turns = np.zeros((bottom - top) * width)  # how much more often rings wind around a pixel than around its left one
-    for ring in found:
-        ahead = np.roll(ring, -1, axis=0)
-        upwards = ring[:, 1] > ahead[:, 1]  # clockwise, that is where a part begins
-        high, low = np.where(upwards[:, None], ahead, ring), np.where(upwards[:, None], ring, ahead)
-        first, end = (np.clip(np.ceil(y - 0.5), top, bottom).astype(np.int64) for y in (high[:, 1], low[:, 1]))
-        count = np.maximum(end - first, 0)  # of the rows whose centres an edge crosses
-        edge = np.repeat(np.arange(len(ring)), count)
-        row = first[edge] + np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
-        (x, y), (run, rise) = high[edge].T, (low - high)[edge].T
-        column = np.clip(np.ceil(x + (row + 0.5 - y) / rise * run - 0.5), left, right).astype(np.int64)
-        turns += np.bincount((row - top) * width + column - left, np.where(upwards, 1, -1)[edge], len(turns))
+    start, ahead = corners, np.concatenate([np.roll(ring, -1, axis=0) for ring in found])
+    upwards = start[:, 1] > ahead[:, 1]  # clockwise, that is where a part begins
+    high, low = np.where(upwards[:, None], ahead, start), np.where(upwards[:, None], start, ahead)
+    first, end = (np.clip(np.ceil(y - 0.5), top, bottom).astype(np.int64) for y in (high[:, 1], low[:, 1]))
+    count = np.maximum(end - first, 0)  # of the rows whose centres an edge crosses
+    edge = np.repeat(np.arange(len(start)), count)
+    row = first[edge] + np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+    (x, y), (run, rise) = high[edge].T, (low - high)[edge].T
+    column = np.clip(np.ceil(x + (row + 0.5 - y) / rise * run - 0.5), left, right).astype(np.int64)
+    # how much more often rings wind around a pixel than around its left one
+    turns = np.bincount((row - top) * width + column - left, np.where(upwards, 1, -1)[edge], (bottom - top) * width)
     covered[top:bottom, left:right] = turns.reshape(-1, width).cumsum(1)[:, :-1] != 0
     return covered

@@ -88,4 +88,9 @@ ImageSize image_file_size(const std::filesystem::path& file,
 std::string encode_png(const ColourView& image);
 std::string encode_jpeg(const ColourView& image, int quality);
 
+/// The bytes of a PNG of numbers [y, x], C order, as many as `size` has pixels: 8 bits with a
+/// palette for people, if none is beyond 254, which is what masks of objects call nothing (255);
+/// else 16 bits grey. Throws as encode_png. Thread safe.
+std::string encode_index_png(ImageSize size, std::span<const std::uint16_t> indices);
+
 }  // namespace eventgan

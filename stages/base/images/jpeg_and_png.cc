@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 #include <memory>
 #include <new>
 #include <optional>
@@ -388,7 +389,8 @@ class PngFile {
     image.indices.resize(image.size.pixel_count());
     const bool is_wide = image.bits == 16;
     run_guarded(escape_, [&] {
-      png_set_packing(png_);  // a byte for each index
+      png_set_packing(png_);                      // a byte for each index
+      png_set_check_for_invalid_index(png_, -1);  // no colour is looked up
       png_set_strip_alpha(png_);
       if constexpr (std::endian::native == std::endian::little) png_set_swap(png_);
       png_set_interlace_handling(png_);
@@ -498,7 +500,13 @@ void nothing_to_flush(png_structp) {}
 
 }  // namespace
 
-std::string encode_png(const ColourView& image) try {
+namespace {
+
+/// Writes a PNG of `bits` a channel. `prepare` is called before the pixels with libpng's writer and
+/// header, to say what else there is of either; `row` gives the place of a row's values.
+std::string write_png(ImageSize size, int bits, int kind,
+                      const std::function<void(png_structp, png_infop)>& prepare,
+                      const std::function<const void*(std::size_t)>& row) try {
   std::string bytes;
   Escape escape;
   png_structp png = nullptr;
@@ -515,22 +523,73 @@ std::string encode_png(const ColourView& image) try {
     info = png_create_info_struct(png);
     if (info == nullptr) escape.leave("cannot start libpng");
     png_set_write_fn(png, &bytes, append_bytes, nothing_to_flush);
-    png_set_IHDR(png, info, static_cast<png_uint_32>(image.size.width),
-                 static_cast<png_uint_32>(image.size.height), 8, PNG_COLOR_TYPE_RGB,
-                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-    // Many times faster than the best compression, and hardly larger for what is drawn.
-    png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
-    png_set_compression_level(png, 1);
-    png_set_compression_strategy(png, 3);  // Z_RLE
-    png_write_info(png, info);
-    png_set_bgr(png);
-    const std::size_t row_bytes = 3 * static_cast<std::size_t>(image.size.width);
-    for (int y = 0; y < image.size.height; ++y) png_write_row(png, image.bgr + y * row_bytes);
+    png_set_IHDR(png, info, static_cast<png_uint_32>(size.width),
+                 static_cast<png_uint_32>(size.height), bits, kind, PNG_INTERLACE_NONE,
+                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    prepare(png, info);
+    for (std::size_t y = 0; y < static_cast<std::size_t>(size.height); ++y) {
+      png_write_row(png, static_cast<png_const_bytep>(row(y)));
+    }
     png_write_end(png, info);
   });
   return bytes;
 } catch (const std::runtime_error& error) {
   throw std::runtime_error(std::string("cannot encode an image: ") + error.what());
+}
+
+/// Colours that are told apart, as Pascal VOC has them: the bits of an index, the lowest first, are
+/// dealt out to red, green and blue, from the highest bit of these downwards.
+std::array<png_color, 256> index_palette() {
+  std::array<png_color, 256> palette{};
+  for (unsigned index = 0; index < palette.size(); ++index) {
+    png_color& colour = palette[index];
+    for (unsigned bit = 0; bit < 8; ++bit) {
+      png_byte& channel = bit % 3 == 0 ? colour.red : bit % 3 == 1 ? colour.green : colour.blue;
+      channel = static_cast<png_byte>(channel | ((index >> bit & 1) << (7 - bit / 3)));
+    }
+  }
+  return palette;
+}
+
+}  // namespace
+
+std::string encode_png(const ColourView& image) {
+  const std::size_t row_bytes = 3 * static_cast<std::size_t>(image.size.width);
+  return write_png(
+      image.size, 8, PNG_COLOR_TYPE_RGB,
+      [](png_structp png, png_infop info) {
+        // Many times faster than the best compression, and hardly larger for what is drawn.
+        png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
+        png_set_compression_level(png, 1);
+        png_set_compression_strategy(png, 3);  // Z_RLE
+        png_write_info(png, info);
+        png_set_bgr(png);
+      },
+      [&](std::size_t y) { return image.bgr + y * row_bytes; });
+}
+
+std::string encode_index_png(ImageSize size, std::span<const std::uint16_t> indices) {
+  constexpr std::uint16_t kMostWithPalette = 254;  // 255 is nothing, by custom
+  const auto width = static_cast<std::size_t>(std::max(size.width, 0));
+  if (std::ranges::any_of(indices, [](std::uint16_t index) { return index > kMostWithPalette; })) {
+    return write_png(
+        size, 16, PNG_COLOR_TYPE_GRAY,
+        [](png_structp png, png_infop info) {
+          png_write_info(png, info);
+          if constexpr (std::endian::native == std::endian::little) png_set_swap(png);
+        },
+        [&](std::size_t y) { return indices.data() + y * width; });
+  }
+  const std::vector<std::uint8_t> narrow(indices.begin(), indices.end());
+  return write_png(
+      size, 8, PNG_COLOR_TYPE_PALETTE,
+      [](png_structp png, png_infop info) {
+        static const std::array<png_color, 256> palette = index_palette();
+        png_set_PLTE(png, info, palette.data(), static_cast<int>(palette.size()));
+        png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_NONE);
+        png_write_info(png, info);
+      },
+      [&](std::size_t y) { return narrow.data() + y * width; });
 }
 
 }  // namespace eventgan

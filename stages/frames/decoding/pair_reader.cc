@@ -162,9 +162,17 @@ Outcome<PreparedPair> PairReader::still(const FramePair& pair, ImageOrientation 
                  : stills_.decode(pair.next, stride);
     if (is_fault(decoded)) return decoded.fault();
     ColourFrame& image = *decoded;
-    const auto [previous, next] = prepare_still({image.size, image.bgr.data()}, pair, spec_, boxes);
+    const ColourView view{image.size, image.bgr.data()};
+    std::vector<Box> outlined;
+    OutlineCounts outlines;
+    if (!pair.objects.empty()) {
+      outlined = boxes;
+      outlines = cut_out_missing(view, outlined);
+    }
+    const auto [previous, next] = prepare_still(view, pair, spec_, outlined);
     PreparedPair prepared = prepare_pair(previous, next);
-    if (tells_between_) prepared.between = frames_between(std::move(image), pair, spec_, boxes);
+    prepared.outlines = outlines;
+    if (tells_between_) prepared.between = frames_between(std::move(image), pair, spec_, outlined);
     return prepared;
   } catch (const std::runtime_error& error) {
     return fault_in(pair.next, error.what());

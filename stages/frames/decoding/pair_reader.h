@@ -105,7 +105,7 @@ class PairReader {
   /// A fault if a file is missing, empty, truncated, not an image, or mirrored, if the sizes
   /// differ, or if too little can be seen of a still after its motion. `still_stride`: of the video
   /// that a still is in, each so many of whose frames are taken (SourceSpec::every). `boxes`: those
-  /// that FramePair::objects is of.
+  /// that FramePair::objects is of; those without an outline are cut out of the image (cut_out.h).
   Outcome<PreparedPair> read(const FramePair& pair,
                              ImageOrientation orientation = ImageOrientation::kStored,
                              std::int64_t still_stride = 1,

@@ -12,6 +12,7 @@
 #include "manifests/values/labels.h"
 #include "manifests/values/placement.h"
 #include "stages/base/images/image_file.h"
+#include "stages/frames/decoding/cut_out.h"
 
 namespace eventgan {
 
@@ -48,7 +49,8 @@ struct PreparedPair {
   int content_x = 0;  ///< where `input`'s top left pixel lies in the volume
   int content_y = 0;
   Placement placement;
-  FramesBetween between = {};  ///< of a still, where a reader was asked to keep it
+  FramesBetween between = {};   ///< of a still, where a reader was asked to keep it
+  OutlineCounts outlines = {};  ///< of a still whose objects move on their own
 };
 
 /// An image [y, x] or [y, x, channel] uint8, C order, 0..255, owned by somebody else.

@@ -316,7 +316,9 @@ void note_other_images(const std::vector<fs::path>& with_frames, const fs::path&
   fs::path last;
   for (const fs::path& place : with_frames) {
     const bool is_of_source = std::ranges::any_of(sources, [&](const FoundSource& source) {
-      return is_below(place, source.root) || is_below(source.root, place);
+      const bool are_masks =
+          source.labels && (source.labels->path == place || source.labels->outlines == place);
+      return are_masks || is_below(place, source.root) || is_below(source.root, place);
     });
     if (is_of_source) continue;
     if (!last.empty() && is_below(place, last)) continue;  // told with the folder that it is in

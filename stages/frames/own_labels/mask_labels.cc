@@ -115,7 +115,8 @@ bool has_index_masks(const fs::path& masks, const std::vector<std::string>& fold
 
 std::optional<fs::path> find_masks(const FoundFrames& frames, std::vector<std::string>&) {
   const fs::path masks = find_label_files(frames, kMaskFiles);
-  if (masks.empty() || !has_index_masks(masks, frames.folders)) return std::nullopt;
+  if (masks.empty() || masks == frames.root || !has_index_masks(masks, frames.folders))
+    return std::nullopt;
   return masks;
 }
 

@@ -176,7 +176,7 @@ class YoloLine {
         corners.push_back({share(i) * image_.width, share(i + 1) * image_.height});
       }
       box.xyxy = bounds(Outline{{corners}});
-      box.outline = outline_of_parts({std::move(corners)});
+      box.outline = outline_of_parts({corners});
     } else {
       box.xyxy = centred();
     }

@@ -1,6 +1,7 @@
 """eventgan.rings and eventgan.mask, against angles: a ring winds around what sees it turn by 360 degrees."""
 
 import json
+import time
 
 import numpy as np
 import pytest
@@ -32,7 +33,9 @@ def test_rings_are_arrays_of_corners():
 
 
 @pytest.mark.parametrize("wrong", [b"x", b"5", b"{}x", b"[5]", b"[[1,2,3,4]]", b"[[1,2,3,4,5]]", b"[[0,0,1,0,NaN,1]]",
-                                   b"[[0,0,1,0,1,1e999]]", b'[["a","b","c","d","e","f"]]', b"[[]]"])
+                                   b"[[0,0,1,0,1,1e999]]", b'[["a","b","c","d","e","f"]]', b"[[]]",
+                                   b'[["1","2","3","4","5","6"]]', b"[[1%s,2,3,4,5,6]]" % (b"0" * 400),
+                                   b"[" * 100_000])
 def test_what_is_no_outline_is_named(wrong):
     with pytest.raises(ValueError, match="expected rings"):
         eventgan.mask(wrong, (4, 4))
@@ -77,3 +80,15 @@ def test_a_hundred_thousand_corners():
     y, x = np.mgrid[:900, :900] + 0.5
     radius = np.hypot(x - 450, y - 450)
     assert circle[radius < 399.9].all() and not circle[radius > 400.1].any()
+
+
+def test_thousands_of_rings_take_no_time_of_the_area_each():
+    """20,000 x 1 megapixel would be minutes."""
+    y, x = np.mgrid[0:1000:5, 0:500:5].reshape(2, -1)
+    squares = np.stack([x, y, x + 1, y, x + 1, y + 1, x, y + 1], axis=1)
+    begin = time.monotonic()
+    speckled = eventgan.mask(json.dumps(squares.tolist()).encode(), (1000, 1000))
+    assert time.monotonic() - begin < 10
+    expected = np.zeros((1000, 1000), bool)
+    expected[::5, :500:5] = True
+    np.testing.assert_array_equal(speckled, expected)

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -110,6 +111,86 @@ TEST(Outlines, PartsMayOverlapWhicheverWayTheyRun) {
             drawn({"####..", "####..", "######", "######", "..####", "..####"}));
   EXPECT_EQ(bounds(outline), (Rectangle{0, 0, 6, 6}));
   EXPECT_EQ(bounds({}), Rectangle{});
+}
+
+/// A square of side 2 clockwise, back at its first corner, its upper left one.
+std::vector<Point> square(double x, double y) {
+  return {{x, y}, {x + 2, y}, {x + 2, y + 2}, {x, y + 2}, {x, y}};
+}
+
+std::vector<Point> chained(const std::vector<std::vector<Point>>& parts) {
+  std::vector<Point> ring;
+  for (const auto& part : parts) ring.insert(ring.end(), part.begin(), part.end());
+  return ring;
+}
+
+TEST(Outlines, PartsInOneRingAreThoseWithoutTheLinesBetweenThem) {
+  const GreyImage three = drawn({"##......##", "##......##", "..........", "..........",  //
+                                 "##........", "##........"});
+  std::vector<Point> closed = chained({square(0, 0), square(8, 0), square(0, 4)});
+  // one line from the last part to the first; the lines alone would cover a triangle
+  EXPECT_EQ(mask_of(outline_of_parts({closed}), three.size), three);
+  std::reverse(closed.begin(), closed.end());
+  EXPECT_EQ(mask_of(outline_of_parts({closed}), three.size), three);
+  std::reverse(closed.begin(), closed.end());
+  closed.push_back({0, 0});
+  EXPECT_EQ(mask_of(outline_of_parts({closed}), three.size), three);
+  EXPECT_EQ(outline_of_parts({closed}).rings.size(), 3U);
+  EXPECT_EQ(outline_of_parts({chained({square(0, 0), square(8, 0)})}).rings.size(), 2U);
+}
+
+TEST(Outlines, ATriangleOfDoubledCornersIsNoLineBetweenParts) {
+  const Outline outline = outline_of_parts({{{0, 0}, {0, 0}, {4, 0}, {4, 0}, {0, 4}, {0, 4}}});
+  ASSERT_EQ(outline.rings.size(), 1U);
+  EXPECT_EQ(twice_area(outline.rings[0]), 16);
+}
+
+TEST(Outlines, HolesAtTheEndOfALineStayHoles) {
+  std::vector<Point> ring{{0, 0}, {6, 0}, {6, 6}, {0, 6}, {0, 0}};  // a hole, the other way round
+  for (const Point corner : std::vector<Point>{{2, 2}, {2, 4}, {4, 4}, {4, 2}, {2, 2}, {0, 0}}) {
+    ring.push_back(corner);
+  }
+  const GreyImage holed = drawn({"######", "######", "##..##", "##..##", "######", "######"});
+  EXPECT_EQ(mask_of(outline_of_parts({ring}), holed.size), holed);
+  std::reverse(ring.begin(), ring.end());
+  EXPECT_EQ(mask_of(outline_of_parts({ring}), holed.size), holed);
+}
+
+TEST(Outlines, LobesTheOtherWayTakeNothingFromOtherParts) {
+  const std::vector<Point> part{{0, 0}, {4, 0}, {4, 4}, {0, 4}};
+  const Outline outline = outline_of_parts(
+      {part, {{3, 1}, {1, 1}, {1, 3}, {3, 3}, {3, 1}, {20, 0}, {20, 10}, {8, 10}}});
+  const GreyImage mask = mask_of(outline, {4, 4});
+  EXPECT_EQ(std::count(mask.pixels.begin(), mask.pixels.end(), 1), 16);
+  // A bow-tie has no area by signs. Centres on an edge belong to what is right of it.
+  const Outline bow = outline_of_parts({{{0, 0}, {4, 4}, {4, 0}, {0, 4}}});
+  EXPECT_EQ(mask_of(bow, {4, 4}), drawn({"...#", "#.##", "#.##", "...#"}));
+}
+
+TEST(Outlines, FarCornersAreCutOff) {
+  for (const double far : {3e9, 3e38}) {
+    EXPECT_EQ(mask_of({{{{0, 0}, {1, 0}, {1, far}, {0, far}}}}, {2, 2}), drawn({"#.", "#."}));
+    EXPECT_EQ(mask_of({{{{0, -far}, {1, -far}, {1, far}, {0, far}}}}, {2, 2}), drawn({"#.", "#."}));
+    EXPECT_EQ(mask_of({{{{0, far}, {1, far}, {1, 2 * far}}}}, {2, 2}), drawn({"..", ".."}));
+  }
+}
+
+TEST(Outlines, AreFilledByTurns) {
+  const std::vector<Point> twice = chained({square(0, 0), square(0, 0)});
+  EXPECT_EQ(mask_of({{twice}}, {2, 2}), drawn({"##", "##"}));
+  EXPECT_EQ(mask_of({{twice}}, {2, 2}, FillRule::kByTurns), drawn({"..", ".."}));
+  EXPECT_EQ(mask_of({{square(0, 0)}}, {2, 2}, FillRule::kByTurns), drawn({"##", "##"}));
+}
+
+TEST(Outlines, CornersAreCountedBeforeTheyAreMade) {
+  for (const double share : {0.0, 0.1, 0.5, 0.9, 1.0}) {
+    const GreyImage mask = random_mask({23, 31}, share, 5);
+    EXPECT_EQ(corner_count(mask.pixels, mask.size), corner_count(outline_of(mask))) << share;
+  }
+  // Two objects side by side, and one of two pixels that touch at a corner.
+  EXPECT_EQ(
+      corner_count(std::vector<std::uint16_t>{1, 2, 2, 0, 300, 0, 0, 0, 300, 0}, ImageSize{2, 5}),
+      16U);
 }
 
 TEST(Outlines, RunLengthsAreCocos) {

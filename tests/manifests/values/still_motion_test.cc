@@ -124,14 +124,15 @@ TEST_F(SettleMotion, ObjectsAreDrawnWithinTheirLimitsAndFillThem) {
   EXPECT_NEAR(resting, 0.2 * (resting + moving), 4 * std::sqrt(0.16 * (resting + moving)));
 }
 
-TEST_F(SettleMotion, OnlyWhatHasAnOutlineAndCountsMovesOnItsOwn) {
+TEST_F(SettleMotion, WhatHasAnOutlineOrCanBeCutOutAndCountsMovesOnItsOwn) {
   Box ignored = outlined();
   ignored.ignore = true;
-  const Box plain{.class_id = 0, .xyxy = {1, 1, 3, 3}};
-  const std::vector<Box> boxes{plain, outlined(), ignored};
+  const Box plain{.class_id = 0, .xyxy = {1, 1, 3, 3}}, empty{.class_id = 0, .xyxy = {1, 1, 1, 3}};
+  const std::vector<Box> boxes{empty, outlined(), ignored, plain};
   for (int i = 0; i < 50; ++i) {
     const FramePair pair = settled(i, boxes);
-    ASSERT_EQ(pair.objects.size(), 3u);
+    ASSERT_EQ(pair.objects.size(), 4u);
+    EXPECT_TRUE(pair.objects[3]);
     EXPECT_FALSE(pair.objects[0]);
     EXPECT_TRUE(pair.objects[1]);
     EXPECT_FALSE(pair.objects[2]);

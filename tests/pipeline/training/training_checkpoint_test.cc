@@ -95,6 +95,18 @@ TEST_F(Resumption, ComparesTheRecordingsByTheirBytes) {
   EXPECT_THROW(check_resumable(before, now, kInReconstruction, manifest_), UsageError);
 }
 
+TEST_F(Resumption, ComparesTheImagesOfARecordingInAFolder) {
+  settings();
+  testing::write_file(folder_ / "ecd/events.txt", "0.1 1 1 1\n");
+  testing::write_file(folder_ / "ecd/images.txt", "0.1 images/a.png\n");
+  testing::write_file(folder_ / "ecd/images/a.png", "abc");
+  manifest_.recordings = {{.path = "ecd", .format = RecordingFormat::kEcd}};
+  const std::vector<TrainingRecording> recordings{{.file = folder_ / "ecd"}};
+  const auto before = training_settings(manifest_, recordings);
+  testing::write_file(folder_ / "ecd/images/a.png", "abd");
+  EXPECT_NE(training_settings(manifest_, recordings).at("recording 0"), before.at("recording 0"));
+}
+
 TEST_F(Resumption, LetsOutputAndCommentsChange) {
   EXPECT_EQ(refusal(kInReconstruction, "\"image_minutes\": 1000", "\"image_minutes\": 1"), "");
   EXPECT_EQ(refusal(kInReconstruction, "\"directory\": \"out\"", "\"directory\": \"moved\""), "");

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -178,6 +179,46 @@ TEST(YoloOutlineLine, BridgesLeadToPartsAndHolesAndBack) {
 TEST(YoloOutlineLine, OverlappingPartsAreFilledOnce) {
   expect_same_pixels({{{{1, 1}, {9, 1}, {9, 9}, {1, 9}}, {{5, 5}, {13, 5}, {13, 12}, {5, 12}}}},
                      {14, 15});
+}
+
+/// Squares clockwise (+1) or the other way (-1), of one ring or of several.
+std::vector<Point> square(int direction) {
+  std::vector<Point> ring{{0, 0}, {10, 0}, {10, 10}, {0, 10}, {0, 0}};
+  if (direction < 0) std::reverse(ring.begin(), ring.end());
+  return ring;
+}
+
+std::vector<Point> square_twice() {
+  std::vector<Point> ring = square(1);
+  for (const Point corner : square(1)) ring.push_back(corner);
+  return ring;
+}
+
+std::vector<Point> pentagram() {
+  std::vector<Point> ring;
+  for (int i = 0; i < 5; ++i) {
+    const double angle = 2 * i * 2 * M_PI / 5;
+    ring.push_back({45 + 40 * std::cos(angle), 45 + 40 * std::sin(angle)});
+  }
+  return ring;
+}
+
+TEST(YoloOutlineLine, ARingThatOverlapsItselfIsFilledOnce) {
+  expect_same_pixels({{square_twice()}}, {12, 12});
+  expect_same_pixels({{pentagram()}}, {90, 90});
+}
+
+TEST(YoloOutlineLine, OfRingsThatCancelEachOtherCoversNothing) {
+  expect_same_pixels({{square_twice(), square(-1), square(-1)}}, {12, 12});
+}
+
+TEST(CocoBox, ARingThatOverlapsItselfIsRunLengths) {
+  for (const auto& ring : {square_twice(), pentagram()}) {
+    const ImageSize size{90, 90};
+    const Json json = Json::parse(coco_box({1, 1, 1}, {0, 0, 90, 90}, false, {{ring}}, size));
+    const auto runs = run_lengths(json["segmentation"]["counts"].get<std::string>());
+    EXPECT_EQ(mask_of(*runs, size), mask_of(Outline{{ring}}, size));
+  }
 }
 
 TEST(YoloOutlineLine, CoversWhatAnyMaskDoes) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "stages/frames/decoding/frame_decoder.h"
 #include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -76,6 +77,50 @@ TEST_F(ClassNumbers, AreThoseOfTheFirstSourceThenTheNext) {
   EXPECT_THAT(names(2), IsEmpty());
   EXPECT_THAT(boxes(0), ElementsAre("person", "car"));
   EXPECT_THAT(boxes(1), ElementsAre("person", "bike"));
+}
+
+/// Answers each method that has a default with something of its own.
+class TellingDataset final : public Dataset {
+ public:
+  explicit TellingDataset(const std::string& name) { schema_.class_names = {name}; }
+  const LabelSchema& label_schema() const override { return schema_; }
+  const std::vector<LabelledFrame>& labelled_frames() const override { return frames_; }
+  PairedFrame paired_frame(const LabelledFrame&, int) const override { return {}; }
+  Outcome<Annotation> annotation(const std::string&) const override { return Annotation(); }
+  ImageSize sensor_size(const std::string&) const override { return {3, 4}; }
+  Outcome<EventWindow> events(const std::string&) const override { return EventWindow{{3, 4}, {}}; }
+  ImageSizes* image_sizes() const override { return &sizes_; }
+  std::string label_place(const std::string& label_key) const override { return label_key; }
+  std::vector<std::string> annotation_files() const override { return {"file"}; }
+  std::map<std::string, std::string> label_meanings() const override { return {{"a", "b"}}; }
+  std::vector<std::string> notes() const override { return {"note"}; }
+  std::vector<std::string> warnings() const override { return {"warning"}; }
+  Unreadable unreadable() const override { return {{"reason"}, 5}; }
+
+ private:
+  LabelSchema schema_;
+  std::vector<LabelledFrame> frames_;
+  mutable ImageSizes sizes_;
+};
+
+TEST_F(ClassNumbers, ChangeNothingElseThatADatasetSays) {
+  for (const char* name : {"car", "person"}) {
+    sources_.emplace_back();
+    datasets_.push_back(std::make_unique<TellingDataset>(name));
+  }
+  number_classes(sources_, datasets_);
+  for (const auto& dataset : datasets_) {
+    EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("car", "person"));
+    EXPECT_EQ(dataset->sensor_size(""), (ImageSize{3, 4}));
+    EXPECT_EQ(dataset->events("")->sensor, (ImageSize{3, 4}));
+    EXPECT_NE(dataset->image_sizes(), nullptr);
+    EXPECT_THAT(dataset->annotation_files(), ElementsAre("file"));
+    EXPECT_THAT(dataset->label_meanings(), ElementsAre(Pair("a", "b")));
+    EXPECT_THAT(dataset->notes(), ElementsAre("note"));
+    EXPECT_THAT(dataset->warnings(), ElementsAre("warning"));
+    EXPECT_THAT(dataset->unreadable().reasons, ElementsAre("reason"));
+    EXPECT_EQ(dataset->unreadable().of, 5);
+  }
 }
 
 TEST_F(ClassNumbers, EachKindOfDatasetHasItsOwn) {

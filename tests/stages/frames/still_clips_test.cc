@@ -24,7 +24,7 @@ constexpr ImageSize kStillSize{120, 160};
 constexpr ImageSize kFrame{90, 120};  // without 15 rows and 20 columns a side
 constexpr int kDark = 30, kFar = 150, kNear = 240;
 
-Box square_at(const Rectangle& box) {
+Box still_object(const Rectangle& box) {
   return {.class_id = 0,
           .xyxy = box,
           .outline = {{{{box.left, box.top},
@@ -45,7 +45,7 @@ class StillClipsTest : public ::testing::Test {
       cv::imwrite((folder_ / "clip" / name).string(), image);
     }
     still_.original = "text";
-    still_.boxes = {square_at({60, 40, 90, 70}), square_at({80, 55, 105, 85})};
+    still_.boxes = {still_object({60, 40, 90, 70}), still_object({80, 55, 105, 85})};
     manifest_.directory = folder_.path();
     manifest_.seed = 11;
     SourceSpec& source = manifest_.sources.emplace_back();
@@ -191,7 +191,7 @@ TEST_F(StillClipsTest, WithoutMotionLabelsAreTheStillsInTheWindow) {
 TEST_F(StillClipsTest, WhatIsCoveredIsToldAndJointsBehindItAreHidden) {
   pairs().stills = StillsSpec{{0, 0}, 0, 0};
   pairs().stills->objects = ObjectMotionSpec{{0, 0}, 0, 0, 0};
-  still_.boxes = {square_at({60, 40, 90, 70}), square_at({60, 45, 90, 75})};
+  still_.boxes = {still_object({60, 40, 90, 70}), still_object({60, 45, 90, 75})};
   still_.persons.resize(2);
   for (const std::size_t k : {0u, 1u}) {
     still_.persons[k].box = still_.boxes[k].xyxy;

@@ -358,6 +358,23 @@ TEST(MapLabels, AnOutlineThatACropLeavesNothingOfIsIgnoredWithItsBox) {
   EXPECT_FALSE(mapped({"", {one}, {}}, kMiddle).boxes[0].ignore);
 }
 
+TEST(MapLabels, AnOutlineThatPassesACropsCornerIsIgnoredWithItsBox) {
+  Box one = box(400, 60, 460, 120);  // kMiddle shows it from (421, 100) on
+  one.outline = {{{{400, 60}, {460, 60}, {400, 120}}}};
+  EXPECT_TRUE(mapped({"", {one}, {}}, kMiddle).boxes[0].ignore);
+  one.outline.rings[0][1].x = 490;
+  EXPECT_FALSE(mapped({"", {one}, {}}, kMiddle).boxes[0].ignore);
+}
+
+TEST(MapLabels, OutlinesOfTooManyCornersAreAFault) {
+  Annotation annotation{"", {box(0, 0, 9, 9), box(0, 0, 9, 9)}, {}};
+  for (Box& one : annotation.boxes) one.outline.rings = {std::vector<Point>(500'000, {1, 1})};
+  EXPECT_EQ(fault(annotation), "");
+  annotation.boxes[1].outline.rings[0].push_back({2, 2});
+  EXPECT_EQ(fault(annotation),
+            "expected at most 1000000 corners of outlines, got 1000001, in label_2/001497.txt");
+}
+
 TEST(MapLabels, AnOutlineOfACornerThatIsNoPlaceIsAFault) {
   for (const double wrong : {kNan, HUGE_VAL, -1.1e6}) {
     EXPECT_THAT(fault(outlined({{{{0, 0}, {9, 0}, {9, wrong}}}})),

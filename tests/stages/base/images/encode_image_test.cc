@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "stages/base/images/image_file.h"
@@ -29,6 +31,31 @@ TEST(EncodeImage, JpegIsWhatOpenCvMakes) {
       EXPECT_EQ(encode_jpeg(view(image), quality), std::string(expected.begin(), expected.end()));
     }
   }
+}
+
+TEST(EncodeImage, NumbersAreColoursUnlessTheyAreTooMany) {
+  std::vector<std::uint16_t> indices;
+  for (int i = 0; i < 5 * 51; ++i) indices.push_back(static_cast<std::uint16_t>(i));
+  const auto read = [](const std::string& png, int how) {
+    return cv::imdecode(std::vector<char>(png.begin(), png.end()), how);
+  };
+  const std::string few = encode_index_png({5, 51}, indices);
+  EXPECT_EQ(few[24], 8);  // the header's bits and kind of colour
+  EXPECT_EQ(few[25], 3);
+  const cv::Mat colours = read(few, cv::IMREAD_COLOR);
+  ASSERT_EQ(colours.size(), cv::Size(51, 5));
+  EXPECT_EQ(colours.at<cv::Vec3b>(0, 0), cv::Vec3b(0, 0, 0));
+  EXPECT_EQ(colours.at<cv::Vec3b>(0, 1), cv::Vec3b(0, 0, 128));       // as Pascal VOC's aeroplanes
+  EXPECT_EQ(colours.at<cv::Vec3b>(0, 15), cv::Vec3b(128, 128, 192));  // and its persons
+  EXPECT_EQ(colours.at<cv::Vec3b>(4, 50), cv::Vec3b(192, 224, 96));
+
+  indices[7] = 255;
+  indices[8] = 65535;
+  const std::string many = encode_index_png({5, 51}, indices);
+  const cv::Mat wide = read(many, cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(wide.type(), CV_16UC1);
+  EXPECT_TRUE(std::equal(indices.begin(), indices.end(), wide.begin<std::uint16_t>()));
+  EXPECT_THROW(encode_index_png({0, 0}, {}), std::runtime_error);
 }
 
 TEST(EncodeImage, RefusesWhatTheFormatsCannotHold) {

@@ -26,7 +26,7 @@ std::vector<double> parse(const std::string& text) {
   return is_fault(outcome) ? std::vector<double>() : *outcome;
 }
 
-std::string fault(const std::string& text) {
+std::string drive_fault(const std::string& text) {
   const auto outcome = parse_timestamps(text, "t.txt");
   return is_fault(outcome) ? outcome.fault().reason : "";
 }
@@ -69,7 +69,7 @@ TEST(Timestamps, AnythingElseIsAFaultThatNamesTheLine) {
         "2011-265-282 13:02:26", "2011-265-26 13:02:26", "2011-09-282 13:02:26",
         "67547-09-26 13:02:26", "2011-9-26 13:02:26", "2011-09-26 13:02:2",
         "2011-09-26 13:02:26."}) {
-    EXPECT_THAT(fault(std::string("2011-09-26 13:02:25\n") + line + "\n"),
+    EXPECT_THAT(drive_fault(std::string("2011-09-26 13:02:25\n") + line + "\n"),
                 AllOf(HasSubstr("expected a time such as "), HasSubstr("in t.txt:2")))
         << line;
   }
@@ -77,9 +77,10 @@ TEST(Timestamps, AnythingElseIsAFaultThatNamesTheLine) {
 
 TEST(Timestamps, ATimeThatIsNotAfterTheOneBeforeIsAFault) {
   EXPECT_EQ(
-      fault("2011-09-26 13:02:25.6\n\n2011-09-26 13:02:25.5\n2011-09-26 13:02:26.0\n"),
+      drive_fault("2011-09-26 13:02:25.6\n\n2011-09-26 13:02:25.5\n2011-09-26 13:02:26.0\n"),
       "expected a time after '2011-09-26 13:02:25.6', got '2011-09-26 13:02:25.5', in t.txt:3");
-  EXPECT_THAT(fault("2011-09-26 13:02:25.6\n2011-09-26 13:02:25.6\n"), HasSubstr("in t.txt:2"));
+  EXPECT_THAT(drive_fault("2011-09-26 13:02:25.6\n2011-09-26 13:02:25.6\n"),
+              HasSubstr("in t.txt:2"));
 }
 
 TEST(Timestamps, ALastLineThatIsCutShortIsAFault) {
@@ -88,7 +89,7 @@ TEST(Timestamps, ALastLineThatIsCutShortIsAFault) {
       "2011-09-26 13:02:26.694360380";
   EXPECT_EQ(parse(whole).size(), 2u);  // only the line end is missing
   for (std::size_t length = whole.size() - 1; length > whole.size() - 29; --length) {
-    EXPECT_THAT(fault(whole.substr(0, length)), HasSubstr("in t.txt:2")) << length;
+    EXPECT_THAT(drive_fault(whole.substr(0, length)), HasSubstr("in t.txt:2")) << length;
   }
 }
 

@@ -175,6 +175,7 @@ TEST_F(MaskLabels, AreFoundBesideImages) {
   ASSERT_TRUE(found.labels);
   EXPECT_EQ(found.labels->format, LabelFormat::kCsv);
   EXPECT_EQ(found.labels->outlines, folder_ / "fudan/masks");
+  EXPECT_THAT(found.remarks, IsEmpty());
 
   add("davis/JPEGImages/bear/1.png", "davis/Annotations/bear/1.png", two_, IndexPng::kPalette);
   found = find_sources(folder_ / "davis").front();

@@ -1,0 +1,248 @@
+#include "pipeline/planning/outline_masks.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <optional>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "manifests/documents/detail/json_text.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/outlines.h"
+#include "manifests/values/text.h"
+#include "pipeline/runtime/threads.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/base/images/image_file.h"
+#include "stages/frames/dataset.h"
+#include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/frame_selection.h"
+#include "stages/frames/index_mask.h"
+#include "stages/frames/source_folders.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct OutlinedSource {
+  const SourceSpec* spec;
+  fs::path folder;  ///< of the masks
+  std::unique_ptr<Dataset> dataset;
+};
+
+struct MaskWork {
+  const OutlinedSource* source = nullptr;
+  LabelledFrame frame = {};
+  fs::path mask = {};
+  std::string fault = {};  ///< none: it is made or there
+  bool is_done = false;    ///< or at fault
+  bool is_kept = false;
+  OutlineCounts outlines = {};
+};
+
+/// The sources of frames, open, each with the folder of its masks.
+std::vector<OutlinedSource> open_sources(const JobManifest& manifest, const fs::path& out) {
+  std::vector<OutlinedSource> sources;
+  for (const SourceSpec& spec : manifest.sources) {
+    if (!has_events(spec.dataset)) sources.push_back({&spec, out, nullptr});
+  }
+  if (sources.empty()) throw UsageError("expected a source of frames, got recordings of events");
+  std::map<std::string, int> names;
+  for (OutlinedSource& source : sources) {
+    if (sources.size() > 1) {
+      const std::string name = SourceRoot(source.spec->root, manifest.directory).name();
+      const int others = names[name]++;
+      source.folder /= others == 0 ? name : name + "-" + std::to_string(others + 1);
+    }
+    SourceSpec spec = *source.spec;
+    // The masks that this is to make, or to go on with, are not its own input.
+    if (spec.outlines && fs::weakly_canonical(resolve(manifest, *spec.outlines)) ==
+                             fs::weakly_canonical(fs::absolute(source.folder))) {
+      spec.outlines.reset();
+    }
+    source.dataset = open_dataset(spec, manifest.directory);
+  }
+  return sources;
+}
+
+std::vector<MaskWork> list_work(const JobManifest& manifest,
+                                const std::vector<OutlinedSource>& sources) {
+  std::vector<MaskWork> works;
+  std::map<fs::path, std::string> images;  // by mask
+  for (const OutlinedSource& source : sources) {
+    const std::string root = SourceRoot(source.spec->root, manifest.directory).written("");
+    for (LabelledFrame& frame : select_frames(source.dataset->labelled_frames(), *source.spec,
+                                              manifest.directory, manifest.seed)
+                                    .frames) {
+      MaskWork work{.source = &source, .frame = std::move(frame)};
+      work.mask = source.folder / mask_name(root, work.frame.frame) += ".png";
+      const auto [other, is_first] = images.emplace(work.mask, work.frame.frame.path);
+      if (!is_first) {
+        work.fault = "expected one image of " + work.mask.string() + ", got " + other->second +
+                     " and " + work.frame.frame.path + " (" + work.frame.sample_id + ")";
+      }
+      works.push_back(std::move(work));
+    }
+  }
+  return works;
+}
+
+/// Draws an object's number where its outline is.
+void draw(const Outline& outline, std::uint16_t number, ImageSize size,
+          std::vector<std::uint16_t>& indices) {
+  const Rectangle around = bounds(outline);
+  const auto within = [](double edge, int end) {
+    return static_cast<int>(std::clamp(edge, 0.0, double(end)));
+  };
+  const int left = within(std::floor(around.left), size.width);
+  const int top = within(std::floor(around.top), size.height);
+  Outline moved = outline;
+  for (std::vector<Point>& ring : moved.rings) {
+    for (Point& corner : ring) corner = {corner.x - left, corner.y - top};
+  }
+  const GreyImage mask = mask_of(moved, {within(std::ceil(around.bottom), size.height) - top,
+                                         within(std::ceil(around.right), size.width) - left});
+  for (int y = 0; y < mask.size.height; ++y) {
+    for (int x = 0; x < mask.size.width; ++x) {
+      if (mask.pixels[static_cast<std::size_t>(y * mask.size.width + x)] == 0) continue;
+      indices[static_cast<std::size_t>(top + y) * static_cast<std::size_t>(size.width) +
+              static_cast<std::size_t>(left + x)] = number;
+    }
+  }
+}
+
+/// The objects by their numbers in the annotation, nearer ones over farther ones.
+std::vector<std::uint16_t> draw_all(Annotation& annotation, ImageSize size) {
+  const std::vector<Box*> boxes = boxes_as_annotated(annotation);
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    if (boxes[i] != nullptr && !boxes[i]->ignore) order.push_back(i);
+  }
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return boxes[i]->xyxy.bottom; });
+  std::vector<std::uint16_t> indices(size.pixel_count());
+  for (const std::size_t i : order) {
+    draw(boxes[i]->outline, static_cast<std::uint16_t>(i + 1), size, indices);
+  }
+  return indices;
+}
+
+/// Throws std::system_error if the disk fails.
+void make_mask(const JobManifest& manifest, const FrameDecoder& decoder, MaskWork& work) {
+  const auto fail = [&](std::string reason) {
+    const std::string id = " (" + work.frame.sample_id + ")";
+    work.fault = reason.ends_with(id) ? std::move(reason) : std::move(reason) + id;
+  };
+  if (fs::exists(work.mask)) {
+    work.is_kept = true;
+    return;
+  }
+  const SourceSpec& spec = *work.source->spec;
+  Outcome<Annotation> annotation = work.source->dataset->annotation(work.frame.label_key);
+  if (is_fault(annotation)) return fail(annotation.fault().reason);
+  const Outcome<ColourFrame> image = decoder.decode(
+      work.frame.frame, spec.every, orientation_of(spec.dataset), manifest.image.range);
+  if (is_fault(image)) return fail(image.fault().reason);
+  const std::size_t objects = annotation->boxes.size() + annotation->left_out_at.size();
+  if (objects > kMostMaskObjects) {
+    return fail("expected at most " + std::to_string(kMostMaskObjects) + " boxes, got " +
+                std::to_string(objects) + ", in " +
+                work.source->dataset->label_place(work.frame.label_key));
+  }
+  work.outlines = cut_out_missing({image->size, image->bgr.data()}, annotation->boxes);
+  fs::create_directories(work.mask.parent_path());
+  write_file_atomically(work.mask,
+                        encode_index_png(image->size, draw_all(*annotation, image->size)));
+}
+
+/// As a manifest in that folder may name another one.
+std::string name_in(const JobManifest& manifest, const fs::path& folder) {
+  const fs::path absolute = fs::absolute(folder).lexically_normal();
+  const fs::path below = absolute.lexically_relative(manifest.directory.lexically_normal());
+  const bool is_below = !below.empty() && *below.begin() != "..";
+  return (is_below ? below : absolute).generic_string();
+}
+
+}  // namespace
+
+OutlineMasksReport make_outline_masks(const JobManifest& manifest,
+                                      const OutlineMasksOptions& options) {
+  const std::vector<OutlinedSource> sources = open_sources(manifest, options.out);
+  std::vector<MaskWork> works = list_work(manifest, sources);
+  const FrameDecoder decoder(manifest.directory);
+  const auto progress = options.make_progress ? options.make_progress(std::ssize(works)) : nullptr;
+  for_each_index(works.size(), thread_count(options.threads), [&](std::size_t i) {
+    if (options.stop && options.stop()) return;
+    MaskWork& work = works[i];
+    if (work.fault.empty()) make_mask(manifest, decoder, work);
+    work.is_done = true;
+    if (progress) progress->advance(!work.fault.empty(), /*bytes=*/0);
+  });
+  if (progress) progress->finish();
+
+  OutlineMasksReport report;
+  for (const OutlinedSource& source : sources) {
+    report.sources.push_back({source.spec->root, name_in(manifest, source.folder)});
+  }
+  report.images = std::ssize(works);
+  for (const MaskWork& work : works) {
+    if (!work.is_done) continue;
+    if (!work.fault.empty()) {
+      report.faults.push_back(work.fault);
+      continue;
+    }
+    ++(work.is_kept ? report.kept : report.made);
+    report.outlines += work.outlines;
+    if (work.outlines.ellipses > 0) report.of_ellipses.push_back(work.mask.string());
+  }
+  return report;
+}
+
+std::string to_text(const OutlineMasksReport& report) {
+  constexpr std::size_t kMostFaults = 20, kMostEllipses = 5;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kMostFaults, report.faults.size()); ++i) {
+    text += escape_controls(report.faults[i]) + "\n";
+  }
+  if (report.faults.size() > kMostFaults) {
+    text += fmt::format("... and {} more\n", report.faults.size() - kMostFaults);
+  }
+  text += fmt::format("masks: {} made, {} kept, {} failed\n", report.made, report.kept,
+                      report.faults.size());
+  text += "outlines: " + to_text(report.outlines);
+  if (!report.of_ellipses.empty()) {
+    text += " in " + escape_controls(some_of(report.of_ellipses, kMostEllipses));
+  }
+  text += "\n";
+  for (const auto& [root, outlines] : report.sources) {
+    text += fmt::format("for the source of {} in the manifest:  \"outlines\": {}\n",
+                        escape_controls(root), dump_json(nlohmann::json(outlines)));
+  }
+  return text;
+}
+
+std::string to_json(const OutlineMasksReport& report) {
+  nlohmann::json sources = nlohmann::json::array();
+  for (const auto& [root, outlines] : report.sources) {
+    sources.push_back({{"root", root}, {"outlines", outlines}});
+  }
+  const nlohmann::json json = {{"event", "report"},
+                               {"images", report.images},
+                               {"made", report.made},
+                               {"kept", report.kept},
+                               {"given", report.outlines.given},
+                               {"cut", report.outlines.cut},
+                               {"ellipses", report.outlines.ellipses},
+                               {"of_ellipses", report.of_ellipses},
+                               {"faults", report.faults},
+                               {"sources", sources}};
+  return dump_json(json) + "\n";
+}
+
+}  // namespace eventgan
