@@ -163,12 +163,9 @@ Outcome<PreparedPair> PairReader::still(const FramePair& pair, ImageOrientation 
     if (is_fault(decoded)) return decoded.fault();
     ColourFrame& image = *decoded;
     const ColourView view{image.size, image.bgr.data()};
-    std::vector<Box> outlined;
+    std::vector<Box> outlined = boxes;
     OutlineCounts outlines;
-    if (!pair.objects.empty()) {
-      outlined = boxes;
-      outlines = cut_out_missing(view, outlined);
-    }
+    if (!pair.objects.empty()) outlines = cut_out_missing(view, outlined);
     const auto [previous, next] = prepare_still(view, pair, spec_, outlined);
     PreparedPair prepared = prepare_pair(previous, next);
     prepared.outlines = outlines;
