@@ -20,7 +20,7 @@
 namespace eventgan {
 namespace {
 
-constexpr ImageSize kImage{120, 160};
+constexpr ImageSize kStillSize{120, 160};
 constexpr ImageSize kFrame{90, 120};  // without 15 rows and 20 columns a side
 constexpr int kDark = 30, kFar = 150, kNear = 240;
 
@@ -37,7 +37,7 @@ Box still_object(const Rectangle& box) {
 class StillClipsTest : public ::testing::Test {
  protected:
   StillClipsTest() {
-    cv::Mat image(kImage.height, kImage.width, CV_8UC1, cv::Scalar(kDark));
+    cv::Mat image(kStillSize.height, kStillSize.width, CV_8UC1, cv::Scalar(kDark));
     image(cv::Rect(60, 40, 30, 30)) = kFar;
     image(cv::Rect(80, 55, 25, 30)) = kNear;
     std::filesystem::create_directories(folder_ / "clip");

@@ -145,7 +145,9 @@ TEST_F(StillObjects, OneAtRestHidesAFartherOneAndStaysAsItIs) {
   pair_.objects = {ImageMotion{.x_px = 14}, ImageMotion()};
   const ColourFrame frame = moved();
   for_each_pixel([&](int x, int y) {
-    if (inside(near, x, y, -1)) ASSERT_EQ(at(frame, x, y), at(image_, x, y)) << x << ", " << y;
+    if (inside(near, x, y, -1)) {
+      ASSERT_EQ(at(frame, x, y), at(image_, x, y)) << x << ", " << y;
+    }
     if (inside(shifted(far, 14, 0), x, y, -kEdge) && !inside(near, x, y, kEdge)) {
       ASSERT_EQ(at(frame, x, y), at(image_, x - 14, y)) << x << ", " << y;
     }
