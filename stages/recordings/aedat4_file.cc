@@ -263,7 +263,8 @@ std::vector<PacketPlace> Aedat4File::read_table() const {
   at(header_.table_byte, [&] {
     std::string bytes = read(header_.table_byte, file_.end_byte());
     constexpr std::size_t kIdentifierAt = 8;  // as jAER writes it, whatever packets are
-    const bool is_plain = bytes.compare(kIdentifierAt, 4, "FTAB") == 0;
+    const bool is_plain =
+        bytes.size() > kIdentifierAt && bytes.compare(kIdentifierAt, 4, "FTAB") == 0;
     if (!is_plain) bytes = unpack(std::move(bytes));
     const auto* const entries = table_of<aedat4::PacketTable>(bytes, "FTAB").packets();
     for (flatbuffers::uoffset_t i = 0; entries && i < entries->size(); ++i) {

@@ -329,6 +329,12 @@ TEST_F(Aedat4Test, DoesWithoutATableThatSaysOtherwise) {
   const std::string whole = small().bytes();
   expect_read(whole.substr(0, whole.size() - 20));
   expect_read(whole + "rest");
+  TestFile without = small();
+  without.has_table = false;
+  for (std::size_t left = 0; left < 12; ++left) {
+    SCOPED_TRACE(left);
+    expect_read(whole.substr(0, without.bytes().size() + left));
+  }
   // Seen when a later packet is read: its windows are refused.
   const Change seen_when_read[] = {[](TestFile& file) { file.packets[5].begin_us += 1; },
                                    [](TestFile& file) { file.packets[5].end_us += 1; }};
