@@ -364,6 +364,10 @@ CompactEvents Aedat4File::events(PacketPlace& packet) const {
         throw EventFault(fmt::format("expected times of {} to {} µs, as the table says, got {} µs",
                                      packet.begin_us, packet.end_us, event.t_us()));
       }
+      if (is_told && i > 0 && event.t_us() < is.end_us) {
+        throw EventFault(fmt::format("expected times that never decrease, got {} µs after {} µs",
+                                     event.t_us(), is.end_us));
+      }
       if (i == 0) is.begin_us = event.t_us();
       is.end_us = event.t_us();
       events.push_back({static_cast<double>(event.x()), static_cast<double>(event.y()),
