@@ -167,6 +167,16 @@ TEST_F(TableRecordingTest, NamesWhatIsWrong) {
   refuses("n.csv", "t,x,y,p\n3,2,1,0\n", "expected the sensor's size in the file, or ");
 }
 
+TEST_F(TableRecordingTest, ATimeThatIsInfiniteHidesNoOther) {
+  testing::write_file(folder_ / "a.csv",
+                      "t,x,y,p\n0.1,0,0,1\ninf,0,0,1\n0.12,1,0,1\n0.2,2,0,1\n0.3,3,0,1\n");
+  const auto recording = open("a.csv");
+  EXPECT_THAT([&] { recording->events_in(0.05, 0.15); },
+              ThrowsMessage<InputError>(HasSubstr("got inf")));
+  EXPECT_THAT(recording->events_in(0.15, 0.25), ElementsAre(Event{2, 0, 0.2, true}));
+  EXPECT_THAT(recording->events_in(0.25, 0.35), ElementsAre(Event{3, 0, 0.3, true}));
+}
+
 TEST_F(TableRecordingTest, IsSortedByTimeAndSaysSo) {
   testing::write_file(folder_ / "a.csv", "t,x,y,p\n7,3,0,0\n7,1,1,1\n5,0,2,1\n");
   holds_the_events("a.csv");
