@@ -263,7 +263,8 @@ std::vector<PacketPlace> Aedat4File::read_table() const {
   at(header_.table_byte, [&] {
     std::string bytes = read(header_.table_byte, file_.end_byte());
     constexpr std::size_t kIdentifierAt = 8;  // as jAER writes it, whatever packets are
-    const bool is_plain = bytes.compare(kIdentifierAt, 4, "FTAB") == 0;
+    const bool is_plain =
+        bytes.size() > kIdentifierAt && bytes.compare(kIdentifierAt, 4, "FTAB") == 0;
     if (!is_plain) bytes = unpack(std::move(bytes));
     const auto* const entries = table_of<aedat4::PacketTable>(bytes, "FTAB").packets();
     for (flatbuffers::uoffset_t i = 0; entries && i < entries->size(); ++i) {
@@ -362,6 +363,10 @@ CompactEvents Aedat4File::events(PacketPlace& packet) const {
       if (is_told && (event.t_us() < packet.begin_us || event.t_us() > packet.end_us)) {
         throw EventFault(fmt::format("expected times of {} to {} µs, as the table says, got {} µs",
                                      packet.begin_us, packet.end_us, event.t_us()));
+      }
+      if (is_told && i > 0 && event.t_us() < is.end_us) {
+        throw EventFault(fmt::format("expected times that never decrease, got {} µs after {} µs",
+                                     event.t_us(), is.end_us));
       }
       if (i == 0) is.begin_us = event.t_us();
       is.end_us = event.t_us();

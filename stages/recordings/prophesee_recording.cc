@@ -161,10 +161,15 @@ constexpr std::size_t kMostEventsPerWord = 32;
 using WordEvents = std::array<StoredEvent, kMostEventsPerWord>;
 
 /// Takes a new value of a counter of so many bits. A fall of half its range or more is a wrap, as
-/// where words were lost around one; a smaller one is a step back.
+/// where words were lost around one; a smaller one is a step back, and so is a rise of three
+/// quarters or more, of a late word behind a wrap: less may be a time without events.
 void count_on(WordState& state, std::uint32_t value, int bits) {
   const std::uint64_t half = std::uint64_t{1} << (bits - 1);
-  if (state.counter && *state.counter >= value + half) ++state.wraps;
+  if (state.counter && *state.counter >= value + half) {
+    ++state.wraps;
+  } else if (state.wraps > 0 && value >= *state.counter + half + half / 2) {
+    --state.wraps;
+  }
   state.counter = value;
 }
 

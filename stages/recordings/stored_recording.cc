@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
 #include <mutex>
 #include <string>
@@ -45,7 +46,8 @@ ImageSize sensor_size(const std::optional<ImageSize>& told, const std::optional<
                       StoredParts& parts) {
   if (!told && !given) {
     throw InputError(
-        "expected the sensor's size in the file, or \"sensor\": {\"width\": ..., \"height\": ...} in "
+        "expected the sensor's size in the file, or \"sensor\": {\"width\": ..., \"height\": ...} "
+        "in "
         "the manifest, got none, in " +
         parts.name);
   }
@@ -155,7 +157,8 @@ class StoredRecording final : public Recording {
   std::int64_t events_until(double time_s) const {
     const auto [begin, end] = order().block_after(time_s);
     const std::vector<double> times = parts_.events->times_s(begin, end - begin);
-    const auto later = std::ranges::find_if(times, [&](double t_s) { return t_s > time_s; });
+    const auto later =
+        std::ranges::find_if(times, [&](double t_s) { return std::isfinite(t_s) && t_s > time_s; });
     return begin + (later - times.begin());
   }
 

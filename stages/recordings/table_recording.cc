@@ -258,17 +258,20 @@ TableContent read_table(const fs::path& path, const EventFields& columns) try {
 /// What times count, and what tells so.
 struct TimeUnit {
   double ticks_per_s = 1e6;
-  std::string_view reason;  ///< empty: the manifest says, or nothing else
+  std::string_view reason;  ///< empty: it is told, or there is no time
 };
 
-/// By the name of the column, else by the times. Throws InputError where these can be two things.
-TimeUnit time_unit(const EventFields& columns, const std::vector<double>& times,
+/// By the name of the column or Metavision's header, else by the times. Throws InputError where
+/// these can be two things.
+TimeUnit time_unit(const EventFields& columns, const TableContent& content,
                    const std::string& file) {
+  const std::vector<double>& times = content.events.times_s();
   if (columns.tick_s) return {std::round(1 / *columns.tick_s)};
   for (const auto& [ending, ticks_per_s] :
        {std::pair("_s", 1.0), {"_ms", 1e3}, {"_us", 1e6}, {"_ns", 1e9}}) {
-    if (columns.t.ends_with(ending)) return {ticks_per_s, "as the column's name says"};
+    if (columns.t.ends_with(ending)) return {ticks_per_s};
   }
+  if (content.sensor) return {};
   double least = HUGE_VAL, most = -HUGE_VAL;
   bool is_whole = true;
   for (const double time : times) {
@@ -277,6 +280,7 @@ TimeUnit time_unit(const EventFields& columns, const std::vector<double>& times,
     most = std::max(most, time);
     is_whole &= time == std::floor(time);
   }
+  if (most < least) return {};
   const double span = most - least;
   const auto doubt = [&](double a_per_s, std::string_view a, double b_per_s, std::string_view b) {
     throw InputError(fmt::format(
@@ -284,7 +288,7 @@ TimeUnit time_unit(const EventFields& columns, const std::vector<double>& times,
         "events take {:g} s) or {} ({:g} s), got none, in {}",
         a, times.size(), span / a_per_s, b, span / b_per_s, file));
   };
-  constexpr double kDay_s = 86'400, kMostPerSecond = 1e9, kFewEvents = 1000;
+  constexpr double kDay_s = 86'400, kFewEvents = 1000;
   if (!is_whole) {
     if (span > kDay_s) doubt(1, "s", 1e6, "us");
     return {1, "since they have decimals"};
@@ -292,9 +296,14 @@ TimeUnit time_unit(const EventFields& columns, const std::vector<double>& times,
   constexpr double kClockOfTheDay_ns = 1e17;  // of 1973; as us it would be of the year 5138
   if (least >= kClockOfTheDay_ns) return {1e9, "since they are of the clock of the day"};
   if (span > kDay_s * 1e6) doubt(1e6, "us", 1e9, "ns");
+  // Of a camera: rather this many in a second of a recording of so many seconds or fewer.
+  const double seconds = span / 1e6;
   const auto events = static_cast<double>(times.size());
-  if (events > kFewEvents && events > kMostPerSecond * span / 1e6) doubt(1e6, "us", 1e3, "ms");
-  return {};
+  const double most_events = seconds * (seconds < 1 ? 5e6 : 1e8);
+  const double least_events = seconds < 60 ? 0 : seconds * (seconds < 3600 ? 100 : 1e4);
+  if (events > kFewEvents && events > most_events) doubt(1e6, "us", 1e3, "ms");
+  if (events > kFewEvents && events < least_events) doubt(1e6, "us", 1e9, "ns");
+  return {1e6, "since they are whole numbers"};
 }
 
 /// The same events at times in seconds.
@@ -329,12 +338,12 @@ class TableEvents final : public EventParts {
       : EventParts(path.string()), path_(std::move(path)), columns_(std::move(columns)) {
     TableContent content = read_table(path_, columns_);
     sensor_ = content.sensor;
-    const TimeUnit unit = time_unit(columns_, content.events.times_s(), path_.string());
+    const TimeUnit unit = time_unit(columns_, content, path_.string());
     columns_.tick_s = 1 / unit.ticks_per_s;  // when it is read again
-    if (!unit.reason.empty() && unit.ticks_per_s != 1e6) {
+    if (!unit.reason.empty()) {
       notes_.push_back(fmt::format("times are taken to count {}, {}, in {}",
                                    unit.ticks_per_s == 1     ? "seconds"
-                                   : unit.ticks_per_s == 1e3 ? "milliseconds"
+                                   : unit.ticks_per_s == 1e6 ? "microseconds"
                                                              : "nanoseconds",
                                    unit.reason, path_.string()));
     }

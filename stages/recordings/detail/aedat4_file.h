@@ -78,7 +78,8 @@ class Aedat4File {
   void check_table(const std::vector<PacketPlace>& packets, const std::vector<PacketPlace>& table,
                    int event_stream) const;
 
-  /// Reads a packet. What was not known of it is known then; what was must be so. Times may fall.
+  /// Reads a packet. What was not known of it is known then; what was must be so. Times may fall
+  /// but in one whose times were known: of those between nobody has been told.
   CompactEvents events(PacketPlace& packet) const;
 
   /// The frame of a packet, which must be of this size; its time is the middle of its exposure.

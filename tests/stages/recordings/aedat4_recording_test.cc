@@ -329,6 +329,12 @@ TEST_F(Aedat4Test, DoesWithoutATableThatSaysOtherwise) {
   const std::string whole = small().bytes();
   expect_read(whole.substr(0, whole.size() - 20));
   expect_read(whole + "rest");
+  TestFile without = small();
+  without.has_table = false;
+  for (std::size_t left = 0; left < 12; ++left) {
+    SCOPED_TRACE(left);
+    expect_read(whole.substr(0, without.bytes().size() + left));
+  }
   // Seen when a later packet is read: its windows are refused.
   const Change seen_when_read[] = {[](TestFile& file) { file.packets[5].begin_us += 1; },
                                    [](TestFile& file) { file.packets[5].end_us += 1; }};
@@ -388,6 +394,15 @@ TEST_F(Aedat4Test, RefusesWindowsWhoseTimesFallAndTimesThatCannotBe) {
   const auto fallen = open(file);
   EXPECT_EQ(fallen->events_in(1.000001, 2).size(), 2u);
   EXPECT_THAT([&] { fallen->events_in(0, 1); }, Throws<InputError>());
+  // Between the times that the table tells: no window loses an event in silence.
+  file.packets[0] = events_packet({{10, 0, 0, 1}, {15, 1, 0, 1}, {12, 2, 0, 1}, {20, 3, 0, 1}});
+  const auto within = open(file);
+  for (const auto& [after_s, until_s] : {std::pair(9e-6, 13e-6), {13e-6, 20e-6}, {0.0, 1.0}}) {
+    EXPECT_THAT([&] { within->events_in(after_s, until_s); },
+                ThrowsMessage<InputError>(
+                    AllOf(HasSubstr("got 12 µs after 15 µs"), HasSubstr(path_.string()))));
+  }
+  EXPECT_EQ(within->events_in(20e-6, 2).size(), 3u);
   file.has_table = false;
   for (const std::int64_t time_us :
        {std::int64_t{-1}, std::int64_t{1} << 52, std::numeric_limits<std::int64_t>::max()}) {

@@ -223,6 +223,35 @@ TEST_F(PropheseeTest, GoesOnWhereEvt3Wraps) {
                  "expected times that never decrease");
 }
 
+// What comes after it has its own times, not those of the next range.
+TEST_F(PropheseeTest, StepsBackOverAWrap) {
+  const auto expect_last_at = [&](const std::string& bytes, double wrap_s, double last_s) {
+    const auto recording = open(bytes);
+    EXPECT_THAT([&] { recording->events_in(wrap_s - 1e-5, wrap_s + 1e-5); },
+                ThrowsMessage<InputError>(HasSubstr("expected times that never decrease")));
+    EXPECT_EQ(recording->event_span()->at(1), last_s);
+    EXPECT_EQ(recording->events_in(last_s - 1e-6, last_s).size(), 1u);
+    EXPECT_THAT(recording->notes(), ElementsAre(HasSubstr("before an earlier one")));
+  };
+  for (const std::uint32_t back : {1, 2, 1000}) {
+    SCOPED_TRACE(back);
+    expect_last_at(kDatHeader + words<std::uint64_t>({dat(0xffffffff, 1, 1, 1), dat(0, 1, 1, 1),
+                                                      dat(0 - back, 1, 1, 1), dat(99, 1, 1, 1)}),
+                   4294.967296, (4294967296 + 99) / 1e6);
+    const auto high = [](std::uint32_t value) { return evt2_high(value & 0xfffffff); };
+    expect_last_at(kEvt2Header + words<std::uint32_t>(
+                                     {high(0xfffffff), evt2(0, 1, 1, 1), high(0), evt2(0, 1, 1, 1),
+                                      high(0 - back), evt2(0, 1, 1, 1), high(1), evt2(0, 1, 1, 1)}),
+                   17179.869184, (17179869184 + 64) / 1e6);
+    const int late = 4096 - static_cast<int>(back);
+    expect_last_at(
+        kEvt3Header + words<std::uint16_t>({evt3(kY, 0), evt3(kHigh, 4095), evt3(kX, 1),
+                                            evt3(kHigh, 0), evt3(kX, 1), evt3(kHigh, late),
+                                            evt3(kX, 1), evt3(kHigh, 1), evt3(kX, 1)}),
+        16.777216, (16777216 + 4096) / 1e6);
+  }
+}
+
 TEST_F(PropheseeTest, PassesOverWordsThatMeanNothing) {
   const auto evt3_file = open(kEvt3Header +
                               words<std::uint16_t>({0x9999, evt3(kHigh, 1), 0x9999, evt3(kY, 0),
@@ -279,8 +308,9 @@ TEST_F(PropheseeTest, RefusesHeaders) {
   expect_refused("", "expected a header");
   expect_refused("% text\n", "expected a header");
   expect_refused("% evt 2.0", "expected a line of text, got no end of it");
-  expect_refused("% evt 2.0\n", R"("sensor": {"width": ..., "height": ...} in the manifest, got none, in )" +
-                                   path_.string());
+  expect_refused(
+      "% evt 2.0\n",
+      R"("sensor": {"width": ..., "height": ...} in the manifest, got none, in )" + path_.string());
   expect_refused("% evt 4.0\n", "expected 2.0, 2.1 or 3.0, got another encoding, in " +
                                     path_.string() + " (byte 0)");
   expect_refused("% evt 2.0\n% format EVT3;height=1;width=1\n", "expected lines that agree");

@@ -167,13 +167,24 @@ TEST_F(TableRecordingTest, NamesWhatIsWrong) {
   refuses("n.csv", "t,x,y,p\n3,2,1,0\n", "expected the sensor's size in the file, or ");
 }
 
+TEST_F(TableRecordingTest, ATimeThatIsInfiniteHidesNoOther) {
+  testing::write_file(folder_ / "a.csv",
+                      "t,x,y,p\n0.1,0,0,1\ninf,0,0,1\n0.12,1,0,1\n0.2,2,0,1\n0.3,3,0,1\n");
+  const auto recording = open("a.csv");
+  EXPECT_THAT([&] { recording->events_in(0.05, 0.15); },
+              ThrowsMessage<InputError>(HasSubstr("got inf")));
+  EXPECT_THAT(recording->events_in(0.15, 0.25), ElementsAre(Event{2, 0, 0.2, true}));
+  EXPECT_THAT(recording->events_in(0.25, 0.35), ElementsAre(Event{3, 0, 0.3, true}));
+}
+
 TEST_F(TableRecordingTest, IsSortedByTimeAndSaysSo) {
   testing::write_file(folder_ / "a.csv", "t,x,y,p\n7,3,0,0\n7,1,1,1\n5,0,2,1\n");
   holds_the_events("a.csv");
   EXPECT_THAT(open("a.csv")->notes(),
-              ElementsAre(AllOf(HasSubstr("first at event 2"), HasSubstr("sorted by time"))));
+              ElementsAre(HasSubstr("microseconds, since they are whole numbers"),
+                          AllOf(HasSubstr("first at event 2"), HasSubstr("sorted by time"))));
   testing::write_file(folder_ / "b.csv", "t,x,y,p\n5,0,2,1\n7,1,1,1\n");
-  EXPECT_THAT(open("b.csv")->notes(), ElementsAre());
+  EXPECT_EQ(open("b.csv")->notes().size(), 1u);
 }
 
 TEST_F(TableRecordingTest, MetavisionsCsvHasNoHeader) {
@@ -201,7 +212,7 @@ TEST_F(TableRecordingTest, TellsWhatItsTimesCount) {
     return *open("t.csv")->event_span();
   };
   EXPECT_EQ(table("0 2000000"), (std::array{0.0, 2.0}));
-  EXPECT_THAT(open("t.csv")->notes(), ElementsAre());
+  EXPECT_THAT(open("t.csv")->notes(), ElementsAre(HasSubstr("microseconds, since they are whole")));
   EXPECT_EQ(table("0 0.25 2"), (std::array{0.0, 2.0}));
   EXPECT_THAT(open("t.csv")->notes(),
               ElementsAre(AllOf(HasSubstr("seconds"), HasSubstr("decimals"))));
@@ -218,6 +229,29 @@ TEST_F(TableRecordingTest, TellsWhatItsTimesCount) {
   refused("0.5 300000000", "s (then 2 events take 3e+08 s) or us (300 s)");
   options_.columns.tick_s = 1e-9;
   EXPECT_EQ(table("0 300000000000"), (std::array{0.0, 300.0}));
+}
+
+TEST_F(TableRecordingTest, AsksWhatTimesCountThatMayBeTwoThings) {
+  const auto open_evenly = [&](int events, double span) {  // whole numbers 0..span
+    std::string text = "t,x,y,p\n";
+    for (int i = 0; i < events; ++i) {
+      text += std::to_string(static_cast<std::int64_t>(span * i / (events - 1))) + ",0,0,1\n";
+    }
+    testing::write_file(folder_ / "t.csv", text);
+    return open("t.csv");
+  };
+  const auto asks = [&](int events, double span, const std::string& readings) {
+    EXPECT_THAT([&] { open_evenly(events, span); }, ThrowsMessage<InputError>(HasSubstr(readings)));
+  };
+  asks(100'000, 9'999, "us (then 100000 events take 0.009999 s) or ms (9.999 s)");
+  asks(2'000, 0, "or ms (0 s)");
+  asks(100'000, 6e9, "us (then 100000 events take 6000 s) or ns (6 s)");
+  asks(2'000, 61e6, "us (then 2000 events take 61 s) or ns (0.061 s)");
+  EXPECT_EQ(open_evenly(4'000, 100e3)->event_span()->at(1), 0.1);  // as of N-CARS
+  EXPECT_EQ(open_evenly(20'000, 150e6)->event_span()->at(1), 150);
+  EXPECT_EQ(open_evenly(900, 9e9)->event_span()->at(1), 9000);  // too few to tell
+  testing::write_file(folder_ / "t.csv", "t,x,y,p\n");
+  EXPECT_THAT(open("t.csv")->notes(), ElementsAre());
 }
 
 TEST_F(TableRecordingTest, AFileIsReadAgainWhenItIsOpenedAgain) {
