@@ -433,7 +433,7 @@ class Draft {
     text += fmt::format("    {{\n      \"dataset\": \"{}\",\n", to_string(source.found.dataset));
     text += source_keys(source.found);
     text += has_events(source.found.dataset) ? window_text(source)
-            : source.is_stills               ? stills_text()
+            : source.is_stills               ? stills_text(source)
                                              : pairs_text(source);
     return text + "    }";
   }
@@ -468,16 +468,35 @@ class Draft {
         fmt::join(source.gaps, ", "), to_string(source.habits.side));
   }
 
-  static std::string stills_text() {
+  static std::string stills_text(const SourceDraft& source) {
     const StillsSpec spec;
-    return fmt::format(
-        R"(      // The motion of each image is drawn: what moves is everything, as before a moving camera.
+    const ObjectMotionSpec object;
+    const std::string image = fmt::format(
+        R"("translation_px": [{}, {}], "rotation_deg": {}, "scale": {}, "frames": {})",
+        spec.translation_px[0], spec.translation_px[1], spec.rotation_deg, spec.scale, spec.frames);
+    if (!source.found.labels && source.found.dataset != DatasetKind::kKittiObject) {
+      return fmt::format(
+          R"(      // The motion of each image is drawn: what moves is everything, as before a moving camera.
       "pairs": {{
         "from": "stills",
-        "motion": {{ "translation_px": [{}, {}], "rotation_deg": {}, "scale": {}, "frames": {} }}
+        "motion": {{ {} }}
       }}
 )",
-        spec.translation_px[0], spec.translation_px[1], spec.rotation_deg, spec.scale, spec.frames);
+          image);
+    }
+    return fmt::format(
+        R"(      // The motion of each image is drawn, and half of them rest. Each object moves on its own; one whose labels
+      // have no outline is cut out of its box.
+      "pairs": {{
+        "from": "stills",
+        "motion": {{
+          {},
+          "objects": {{ "translation_px": [{}, {}], "rotation_deg": {}, "scale": {} }}
+        }}
+      }}
+)",
+        image, object.translation_px[0], object.translation_px[1], object.rotation_deg,
+        object.scale);
   }
 
   static std::string window_text(const SourceDraft& source) {

@@ -31,6 +31,7 @@ def read_commented(path):
 
 
 STILLS = {"from": "stills", "motion": {"translation_px": [2, 8], "rotation_deg": 2, "scale": 0.03, "frames": 1}}
+OBJECTS = {"translation_px": [0, 8], "rotation_deg": 3, "scale": 0.04}
 
 
 class Init(program.InFolder):
@@ -80,7 +81,8 @@ class Init(program.InFolder):
         told, manifest = self.init(self.folder)
         self.assertIn("no prev_2", told)
         self.assertIn('no sequences: each image makes a pair with itself under a small motion ("from": "stills")', told)
-        self.assertEqual(read_commented(manifest)["sources"][0]["pairs"], STILLS)
+        self.assertEqual(read_commented(manifest)["sources"][0]["pairs"],
+                         {**STILLS, "motion": {**STILLS["motion"], "objects": OBJECTS}})
 
     def test_gaps_without_paired_frames_are_left_out(self):
         write_cars(self.folder / "training", 2, np.random.default_rng(7))
