@@ -197,9 +197,8 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
   const FramePair& pair = sample.pair;
   const auto moving = std::ranges::count_if(
       pair.objects, [](const auto& motion) { return motion && *motion != ImageMotion(); });
-  const std::string objects = moving > 0 ? ", " + count_text(moving, "object") + " on " +
-                                               (moving == 1 ? "its" : "their") + " own"
-                                         : "";
+  const std::string objects =
+      moving > 0 ? ", " + count_text(moving, "object") + (moving == 1 ? " moves" : " move") : "";
   content.title = header.dataset + " " + sample.sample_id +
                   (state_->has_events ? fmt::format(", {:.4g} s", pair.gap_s())
                                       : (pair.motion ? ", still" + objects + ", gap " : ", gap ") +
