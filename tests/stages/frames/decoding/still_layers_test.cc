@@ -176,6 +176,19 @@ TEST_F(StillObjects, AFartherOneGoesOnBehindANearerOneThatMovesAway) {
   EXPECT_EQ(shown, 3 * 16);
 }
 
+TEST_F(StillObjects, OneThatIsHiddenAsAWholeKeepsNothingOfTheNearerOne) {
+  const Rectangle box{30, 15, 60, 45};
+  draw({60, 90}, {box});
+  boxes_.insert(boxes_.begin(), object_at(box));  // the same object twice
+  boxes_[0].xyxy.bottom -= 1;
+  pair_.label_position = 0;
+  pair_.objects = {ImageMotion(), ImageMotion{.x_px = 8}};
+  const ColourFrame frame = moved();
+  for_each_pixel([&](int x, int y) {
+    if (!inside(shifted(box, 8, 0), x, y, kEdge)) ASSERT_LE(at(frame, x, y), 100) << x << ", " << y;
+  });
+}
+
 TEST_F(StillObjects, OneThatReachesTheBorderIsNotTornOff) {
   const Rectangle box{0, 20, 25, 60};  // at the left and the lower border
   draw({60, 80}, {box});
