@@ -304,6 +304,16 @@ TEST_F(StillObjects, BetweenTheFramesEverythingMovesSteadily) {
   EXPECT_EQ(between.at(0.3).size, (ImageSize{30, 40}));
 }
 
+TEST_F(StillObjects, NoPointOfAnOutlineBeyondItsBoxMovesFarther) {
+  draw({60, 80}, {{30, 20, 40, 30}});
+  boxes_[0].outline = outline_around({0, 20, 80, 30});
+  pair_.objects[0] = ImageMotion{.angle_deg = 3};
+  // About the box's middle, in pixel centres (34.5, 24.5); the farthest corner is at (79.5, 29.5).
+  const double chord = 2 * std::sin(1.5 * std::numbers::pi / 180);
+  EXPECT_NEAR(frames_between(image_, pair_, {}, boxes_).displacement_px, chord * std::hypot(45, 5),
+              1e-9);
+}
+
 TEST_F(StillObjects, WhatDoesNotMoveOnItsOwnIsAPartOfTheImage) {
   const Rectangle box{30, 22, 50, 45};
   draw({60, 80}, {box});
