@@ -169,10 +169,20 @@ Outcome<PreparedPair> PairReader::still(const FramePair& pair, ImageOrientation 
       outlined = boxes;
       outlines = cut_out_missing(view, outlined);
     }
-    const auto [previous, next] = prepare_still(view, pair, spec_, outlined);
-    PreparedPair prepared = prepare_pair(previous, next);
+    FramesBetween between;
+    std::array<PreparedFrame, 2> frames;
+    if (tells_between_) {  // its ends are the frames
+      const ImageSize size = image.size;
+      between = frames_between(std::move(image), pair, spec_, outlined);
+      for (const int end : {0, 1}) {
+        frames[end] = {between.at(end).pixels, place(size, spec_, pair)};
+      }
+    } else {
+      frames = prepare_still(view, pair, spec_, outlined);
+    }
+    PreparedPair prepared = prepare_pair(frames[0], frames[1]);
     prepared.outlines = outlines;
-    if (tells_between_) prepared.between = frames_between(std::move(image), pair, spec_, outlined);
+    prepared.between = std::move(between);
     return prepared;
   } catch (const std::runtime_error& error) {
     return fault_in(pair.next, error.what());
