@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "manifests/values/outlines.h"
+
 namespace eventgan {
 
 AffineMap map_of(const ImageMotion& motion, Point centre, double u) {
@@ -86,6 +88,19 @@ ImageMotion draw_moving(const StillsSpec& spec, const CounterRandom& random) {
   return draw(spec.translation_px, spec.rotation_deg, spec.scale, random);
 }
 
+/// Whether a pixel's centre lies in the box and, where its size is known, in the image.
+bool holds_pixel(const Rectangle& box, const std::optional<ImageSize>& image) {
+  const auto between = [&](double begin, double end, int side) {
+    const auto first = [&](double edge) {
+      const double pixel = std::ceil(edge - 0.5);
+      return image ? std::clamp(pixel, 0.0, static_cast<double>(side)) : pixel;
+    };
+    return first(begin) < first(end);
+  };
+  const ImageSize size = image.value_or(ImageSize());
+  return between(box.left, box.right, size.width) && between(box.top, box.bottom, size.height);
+}
+
 }  // namespace
 
 ImageMotion draw_motion(const StillsSpec& spec, const CounterRandom& pair) {
@@ -95,14 +110,12 @@ ImageMotion draw_motion(const StillsSpec& spec, const CounterRandom& pair) {
 }
 
 void settle_motion(const PairSpec& spec, const PairKey& key, const std::vector<Box>& boxes,
-                   FramePair& pair) {
+                   const std::optional<ImageSize>& image, FramePair& pair) {
   if (!pair.motion || !spec.stills) return;
   const bool image_rests = *pair.motion == ImageMotion();
   const auto& objects = spec.stills->objects;
-  const auto moves_alone = [](const Box& box) {
-    const Rectangle& edges = box.xyxy;
-    const bool can_be_cut_out = edges.left < edges.right && edges.top < edges.bottom;
-    return !box.ignore && (!box.outline.empty() || can_be_cut_out);
+  const auto moves_alone = [&](const Box& box) {
+    return !box.ignore && holds_pixel(box.outline.empty() ? box.xyxy : bounds(box.outline), image);
   };
   pair.objects.clear();
   if (!objects || std::ranges::none_of(boxes, moves_alone)) {

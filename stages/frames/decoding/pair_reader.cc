@@ -154,7 +154,8 @@ Outcome<std::array<SharedFrame, 2>> PairReader::frames(const FramePair& pair,
 }
 
 Outcome<PreparedPair> PairReader::still(const FramePair& pair, ImageOrientation orientation,
-                                        std::int64_t stride, const std::vector<Box>& boxes) const {
+                                        std::int64_t stride, const std::vector<Box>& boxes,
+                                        const std::function<void(ImageSize)>& sized) const {
   try {
     const bool is_image = pair.next.video_frame < 0;
     Outcome<ColourFrame> decoded =
@@ -162,6 +163,7 @@ Outcome<PreparedPair> PairReader::still(const FramePair& pair, ImageOrientation 
                  : stills_.decode(pair.next, stride);
     if (is_fault(decoded)) return decoded.fault();
     ColourFrame& image = *decoded;
+    if (sized) sized(image.size);
     const ColourView view{image.size, image.bgr.data()};
     std::vector<Box> outlined;
     OutlineCounts outlines;
@@ -198,9 +200,9 @@ void PairReader::expect(const FramePair& pair, ImageOrientation orientation) con
 }
 
 Outcome<PreparedPair> PairReader::read(const FramePair& pair, ImageOrientation orientation,
-                                       std::int64_t still_stride,
-                                       const std::vector<Box>& boxes) const {
-  if (pair.motion) return still(pair, orientation, still_stride, boxes);
+                                       std::int64_t still_stride, const std::vector<Box>& boxes,
+                                       const std::function<void(ImageSize)>& sized) const {
+  if (pair.motion) return still(pair, orientation, still_stride, boxes, sized);
   const auto outcome = frames(pair, orientation);
   if (is_fault(outcome)) return outcome.fault();
   const auto& [previous, next] = *outcome;
