@@ -90,9 +90,11 @@ Span frame_window(const std::vector<double>& frames, double time_s, LabelPlace p
       std::clamp<std::ptrdiff_t>(after - frames.begin(), 1, std::ssize(frames) - 1);
   const double before_s = frames[static_cast<std::size_t>(last) - 1];
   const double last_s = frames[static_cast<std::size_t>(last)];
-  const double length_s = last_s - before_s;
-  if (place == LabelPlace::kMiddle) return {time_s - length_s / 2, time_s + length_s / 2};
-  return {time_s == last_s ? before_s : time_s - length_s, time_s};
+  if (place == LabelPlace::kMiddle) {
+    const double half_s = later(last_s, -before_s) / 2;
+    return {later(time_s, -half_s), later(time_s, half_s)};
+  }
+  return {later(later(time_s, -last_s), before_s), time_s};
 }
 
 /// A manifest of this program may lie beside a recording under its name.
