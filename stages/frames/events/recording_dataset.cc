@@ -242,6 +242,9 @@ class RecordingDataset final : public Dataset {
     const char* const end = label_key.data() + label_key.size();
     const char* const begin = label_key.data() + std::min(slash + 1, label_key.size());
     const auto [stop, error] = std::from_chars(begin, end, time_s);
+    if (const auto reason = unopened_.find(label_key.substr(0, slash)); reason != unopened_.end()) {
+      throw InputError(reason->second);
+    }
     if (recorded == recordings_.end() || error != std::errc() || stop != end) {
       throw InputError("expected a recording and a time of the source, got " + label_key);
     }
@@ -414,6 +417,7 @@ class RecordingDataset final : public Dataset {
         if (is_one) throw;
         if (!first) first = std::current_exception();
         unreadable_.emplace_back(error.what());
+        unopened_[entry->first] = error.what();
         entry = recordings_.erase(entry);
       }
     }
@@ -595,7 +599,8 @@ class RecordingDataset final : public Dataset {
   std::vector<std::string> annotation_files_;  ///< as FrameRef::path is written
   std::vector<std::string> notes_;
   std::vector<std::string> warnings_;
-  std::vector<std::string> unreadable_;  ///< Dataset::unreadable
+  std::vector<std::string> unreadable_;          ///< Dataset::unreadable
+  std::map<std::string, std::string> unopened_;  ///< why recordings do not open, by name
 };
 
 }  // namespace

@@ -441,6 +441,18 @@ TEST_F(RecordingDatasetTest, AnEventAtTheBeginOfAWindowBetweenFramesIsNotInIt) {
   }
 }
 
+TEST_F(RecordingDatasetTest, ARecordingThatDoesNotOpenAnyMoreSaysWhy) {
+  testing::write_hdf5(folder_ / "all/a.h5", testing::small_mvsec());
+  testing::write_hdf5(folder_ / "all/b.h5", testing::small_mvsec());
+  spec_.root = "all";
+  const std::string key = open()->labelled_frames().at(2).label_key;
+  const std::string whole = read_text_file(folder_ / "all/b.h5");
+  testing::write_file(folder_ / "all/b.h5", whole.substr(0, whole.size() / 2));
+  const auto outcome = open()->events(key);
+  ASSERT_TRUE(is_fault(outcome));
+  EXPECT_THAT(outcome.fault().reason, AllOf(HasSubstr("b.h5"), HasSubstr("truncated")));
+}
+
 // HDF5 that is cut, RAW of a kind that is not read, AEDAT of another version.
 TEST_F(RecordingDatasetTest, TellsOfRecordingsThatCannotBeRead) {
   testing::write_hdf5(folder_ / "all/a.h5", testing::small_mvsec());
