@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "manifests/values/outlines.h"
+
 namespace eventgan {
 
 AffineMap map_of(const ImageMotion& motion, Point centre, double u) {
@@ -122,6 +124,19 @@ ImageMotion draw_moving(const StillsSpec& spec, const CounterRandom& random) {
   return draw(spec.translation_px, spec.rotation_deg, spec.scale, random);
 }
 
+/// Whether a pixel's centre lies in the box and, where its size is known, in the image.
+bool holds_pixel(const Rectangle& box, const std::optional<ImageSize>& image) {
+  const auto between = [&](double begin, double end, int side) {
+    const auto first = [&](double edge) {
+      const double pixel = std::ceil(edge - 0.5);
+      return image ? std::clamp(pixel, 0.0, static_cast<double>(side)) : pixel;
+    };
+    return first(begin) < first(end);
+  };
+  const ImageSize size = image.value_or(ImageSize());
+  return between(box.left, box.right, size.width) && between(box.top, box.bottom, size.height);
+}
+
 }  // namespace
 
 ImageMotion draw_motion(const StillsSpec& spec, const CounterRandom& pair) {
@@ -131,15 +146,13 @@ ImageMotion draw_motion(const StillsSpec& spec, const CounterRandom& pair) {
 }
 
 void settle_motion(const PairSpec& spec, const PairKey& key, const std::vector<Box>& boxes,
-                   FramePair& pair) {
+                   const std::optional<ImageSize>& image, FramePair& pair) {
   if (!pair.motion || !spec.stills) return;
   const bool image_rests = *pair.motion == ImageMotion();
   const auto& objects = spec.stills->objects;
-  // What has no outline is cut out of its box, if that has an area.
-  const auto may_move = [](const Box& box) {
-    const Rectangle& edges = box.xyxy;
-    return moves_alone(box) ||
-           (!box.ignore && edges.left < edges.right && edges.top < edges.bottom);
+  // What has no outline is cut out of its box.
+  const auto may_move = [&](const Box& box) {
+    return !box.ignore && holds_pixel(box.outline.empty() ? box.xyxy : bounds(box.outline), image);
   };
   pair.objects.clear();
   if (!objects || std::ranges::none_of(boxes, may_move)) {

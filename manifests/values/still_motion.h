@@ -66,11 +66,12 @@ bool moves_alone(const Box& box);
 /// The seed draws each number on its own, so that the limits of one do not change the others.
 ImageMotion draw_motion(const StillsSpec& spec, const CounterRandom& pair);
 
-/// Gives a planned still what its labels decide: FramePair::objects, of boxes that have an outline
-/// or an area to cut it out of, and are not to be ignored; and to an image that was to rest, if no
-/// object moves before it, the motion that it would have had, since a sensor would see nothing.
-/// Pure; does nothing to other pairs.
+/// Gives a planned still what its labels decide: FramePair::objects, of boxes whose outline or, to
+/// cut one out of, whose area holds a pixel of the image, and are not to be ignored; and to an
+/// image that was to rest, if no object moves before it, the motion that it would have had, since a
+/// sensor would see nothing. `image`: its size; not known, it has every pixel, and the motion may
+/// be settled again once it is. Pure; does nothing to other pairs.
 void settle_motion(const PairSpec& spec, const PairKey& key, const std::vector<Box>& boxes,
-                   FramePair& pair);
+                   const std::optional<ImageSize>& image, FramePair& pair);
 
 }  // namespace eventgan

@@ -90,7 +90,8 @@ void SampleStages::read(SampleMessage& message) const try {
   message.sample.source_to_volume.fill(std::numeric_limits<double>::quiet_NaN());
   Outcome<Annotation> annotation = datasets_[source]->annotation(planned.label_key);
   std::vector<Box> boxes = is_fault(annotation) ? std::vector<Box>() : annotation->boxes;
-  settle_motion(manifest_.sources[source].pairs, key_of(message), boxes, message.sample.pair);
+  settle_motion(manifest_.sources[source].pairs, key_of(message), boxes, std::nullopt,
+                message.sample.pair);
   Outcome<MadePair> made = datasets_[source]->made_pair(planned.label_key);
   if (!is_fault(made) && !made->poses.empty()) {
     message.sample.pair.poses = std::move(made->poses);
@@ -118,7 +119,9 @@ void SampleStages::read_frames(SampleMessage& message, const std::vector<Box>& b
     reader_.expect(samples[i].pair, orientation);
   }
   Outcome<PreparedPair> prepared =
-      reader_.read(message.sample.pair, orientation, source.every, boxes);
+      reader_.read(message.sample.pair, orientation, source.every, boxes, [&](ImageSize size) {
+        settle_motion(source.pairs, key_of(message), boxes, size, message.sample.pair);
+      });
   if (is_fault(prepared)) {
     message.fail(prepared.fault().reason);
   } else {

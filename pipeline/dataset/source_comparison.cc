@@ -164,7 +164,9 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   const PairKey key{manifest_.seed, to_string(kind), planned.sample_id, of_source};
   const auto planned_motion = pair.motion;
   if (!is_fault(read)) {
-    settle_motion(manifest_.sources[source].pairs, key, read->boxes, pair);
+    const bool is_sized = stored.source_size.width > 0;
+    settle_motion(manifest_.sources[source].pairs, key, read->boxes,
+                  is_sized ? std::optional(stored.source_size) : std::nullopt, pair);
   }
   // Labels that could not be read when a sample was quarantined decided nothing.
   if (stored.pair.motion != pair.motion && (stored.valid || stored.pair.motion != planned_motion)) {

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <new>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <stdexcept>
 
 #include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
@@ -15,10 +17,11 @@ namespace {
 
 constexpr double kSurroundings = 0.25;  // around the box, of its sides
 constexpr int kLeastSurroundings_px = 4;
-constexpr int kLeastSide_px = 16;    // below, an ellipse is as good
-constexpr double kLeastCut = 0.1;    // of what lies in the box beside the core, the share that is
-constexpr double kMostCut = 0.95;    // cut, in pixels of the copy
-constexpr double kCoreHeight = 0.9;  // of the box's
+constexpr int kLeastSide_px = 16;  // below, an ellipse is as good
+constexpr int kLeastPixels = 5;    // of object and background: GrabCut tells apart so many colours
+constexpr double kLeastCut = 0.1;  // of what lies in the box beside the core, the share that is
+constexpr double kMostCut = 0.95;  // cut, in pixels of the copy
+constexpr double kCoreHeight = 0.9;        // of the box's
 constexpr double kCoreWidths[]{0.3, 0.9};  // least and most, of the box's
 
 /// The pixels whose centres lie in the box and the image; empty also of a box that is none.
@@ -55,18 +58,14 @@ void fill_ellipse(cv::Mat& mask, const cv::Rect2d& box, double width, double hei
   }
 }
 
-/// 255 where the largest part of a mask is, or a hole in it, which the mask's border does not
-/// reach.
-cv::Mat largest_part(const cv::Mat& mask) {
-  cv::Mat parts, statistics, centres;
-  const int count = cv::connectedComponentsWithStats(mask, parts, statistics, centres, 4, CV_32S);
-  const auto area = [&](int part) { return statistics.at<int>(part, cv::CC_STAT_AREA); };
-  int largest = 1;
-  for (int part = 2; part < count; ++part) {
-    if (area(part) > area(largest)) largest = part;
-  }
+/// 255 where the part of a mask is that holds `place`, or a hole in it, which the mask's border
+/// does not reach.
+cv::Mat part_at(const cv::Mat& mask, cv::Point place) {
+  cv::Mat parts;
+  cv::connectedComponents(mask, parts, 4, CV_32S);
   cv::Mat around;
-  cv::copyMakeBorder(parts != largest, around, 1, 1, 1, 1, cv::BORDER_CONSTANT, cv::Scalar(255));
+  cv::copyMakeBorder(parts != parts.at<int>(place), around, 1, 1, 1, 1, cv::BORDER_CONSTANT,
+                     cv::Scalar(255));
   cv::floodFill(around, {0, 0}, cv::Scalar(128));
   return around(cv::Rect(1, 1, mask.cols, mask.rows)) != 128;
 }
@@ -95,11 +94,17 @@ std::optional<cv::Mat> cut(const cv::Mat& image, const cv::Rect& inner, const Cu
                std::clamp(spec.core * inner.width / inner.height, kCoreWidths[0], kCoreWidths[1]),
                kCoreHeight, cv::GC_FGD);
   const int core = cv::countNonZero(labels == cv::GC_FGD);
+  const int background_count = cv::countNonZero(labels == cv::GC_BGD);
+  if (std::min(background_count, open.area()) < kLeastPixels) return std::nullopt;
 
   cv::theRNG() = cv::RNG(1);
   cv::Mat background, foreground;
   cv::grabCut(copy, labels, {}, background, foreground, spec.iterations, cv::GC_INIT_WITH_MASK);
-  const cv::Mat object = largest_part(labels & 1);  // GC_FGD and GC_PR_FGD are odd
+  const cv::Mat found = labels & 1;  // GC_FGD and GC_PR_FGD are odd
+  const cv::Point middle(static_cast<int>(box.x + box.width / 2),
+                         static_cast<int>(box.y + box.height / 2));
+  if (found.at<std::uint8_t>(middle) == 0) return std::nullopt;
+  const cv::Mat object = part_at(found, middle);
   const double cut_open = double(cv::countNonZero(object(open)) - core) / (open.area() - core);
   if (!(cut_open >= kLeastCut && cut_open <= kMostCut)) return std::nullopt;
   cv::Mat full;
@@ -117,7 +122,9 @@ CutOut cut_out(const ColourView& image, const Rectangle& box, const CutOutSpec& 
   try {
     mask = cut({image.size.height, image.size.width, CV_8UC3, const_cast<std::uint8_t*>(image.bgr)},
                inner, spec);
-  } catch (const cv::Exception&) {  // fewer pixels of a kind than it wants
+  } catch (const cv::Exception& exception) {
+    if (exception.code == cv::Error::StsNoMem) throw std::bad_alloc();
+    throw std::runtime_error("expected an object that can be cut out, got " + exception.err);
   }
   result.is_ellipse = !mask;
   if (result.is_ellipse) {

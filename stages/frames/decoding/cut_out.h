@@ -30,7 +30,7 @@ struct CutOut {
 /// the box and a quarter more around it. What is outside of the box is background, and an upright
 /// ellipse in the box's middle is the object: it has 0.9 of the box's height, and the wider the box
 /// the more of its width, since what stands is thin and what lies fills its box. Of what is cut the
-/// largest part is kept, and its holes are closed.
+/// part in the box's middle is kept, and its holes are closed.
 ///
 /// An ellipse takes its place where a side has fewer than 16 pixels, where there is no background
 /// (the box is the whole image), and where less than a tenth or more than 95 % of what lies in the
@@ -38,7 +38,8 @@ struct CutOut {
 /// (manifests/guides/own_data.md) these are nearer to an ellipse.
 ///
 /// A function of its arguments alone: OpenCV's random numbers, which are each thread's own, are
-/// begun anew for each object. Thread safe.
+/// begun anew for each object. Throws std::bad_alloc, and std::runtime_error of what OpenCV
+/// refuses. Thread safe.
 CutOut cut_out(const ColourView& image, const Rectangle& box, const CutOutSpec& spec = {});
 
 /// How many outlines an image's boxes have, and whence.

@@ -154,7 +154,8 @@ Outcome<std::array<SharedFrame, 2>> PairReader::frames(const FramePair& pair,
 }
 
 Outcome<PreparedPair> PairReader::still(const FramePair& pair, ImageOrientation orientation,
-                                        std::int64_t stride, const std::vector<Box>& boxes) const {
+                                        std::int64_t stride, const std::vector<Box>& boxes,
+                                        const std::function<void(ImageSize)>& sized) const {
   try {
     const bool is_image = pair.next.video_frame < 0;
     Outcome<ColourFrame> decoded =
@@ -162,14 +163,26 @@ Outcome<PreparedPair> PairReader::still(const FramePair& pair, ImageOrientation 
                  : stills_.decode(pair.next, stride);
     if (is_fault(decoded)) return decoded.fault();
     ColourFrame& image = *decoded;
+    if (sized) sized(image.size);
     const ColourView view{image.size, image.bgr.data()};
     std::vector<Box> outlined = boxes;
     OutlineCounts outlines;
     if (!pair.objects.empty()) outlines = cut_out_missing(view, outlined);
-    const auto [previous, next] = prepare_still(view, pair, spec_, outlined);
-    PreparedPair prepared = prepare_pair(previous, next);
+    FramesBetween between;
+    std::array<PreparedFrame, 2> frames;
+    if (tells_between_ && pair.poses.empty()) {  // its ends are the frames
+      const ImageSize size = image.size;
+      between = frames_between(std::move(image), pair, spec_, outlined);
+      for (const int end : {0, 1}) {
+        frames[end] = {between.at(end).pixels, place(size, spec_, pair)};
+      }
+    } else {
+      frames = prepare_still(view, pair, spec_, outlined);
+      if (tells_between_) between = frames_between(std::move(image), pair, spec_, outlined);
+    }
+    PreparedPair prepared = prepare_pair(frames[0], frames[1]);
     prepared.outlines = outlines;
-    if (tells_between_) prepared.between = frames_between(std::move(image), pair, spec_, outlined);
+    prepared.between = std::move(between);
     return prepared;
   } catch (const std::runtime_error& error) {
     return fault_in(pair.next, error.what());
@@ -185,9 +198,11 @@ void PairReader::expect(const FramePair& pair, ImageOrientation orientation) con
 }
 
 Outcome<PreparedPair> PairReader::read(const FramePair& pair, ImageOrientation orientation,
-                                       std::int64_t still_stride,
-                                       const std::vector<Box>& boxes) const {
-  if (pair.motion || !pair.poses.empty()) return still(pair, orientation, still_stride, boxes);
+                                       std::int64_t still_stride, const std::vector<Box>& boxes,
+                                       const std::function<void(ImageSize)>& sized) const {
+  if (pair.motion || !pair.poses.empty()) {
+    return still(pair, orientation, still_stride, boxes, sized);
+  }
   const auto outcome = frames(pair, orientation);
   if (is_fault(outcome)) return outcome.fault();
   const auto& [previous, next] = *outcome;

@@ -106,10 +106,11 @@ class PairReader {
   /// differ, or if too little can be seen of a still after its motion. `still_stride`: of the video
   /// that a still is in, each so many of whose frames are taken (SourceSpec::every). `boxes`: those
   /// that FramePair::objects is of; those without an outline are cut out of the image (cut_out.h).
+  /// `sized`: is told a still's size before its motion is looked at, which it may change.
   Outcome<PreparedPair> read(const FramePair& pair,
                              ImageOrientation orientation = ImageOrientation::kStored,
-                             std::int64_t still_stride = 1,
-                             const std::vector<Box>& boxes = {}) const;
+                             std::int64_t still_stride = 1, const std::vector<Box>& boxes = {},
+                             const std::function<void(ImageSize)>& sized = {}) const;
 
   /// Has the system load the images of a pair that will be read soon, so that reading it does not
   /// wait for the disk. (Videos are read in order; the system looks ahead in these by itself.)
@@ -121,7 +122,8 @@ class PairReader {
                                              ImageOrientation orientation) const;
   SharedFrame frame(const FrameRef& ref, ImageOrientation orientation) const;
   Outcome<PreparedPair> still(const FramePair& pair, ImageOrientation orientation,
-                              std::int64_t stride, const std::vector<Box>& boxes) const;
+                              std::int64_t stride, const std::vector<Box>& boxes,
+                              const std::function<void(ImageSize)>& sized) const;
 
   std::filesystem::path base_;
   ImageSpec spec_;

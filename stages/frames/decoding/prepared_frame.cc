@@ -132,8 +132,9 @@ class MovingStill {
     const double right = size_.width - 0.5, bottom = size_.height - 0.5;
     double most = farthest(image_map(moved_end()), {-0.5, -0.5, right, bottom});
     for (std::size_t k = 0; k < pair_.objects.size(); ++k) {
-      if (!pair_.objects[k] || k >= boxes_.size()) continue;
-      most = std::max(most, farthest(object_map(k, moved_end()), boxes_[k].xyxy));
+      if (!pair_.objects[k] || k >= boxes_.size() || boxes_[k].outline.empty()) continue;
+      const Rectangle seen = seen_of(bounds(boxes_[k].outline));
+      most = std::max(most, farthest(object_map(k, moved_end()), seen));
     }
     return most;
   }
@@ -148,6 +149,16 @@ class MovingStill {
     const ImageMotion& motion = *pair_.objects[k];
     return motion == ImageMotion() ? image_map(u)
                                    : object_to_labelled(size_, pair_, motion, boxes_.at(k), u);
+  }
+
+  /// What the image holds of it, as points: an edge lies half a pixel before the centre of the
+  /// pixel with its number.
+  Rectangle seen_of(const Rectangle& edges) const {
+    const auto within = [](double edge, int end) {
+      return std::clamp(edge, 0.0, double(end)) - 0.5;
+    };
+    return {within(edges.left, size_.width), within(edges.top, size_.height),
+            within(edges.right, size_.width), within(edges.bottom, size_.height)};
   }
 
   /// What moves on its own, and what may hide it. The one place that asks for outlines.

@@ -145,6 +145,10 @@ StillLayers::StillLayers(const cv::Mat& image, std::vector<StillObject> objects,
   std::erase_if(layers_, [](const Layer& layer) { return layer.cover.empty(); });
 }
 
+bool StillLayers::can_be_seen(std::size_t number, const cv::Mat& owner) const {
+  return cv::countNonZero(owner(layers_[number].area) == static_cast<double>(number + 1)) > 0;
+}
+
 /// Where objects move away; but for what they are certain to cover themselves.
 void StillLayers::fill_background(const cv::Mat& owner) {
   cv::Mat hole(owner.size(), CV_8UC1, cv::Scalar(0));
@@ -166,7 +170,9 @@ void StillLayers::fill_background(const cv::Mat& owner) {
   }
   hole.setTo(0, stays);
   cv::Mat wanted = hole.clone();
-  for (const Layer& layer : layers_) {
+  for (std::size_t i = 0; i < layers_.size(); ++i) {
+    const Layer& layer = layers_[i];
+    if (!can_be_seen(i, owner)) continue;
     cv::Mat depth;
     cv::distanceTransform(layer.mask, depth, cv::DIST_L2, cv::DIST_MASK_5);
     wanted(layer.area).setTo(0, depth > layer.reach_px + kSlack_px);
@@ -182,8 +188,8 @@ void StillLayers::fill_background(const cv::Mat& owner) {
 /// Where nearer objects hide it; a layer of which nothing can be seen gets no cover.
 void StillLayers::fill_layer(std::size_t number, const cv::Mat& image, const cv::Mat& owner) {
   Layer& layer = layers_[number];
+  if (!can_be_seen(number, owner)) return;
   const double code = static_cast<double>(number + 1);
-  if (cv::countNonZero(owner(layer.area) == code) == 0) return;
   double reach_px = 0;
   for (std::size_t i = number; i < layers_.size(); ++i) {
     reach_px = std::max(reach_px, layers_[i].reach_px);

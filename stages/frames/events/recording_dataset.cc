@@ -90,9 +90,11 @@ Span frame_window(const std::vector<double>& frames, double time_s, LabelPlace p
       std::clamp<std::ptrdiff_t>(after - frames.begin(), 1, std::ssize(frames) - 1);
   const double before_s = frames[static_cast<std::size_t>(last) - 1];
   const double last_s = frames[static_cast<std::size_t>(last)];
-  const double length_s = last_s - before_s;
-  if (place == LabelPlace::kMiddle) return {time_s - length_s / 2, time_s + length_s / 2};
-  return {time_s == last_s ? before_s : time_s - length_s, time_s};
+  if (place == LabelPlace::kMiddle) {
+    const double half_s = later(last_s, -before_s) / 2;
+    return {later(time_s, -half_s), later(time_s, half_s)};
+  }
+  return {later(later(time_s, -last_s), before_s), time_s};
 }
 
 /// A manifest of this program may lie beside a recording under its name.
@@ -240,6 +242,9 @@ class RecordingDataset final : public Dataset {
     const char* const end = label_key.data() + label_key.size();
     const char* const begin = label_key.data() + std::min(slash + 1, label_key.size());
     const auto [stop, error] = std::from_chars(begin, end, time_s);
+    if (const auto reason = unopened_.find(label_key.substr(0, slash)); reason != unopened_.end()) {
+      throw InputError(reason->second);
+    }
     if (recorded == recordings_.end() || error != std::errc() || stop != end) {
       throw InputError("expected a recording and a time of the source, got " + label_key);
     }
@@ -412,6 +417,7 @@ class RecordingDataset final : public Dataset {
         if (is_one) throw;
         if (!first) first = std::current_exception();
         unreadable_.emplace_back(error.what());
+        unopened_[entry->first] = error.what();
         entry = recordings_.erase(entry);
       }
     }
@@ -593,7 +599,8 @@ class RecordingDataset final : public Dataset {
   std::vector<std::string> annotation_files_;  ///< as FrameRef::path is written
   std::vector<std::string> notes_;
   std::vector<std::string> warnings_;
-  std::vector<std::string> unreadable_;  ///< Dataset::unreadable
+  std::vector<std::string> unreadable_;          ///< Dataset::unreadable
+  std::map<std::string, std::string> unopened_;  ///< why recordings do not open, by name
 };
 
 }  // namespace

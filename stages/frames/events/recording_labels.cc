@@ -438,7 +438,9 @@ std::vector<std::filesystem::path> recording_label_companions(const std::filesys
 }
 
 bool is_label_table(const std::filesystem::path& file) {
-  const std::string text = read_text_file(file);
+  constexpr std::int64_t kMostHeaderBytes = std::int64_t{1} << 14;  // it may be of many events
+  const InputFile input(file);
+  const std::string text = input.read_between(0, std::min(kMostHeaderBytes, input.end_byte()));
   const auto header = CsvReader(text).next();
   return !header || std::ranges::any_of(header->fields, [](std::string_view field) {
     return std::ranges::find(kColumns, field) != kColumns.end();

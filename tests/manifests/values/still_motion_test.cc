@@ -74,12 +74,14 @@ class SettleMotion : public ::testing::Test {
   SettleMotion() { spec_.stills = StillsSpec{.objects = ObjectMotionSpec()}; }
 
   /// The pair of sample number i, as it is planned and with these boxes.
-  FramePair settled(int i, const std::vector<Box>& boxes) {
+  FramePair settled(int i, const std::vector<Box>& boxes,
+                    std::optional<ImageSize> image = std::nullopt) {
     const std::string id = std::to_string(i);
     const PairKey key{7, "frames", id};
     FramePair pair;
     pair.motion = draw_motion(*spec_.stills, key.pair());
-    settle_motion(spec_, key, boxes, pair);
+    settle_motion(spec_, key, boxes, std::nullopt, pair);
+    if (image) settle_motion(spec_, key, boxes, image, pair);
     return pair;
   }
 
@@ -162,6 +164,27 @@ TEST_F(SettleMotion, AnImageBeforeWhichNothingMovesDoesNotRest) {
   EXPECT_EQ(planned_at_rest.size(), 2u);
 }
 
+TEST_F(SettleMotion, WhatTheImageHasNoPixelOfDoesNotMove) {
+  const ImageSize image{9, 12};
+  const Box outside{.class_id = 0, .xyxy = {-90, 0, -10, 90}};
+  const Box between{.class_id = 0, .xyxy = {7.6, 2, 8.4, 3}};
+  Box outline_outside = outlined();
+  for (Point& corner : outline_outside.outline.rings[0]) corner.x += 12;
+  Box reaches_in = outside;
+  reaches_in.xyxy.right = 1;
+  for (int i = 0; i < 50; ++i) {
+    for (const Box& box : {outside, between, outline_outside}) {
+      const FramePair pair = settled(i, {box}, image);
+      EXPECT_FALSE(rests(pair.motion));
+      EXPECT_TRUE(pair.objects.empty());
+      EXPECT_FALSE(settled(i, {box, outlined()}, image).objects.at(0));
+    }
+    const FramePair pair = settled(i, {reaches_in}, image);
+    EXPECT_TRUE(pair.objects.at(0));
+    EXPECT_EQ(pair.motion, settled(i, {reaches_in}).motion);
+  }
+}
+
 TEST_F(SettleMotion, SharesAreThoseOfTheManifest) {
   spec_.stills->rests = 1;
   spec_.stills->objects->rests = 1;
@@ -188,7 +211,7 @@ TEST_F(SettleMotion, SharesAreThoseOfTheManifest) {
 TEST_F(SettleMotion, PairsOfSequencesStayAsTheyAre) {
   spec_.stills.reset();
   FramePair pair;
-  settle_motion(spec_, {7, "frames", "1"}, {outlined()}, pair);
+  settle_motion(spec_, {7, "frames", "1"}, {outlined()}, ImageSize{4, 4}, pair);
   EXPECT_FALSE(pair.motion);
   EXPECT_TRUE(pair.objects.empty());
 }

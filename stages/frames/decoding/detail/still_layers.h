@@ -46,6 +46,9 @@ class StillLayers {
     double reach_px;
   };
 
+  /// Whether any of it can; `owner`: [y, x] uint16 of the image, 1 + the number of the layer in
+  /// front.
+  bool can_be_seen(std::size_t layer, const cv::Mat& owner) const;
   void fill_background(const cv::Mat& owner);
   void fill_layer(std::size_t layer, const cv::Mat& image, const cv::Mat& owner);
   cv::Rect seen_in(const Layer& layer, const AffineMap& map) const;

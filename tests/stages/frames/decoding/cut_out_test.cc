@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <new>
 #include <opencv2/core.hpp>
 #include <string>
 #include <thread>
@@ -111,6 +112,38 @@ TEST(CutOut, KeepsOnePartWithoutHoles) {
   const GreyImage mask = mask_of(found.outline, {200, 200});
   EXPECT_EQ(mask.pixels[41 * 200 + 41], 0);
   EXPECT_EQ(mask.pixels[100 * 200 + 100], 1);
+}
+
+TEST(CutOut, KeepsThePartInTheMiddleThoughAnotherIsLarger) {
+  const Shape pole = [](int x, int y) { return x >= 85 && x < 115 && y >= 45 && y < 285; };
+  const Shape beside = [](int x, int y) { return x >= 121 && x < 150 && y >= 40 && y < 290; };
+  const ImageSize size{330, 200};
+  const ColourFrame image =
+      photograph(size, [&](int x, int y) { return pole(x, y) || beside(x, y); });
+  const CutOut found = cut_out(view(image), {50, 40, 150, 290});
+  EXPECT_FALSE(found.is_ellipse);
+  EXPECT_GT(iou(mask_of(found.outline, size), mask_of(pole, size)), 0.7);
+  EXPECT_EQ(iou(mask_of(found.outline, size), mask_of(beside, size)), 0);
+}
+
+/// Has no memory.
+class FullAllocator final : public cv::MatAllocator {
+ public:
+  cv::UMatData* allocate(int, const int*, int, void*, std::size_t*, cv::AccessFlag,
+                         cv::UMatUsageFlags) const override {
+    throw cv::Exception(cv::Error::StsNoMem, "no memory", "", "", 0);
+  }
+  bool allocate(cv::UMatData*, cv::AccessFlag, cv::UMatUsageFlags) const override { return false; }
+  void deallocate(cv::UMatData*) const override {}
+};
+
+TEST(CutOut, LackOfMemoryMakesNoEllipse) {
+  const ColourFrame image = photograph(kSize, figure);
+  FullAllocator full;
+  cv::MatAllocator* const usual = cv::Mat::getDefaultAllocator();
+  cv::Mat::setDefaultAllocator(&full);
+  EXPECT_THROW(cut_out(view(image), kFigureBox), std::bad_alloc);
+  cv::Mat::setDefaultAllocator(usual);
 }
 
 TEST(CutOut, WhatCannotBeCutIsTheEllipseInTheBox) {

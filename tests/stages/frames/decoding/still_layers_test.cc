@@ -178,6 +178,19 @@ TEST_F(StillObjects, AFartherOneGoesOnBehindANearerOneThatMovesAway) {
   EXPECT_EQ(shown, 3 * 16);
 }
 
+TEST_F(StillObjects, OneThatIsHiddenAsAWholeKeepsNothingOfTheNearerOne) {
+  const Rectangle box{30, 15, 60, 45};
+  draw({60, 90}, {box});
+  boxes_.insert(boxes_.begin(), object_at(box));  // the same object twice
+  boxes_[0].xyxy.bottom -= 1;
+  pair_.label_position = 0;
+  pair_.objects = {ImageMotion(), ImageMotion{.x_px = 8}};
+  const ColourFrame frame = moved();
+  for_each_pixel([&](int x, int y) {
+    if (!inside(shifted(box, 8, 0), x, y, kEdge)) ASSERT_LE(at(frame, x, y), 100) << x << ", " << y;
+  });
+}
+
 TEST_F(StillObjects, OneThatReachesTheBorderIsNotTornOff) {
   const Rectangle box{0, 20, 25, 60};  // at the left and the lower border
   draw({60, 80}, {box});
@@ -291,6 +304,16 @@ TEST_F(StillObjects, BetweenTheFramesEverythingMovesSteadily) {
   pair_.motion = ImageMotion{.x_px = 2, .scale = 1.1};
   const FramesBetween between = frames_between(image_, pair_, spec, boxes_);
   EXPECT_EQ(between.at(0.3).size, (ImageSize{30, 40}));
+}
+
+TEST_F(StillObjects, NoPointOfAnOutlineBeyondItsBoxMovesFarther) {
+  draw({60, 80}, {{30, 20, 40, 30}});
+  boxes_[0].outline = outline_around({0, 20, 80, 30});
+  pair_.objects[0] = ImageMotion{.angle_deg = 3};
+  // About the box's middle, in pixel centres (34.5, 24.5); the farthest corner is at (79.5, 29.5).
+  const double chord = 2 * std::sin(1.5 * std::numbers::pi / 180);
+  EXPECT_NEAR(frames_between(image_, pair_, {}, boxes_).displacement_px, chord * std::hypot(45, 5),
+              1e-9);
 }
 
 TEST_F(StillObjects, WhatDoesNotMoveOnItsOwnIsAPartOfTheImage) {

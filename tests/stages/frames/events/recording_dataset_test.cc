@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include "manifests/values/faults.h"
@@ -415,6 +416,43 @@ TEST_F(WithoutFramesTest, AnEventAtAWindowsBeginIsNotInIt) {
   }
 }
 
+// Frames at 0.1, 0.2 and 0.3 s, a label between two, and an event where its window begins.
+TEST_F(RecordingDatasetTest, AnEventAtTheBeginOfAWindowBetweenFramesIsNotInIt) {
+  for (const auto& [place, label_s, begin_s, end_s] :
+       {std::tuple(LabelPlace::kEnd, "0.150000", 0.05, 0.15),
+        {LabelPlace::kEnd, "0.250000", 0.15, 0.25},
+        {LabelPlace::kMiddle, "0.150000", 0.1, 0.2},
+        {LabelPlace::kMiddle, "0.250000", 0.2, 0.3},
+        {LabelPlace::kEnd, "0.200000", 0.1, 0.2}}) {
+    SCOPED_TRACE(label_s);
+    auto mvsec = testing::small_mvsec();
+    mvsec.insert_or_assign("davis/left/image_raw_ts",
+                           testing::Hdf5Dataset{{3}, std::vector<double>{0.1, 0.2, 0.3}});
+    mvsec.insert_or_assign(
+        "davis/left/events",
+        testing::Hdf5Dataset{{3, 4},
+                             std::vector<double>{0, 0, begin_s, 1, 0, 0, end_s, 1, 0, 0, 0.4, 1}});
+    testing::write_hdf5(folder_ / "drive.h5", mvsec);
+    label(std::string(label_s) + ",0,0,1,1,car,\n");
+    spec_.window.label = place;
+    const auto dataset = open();
+    EXPECT_EQ(window(*dataset, 0), (std::array{begin_s, end_s}));
+    EXPECT_THAT(events(*dataset, 0), ElementsAre(Event{0, 0, end_s, true}));
+  }
+}
+
+TEST_F(RecordingDatasetTest, ARecordingThatDoesNotOpenAnyMoreSaysWhy) {
+  testing::write_hdf5(folder_ / "all/a.h5", testing::small_mvsec());
+  testing::write_hdf5(folder_ / "all/b.h5", testing::small_mvsec());
+  spec_.root = "all";
+  const std::string key = open()->labelled_frames().at(2).label_key;
+  const std::string whole = read_text_file(folder_ / "all/b.h5");
+  testing::write_file(folder_ / "all/b.h5", whole.substr(0, whole.size() / 2));
+  const auto outcome = open()->events(key);
+  ASSERT_TRUE(is_fault(outcome));
+  EXPECT_THAT(outcome.fault().reason, AllOf(HasSubstr("b.h5"), HasSubstr("truncated")));
+}
+
 // HDF5 that is cut, RAW of a kind that is not read, AEDAT of another version.
 TEST_F(RecordingDatasetTest, TellsOfRecordingsThatCannotBeRead) {
   testing::write_hdf5(folder_ / "all/a.h5", testing::small_mvsec());
@@ -435,9 +473,10 @@ TEST_F(RecordingDatasetTest, TellsOfRecordingsThatCannotBeRead) {
                           AllOf(HasSubstr("c.raw"), HasSubstr("2.0, 2.1 or 3.0")),
                           AllOf(HasSubstr("d.aedat"), HasSubstr("another version than 4.0")),
                           AllOf(HasSubstr("e.raw"), HasSubstr("the sensor's size"))));
-  for (const auto& [root, reason] :
-       {std::pair("all/b.h5", "truncated"), {"all/c.raw", "2.0, 2.1 or 3.0"},
-        {"all/e.raw", "the sensor's size"}, {"all/notes.txt", "a file of another kind"}}) {
+  for (const auto& [root, reason] : {std::pair("all/b.h5", "truncated"),
+                                     {"all/c.raw", "2.0, 2.1 or 3.0"},
+                                     {"all/e.raw", "the sensor's size"},
+                                     {"all/notes.txt", "a file of another kind"}}) {
     spec_.root = root;
     EXPECT_THAT([&] { open(); },
                 ThrowsMessage<InputError>(AllOf(HasSubstr(reason), HasSubstr(root))));

@@ -6,8 +6,10 @@
 #include <array>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
 #include "tests/testing/npy_bytes.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -58,6 +60,17 @@ TEST_F(RecordingLabelsTest, CsvHasALineABoxAndTimesWithout) {
   EXPECT_THAT(labels.annotations.at(3).boxes, IsEmpty());
   EXPECT_EQ(labels.annotations.at(3).original, "3\n");
   EXPECT_THAT(labels.annotations.at(4).boxes, IsEmpty());
+}
+
+TEST_F(RecordingLabelsTest, OfATableItsFirstLineTellsWhetherItHasLabels) {
+  for (const auto& [header, is] : {std::pair("time_s,left", true), {"t,x,y,p", false}}) {
+    std::string text = std::string(header) + "\n";
+    for (int i = 0; i < 100'000; ++i) text += "0,0,1,1250000\n";
+    testing::write_file(folder_ / "table.csv", text);
+    const InputCounter counter;
+    EXPECT_EQ(is_label_table(folder_ / "table.csv"), is);
+    EXPECT_LE(counter.of(folder_ / "table.csv").bytes, 1u << 14);
+  }
 }
 
 TEST_F(RecordingLabelsTest, CsvMayHaveItsColumnsInAnyOrderAndNoCategory) {
