@@ -476,8 +476,8 @@ TEST_F(MakePlanOfStills, SaysHowManyObjectsCanMoveOnTheirOwn) {
   source().pairs.stills->objects.emplace();
   EXPECT_THAT(plan().sources[0].notes,
               ::testing::Contains(::testing::AllOf(
-                  ::testing::HasSubstr("0 of 0 boxes have an outline and move on their own (of 4 "
-                                       "labelled frames looked at)"),
+                  ::testing::HasSubstr("0 of 0 boxes (of 4 labelled frames looked at) have an "
+                                       "outline"),
                   ::testing::HasSubstr("everything moves as the image does"))));
 }
 
