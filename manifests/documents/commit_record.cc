@@ -129,6 +129,14 @@ CommitRecord read_document(const nlohmann::json& document, FaultList& faults) {
     record.stage_seconds[stage] = seconds.number(0, kMostSeconds);
   }
   record.wall_seconds = object.at("wall_seconds").number(0, kMostSeconds);
+  if (const auto outlines = object.find("outlines")) {
+    StrictObject counts = outlines->object();
+    const auto count = [&](const char* key) {
+      return counts.at(key).integer<std::int64_t>(0, INT64_MAX);
+    };
+    record.outlines = {count("given"), count("cut"), count("ellipses")};
+    counts.finish();
+  }
   if (const auto peak = object.find("peak_bytes")) {
     record.peak_bytes = peak->integer<std::int64_t>(0, INT64_MAX);
   }
@@ -158,23 +166,29 @@ std::string to_json(const CommitRecord& record) {
     require_seconds(seconds, "stage " + stage);
   }
   require_seconds(record.wall_seconds, "wall_seconds");
-  return indented({{"format", kCommitRecordFormat},
-                   {"version", to_string(kCommitRecordVersion)},
-                   {"shard", record.shard},
-                   {"plan_hash", record.plan_hash},
-                   {"sha256", record.sha256},
-                   {"size_bytes", record.size_bytes},
-                   {"samples", record.samples},
-                   {"valid", record.valid},
-                   {"quarantined", quarantined},
-                   {"boxes", record.contents.boxes},
-                   {"persons", record.contents.persons},
-                   {"classes", record.contents.classes},
-                   {"gaps", gaps},
-                   {"optional_columns", record.contents.optional_columns},
-                   {"stage_seconds", record.stage_seconds},
-                   {"wall_seconds", record.wall_seconds},
-                   {"peak_bytes", record.peak_bytes}});
+  nlohmann::json json = {{"format", kCommitRecordFormat},
+                         {"version", to_string(kCommitRecordVersion)},
+                         {"shard", record.shard},
+                         {"plan_hash", record.plan_hash},
+                         {"sha256", record.sha256},
+                         {"size_bytes", record.size_bytes},
+                         {"samples", record.samples},
+                         {"valid", record.valid},
+                         {"quarantined", quarantined},
+                         {"boxes", record.contents.boxes},
+                         {"persons", record.contents.persons},
+                         {"classes", record.contents.classes},
+                         {"gaps", gaps},
+                         {"optional_columns", record.contents.optional_columns},
+                         {"stage_seconds", record.stage_seconds},
+                         {"wall_seconds", record.wall_seconds},
+                         {"peak_bytes", record.peak_bytes}};
+  if (record.outlines != OutlineCounts()) {
+    json["outlines"] = {{"given", record.outlines.given},
+                        {"cut", record.outlines.cut},
+                        {"ellipses", record.outlines.ellipses}};
+  }
+  return indented(json);
 }
 
 CommitRecord parse_commit_record(std::string_view text, const std::string& name) {

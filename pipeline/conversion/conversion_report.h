@@ -26,6 +26,7 @@ struct ConversionReport {
   std::int64_t stored_bytes = 0;     ///< size of the shards
   std::map<std::string, std::int64_t> boxes;  ///< by class
   std::int64_t persons = 0;
+  OutlineCounts outlines;         ///< of objects that move on their own
   std::int64_t volume_bytes = 0;  ///< size of their volumes uncompressed, in the stored type
   std::map<std::string, double> stage_seconds;  ///< busy time by stage, of this run
   double wall_seconds = 0;

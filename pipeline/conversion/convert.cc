@@ -194,6 +194,10 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
   const PlannedShards by_others = run_conversion("make shards", job, earlier.left, sink, &shared);
   add_made(job, sink.committed(), by_others, report);
   std::ranges::copy(sink.notes(), std::back_inserter(report.notes));
+  if (report.outlines != OutlineCounts()) {
+    report.notes.push_back("outlines of objects that move on their own: " +
+                           to_text(report.outlines));
+  }
   report.too_many_faults =
       beyond_limits(manifest.errors, report.quarantined_in_plan(), report.plan_pairs);
   report.stopped = options.stop_requested() && !report.complete();

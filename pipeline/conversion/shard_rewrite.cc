@@ -37,6 +37,7 @@ ShardRewrite::ShardRewrite(std::filesystem::path folder, CommitRecord record,
   if (class_names) name_classes(*class_names);
   record_.shard = before_.shard;
   record_.plan_hash = before_.plan_hash;
+  record_.outlines = before_.outlines;
   // What the shard has cost so far; the work of a retry comes on top.
   record_.stage_seconds = before_.stage_seconds;
   record_.wall_seconds = before_.wall_seconds;
@@ -65,6 +66,7 @@ void ShardRewrite::redo(int slot, const SampleMessage& message) {
   if (!writer_) writer_ = std::make_unique<ShardWriter>(folder_, header_);
   copy_before(slot);
   append(message.sample, message.chunk);
+  if (message.sample.valid) record_.outlines += message.outlines;
 }
 
 bool ShardRewrite::is_news(int slot, const ShardSample& sample) const {

@@ -128,14 +128,6 @@ void ShardSink::open(const PlannedShard& shard) {
   add_write_seconds(start_ns, record_);
 }
 
-std::vector<std::string> ShardSink::notes() const {
-  std::vector<std::string> notes = left_out_.notes();
-  if (outlines_ != OutlineCounts()) {
-    notes.push_back("outlines of objects that move on their own: " + to_text(outlines_));
-  }
-  return notes;
-}
-
 void ShardSink::add(const SampleMessage& message) {
   if (message.failed() && job_.manifest.errors.policy == ErrorPolicy::kFail) {
     throw TooManyFaults("errors.policy is \"fail\": " + message.sample.fault);
@@ -147,9 +139,9 @@ void ShardSink::add(const SampleMessage& message) {
     record_.quarantined.push_back({message.slot, message.sample.sample_id, message.sample.fault});
   } else {
     ++record_.valid;
+    record_.outlines += message.outlines;
   }
   left_out_.add(message.sample.annotation.left_out);
-  outlines_ += message.outlines;
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     record_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }

@@ -44,9 +44,8 @@ class ShardSink final : public SampleSink {
   bool closed() const override;
 
   const std::vector<CommittedShard>& committed() const { return committed_; }
-  /// What a person should know of the labels of all samples that were added: boxes left out, and
-  /// whence the outlines are of objects that move on their own.
-  std::vector<std::string> notes() const;
+  /// What a person should know of the labels of all samples that were added: boxes left out.
+  std::vector<std::string> notes() const { return left_out_.notes(); }
 
  private:
   const ConversionJob& job_;
@@ -58,7 +57,6 @@ class ShardSink final : public SampleSink {
   std::unique_ptr<ShardWriter> writer_;  // of the shard under way
   CommitRecord record_;                  // of the shard under way
   BoxesLeftOut left_out_;
-  OutlineCounts outlines_;
 };
 
 }  // namespace eventgan

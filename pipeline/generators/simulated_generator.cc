@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 #include <stdexcept>
+#include <utility>
 
 #include "manifests/documents/manifest_fields.h"
 #include "manifests/values/counter_random.h"
@@ -13,6 +14,7 @@
 #include "stages/base/files/sha256.h"
 #include "stages/base/processor_clones.h"
 #include "stages/events/event_volume.h"
+#include "stages/events/simulation/sensor.h"
 #include "stages/events/simulation/simulate_pair.h"
 #include "stages/generator/generator.h"
 
@@ -57,22 +59,36 @@ struct SimulatedPair {
   const FramesBetween* between;  ///< null: not known
 };
 
-/// From one image to the next no point moves more than 1 px.
-std::vector<GreyImage> images_between(const FramesBetween& between) {
+/// Images that are kept at once, or as much memory as a Sensor takes that sees one by one.
+constexpr int kMostImages = 64;
+
+/// The events of the frames between, from one to the next of which no point moves more than 1 px.
+std::vector<Event> between_events(const SimulatedPair& pair) {
+  const FramesBetween& between = *pair.between;
   constexpr double kRoundingPx = 1e-9;
   const int steps = std::max(1, static_cast<int>(std::ceil(between.displacement_px - kRoundingPx)));
-  std::vector<GreyImage> images;
-  for (int step = 0; step <= steps; ++step) {
-    images.push_back(between.at(static_cast<double>(step) / steps));
+  const auto image = [&](int step) { return between.at(static_cast<double>(step) / steps); };
+  const CounterRandom random = pair.random.keyed("sensor");
+  const double duration_s = pair.spec.duration_s;
+  if (steps < kMostImages) {
+    std::vector<GreyImage> images;
+    for (int step = 0; step <= steps; ++step) images.push_back(image(step));
+    return simulate_images(images, pair.sensor, duration_s, random, EventOrder::kPixel);
   }
-  return images;
+  Sensor sensor(pair.sensor, pair.previous.size, random);
+  std::vector<Event> events;
+  for (int step = 0; step <= steps; ++step) {
+    const std::vector<Event> seen = sensor.step(linear_intensity(image(step)),
+                                                duration_s * (static_cast<double>(step) / steps));
+    events.insert(events.end(), seen.begin(), seen.end());
+  }
+  std::ranges::stable_sort(events, {},
+                           [](const Event& event) { return std::pair(event.y, event.x); });
+  return events;
 }
 
 std::vector<Event> esim_events(const SimulatedPair& pair) {
-  if (pair.between != nullptr) {
-    return simulate_images(images_between(*pair.between), pair.sensor, pair.spec.duration_s,
-                           pair.random.keyed("sensor"), EventOrder::kPixel);
-  }
+  if (pair.between != nullptr) return between_events(pair);
   return simulate_affine(pair.previous, pair.spec.max_displacement_px, pair.sensor,
                          pair.spec.duration_s, pair.random, EventOrder::kPixel);
 }
@@ -103,7 +119,10 @@ class SimulatedGenerator final : public Generator {
 
   /// At most half of the memory, which leaves one call at a time; `generate` says what is too much.
   std::size_t working_bytes(ImageSize size) const override {
-    const double needed = idle_event_bytes(spec_.sensor, size.pixel_count(), spec_.duration_s);
+    double needed = idle_event_bytes(spec_.sensor, size.pixel_count(), spec_.duration_s);
+    if (generator_row(spec_.kind).sees_between) {
+      needed += kMostImages * static_cast<double>(size.pixel_count());
+    }
     return static_cast<std::size_t>(std::min(needed, static_cast<double>(memory_bytes_) / 2));
   }
 

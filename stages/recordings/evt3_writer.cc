@@ -7,7 +7,6 @@
 namespace eventgan {
 namespace {
 
-constexpr int kLargestSide = 2048;
 constexpr std::size_t kBytesAtOnce = 1 << 16;
 constexpr int kLowBits = 12;
 enum WordType : unsigned { kRow = 0x0, kColumn = 0x2, kTimeLow = 0x6, kTimeHigh = 0x8 };

@@ -25,6 +25,8 @@ namespace eventgan {
 /// I/O errors. Thread safety: one writer is for one thread.
 class Evt3Writer {
  public:
+  static constexpr int kLargestSide = 2048;
+
   /// Throws std::invalid_argument for a size that is empty, or beyond 2048 pixels a side, which the
   /// words do not hold.
   Evt3Writer(const std::filesystem::path& file, ImageSize size);

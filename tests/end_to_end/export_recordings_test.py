@@ -344,6 +344,15 @@ class Recordings(Export):
                 self.assertEqual(of_rvt.read_bytes() if of_rvt.exists() else b"",
                                  of_raw.read_bytes() if ending == "_windows.txt" or len(np.load(of_raw)) else b"")
 
+    def test_raw_says_at_once_that_its_pixels_have_eleven_bits(self):
+        manifest = small_job.small_job(self.out.parent / "wide", cars=2, people=0, errors=small_job.LENIENT,
+                                       image={"width": 2560, "height": 16, "preset": "mpii"})
+        run("convert", manifest, "--progress", "none")
+        run("finalize", manifest.parent / "out")
+        _, err = self.export("raw", source=manifest.parent / "out", expect=64)
+        self.assertIn("expected volumes of at most 2048 pixels a side for --to raw, got 2560x16", err)
+        self.assertFalse(self.out.exists())
+
     def test_rvt_names_files_of_gen1_as_its_preprocessing_does_and_leaves_no_bbox_in_a_name(self):
         manifest = self.out.parent / "manifest.json"
         source = {"dataset": "kitti_tracking", "root": str(self.drive), "pairs": program.pairs([2])}

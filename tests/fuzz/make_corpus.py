@@ -432,6 +432,7 @@ def main(folder):
         "aedat4/lz4": Aedat4(1).file(),
         "aedat4/zstd": Aedat4(4).file(),
         "aedat4/unplugged": Aedat4(3).file(has_table=False)[:-7],
+        "aedat4/begun": Aedat4().file()[:len(Aedat4().file(has_table=False)) + 4],
         "aedat4/huge": Aedat4().file().replace(struct.pack("<Iq", 2, 5), struct.pack("<Iq", 1 << 31, 5)),
         "prophesee/dat": prophesee(dat, "H", 0x080c) + struct.pack("<4I", 5, 1 << 28 | 5 << 14 | 7, 6, 0),
         "prophesee/evt2": prophesee(evt2, "I", 0x10000000, 0x80000003, 0x11403805, 0xa0000000, 0x80000004, 0x00001003),

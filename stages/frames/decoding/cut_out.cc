@@ -10,7 +10,6 @@
 #include <stdexcept>
 
 #include "manifests/values/outlines.h"
-#include "manifests/values/text.h"
 
 namespace eventgan {
 namespace {
@@ -141,19 +140,6 @@ CutOut cut_out(const ColourView& image, const Rectangle& box, const CutOutSpec& 
     for (Point& corner : ring) corner = {corner.x + inner.x, corner.y + inner.y};
   }
   return result;
-}
-
-OutlineCounts& OutlineCounts::operator+=(const OutlineCounts& other) {
-  given += other.given;
-  cut += other.cut;
-  ellipses += other.ellipses;
-  return *this;
-}
-
-std::string to_text(const OutlineCounts& counts) {
-  return std::to_string(counts.given) + " of labels, " + std::to_string(counts.cut) +
-         " cut out of their boxes, " +
-         count_text(static_cast<std::int64_t>(counts.ellipses), "ellipse");
 }
 
 OutlineCounts cut_out_missing(const ColourView& image, std::vector<Box>& boxes) {

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <cstddef>
-#include <string>
 #include <vector>
 
 #include "manifests/values/labels.h"
+#include "manifests/values/outline_counts.h"
 #include "stages/base/images/image_file.h"
 
 namespace eventgan {
@@ -41,19 +40,6 @@ struct CutOut {
 /// begun anew for each object. Throws std::bad_alloc, and std::runtime_error of what OpenCV
 /// refuses. Thread safe.
 CutOut cut_out(const ColourView& image, const Rectangle& box, const CutOutSpec& spec = {});
-
-/// How many outlines an image's boxes have, and whence.
-struct OutlineCounts {
-  std::size_t given = 0;  ///< the labels' own
-  std::size_t cut = 0;
-  std::size_t ellipses = 0;  ///< in place of a cut
-
-  OutlineCounts& operator+=(const OutlineCounts& other);
-  bool operator==(const OutlineCounts&) const = default;
-};
-
-/// "120 of labels, 300 cut out of their boxes, 12 ellipses".
-std::string to_text(const OutlineCounts& counts);
 
 /// Gives the boxes that have no outline that of cut_out, but for regions to be ignored and boxes
 /// beyond the image. Thread safe.

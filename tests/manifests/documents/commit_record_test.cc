@@ -89,6 +89,8 @@ TEST(CommitRecord, TextIsCanonical) {
 TEST(CommitRecord, GoesThereAndBack) {
   CommitRecord record = sample_commit_record();
   EXPECT_EQ(parse_commit_record(to_json(record), "m"), record);
+  record.outlines = {120, 300, 12};
+  EXPECT_EQ(parse_commit_record(to_json(record), "m"), record);
   record.quarantined = {};
   record.valid = record.samples = 0;
   record.contents.boxes = record.contents.persons = {};

@@ -126,6 +126,10 @@ TEST(SimulatedGenerator, EsimSeesWhatIsBetweenTheFramesIfThatIsKnown) {
   EXPECT_THAT(asked, ::testing::ElementsAre(0, 0.25, 0.5, 0.75, 1));
   EXPECT_NEAR(events(0), 0, 1e-3);
   EXPECT_THAT(asked, ::testing::ElementsAre(0, 1));
+  // So many that they are seen one by one.
+  EXPECT_NEAR(events(200), 12, 1e-3);
+  EXPECT_EQ(asked.size(), 201u);
+  EXPECT_GE(generator->working_bytes({1000, 1000}), 64'000'000u);
 }
 
 TEST(SimulatedGenerator, DependsOnFramesSeedAndSettingsAlone) {
