@@ -68,8 +68,8 @@ TEST(OnGrid, OfTheSamePlacementChangesNothingAndRefusesOthersImages) {
 
 TEST(LabelledPixels, AreThoseOfBoxesWhoseCentreLiesInside) {
   VolumeLabels labels;
-  labels.boxes.push_back({{0.6, 0, 3.5, 1}, {}, false});  // the centres at 1.5, 2.5 and 3.5
-  labels.boxes.push_back({{0, 1, 5, 2}, {}, /*ignore=*/true});
+  labels.boxes.push_back({{0.6, 0, 3.5, 1}, {}, false, {}});  // the centres at 1.5, 2.5 and 3.5
+  labels.boxes.push_back({{0, 1, 5, 2}, {}, /*ignore=*/true, {}});
   EXPECT_THAT(labelled_pixels(labels, {2, 5}), ElementsAre(0, 1, 1, 1, 0, 0, 0, 0, 0, 0));
 }
 

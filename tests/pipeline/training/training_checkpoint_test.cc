@@ -100,8 +100,11 @@ TEST_F(Resumption, ComparesTheImagesOfARecordingInAFolder) {
   testing::write_file(folder_ / "ecd/events.txt", "0.1 1 1 1\n");
   testing::write_file(folder_ / "ecd/images.txt", "0.1 images/a.png\n");
   testing::write_file(folder_ / "ecd/images/a.png", "abc");
-  manifest_.recordings = {{.path = "ecd", .format = RecordingFormat::kEcd}};
-  const std::vector<TrainingRecording> recordings{{.file = folder_ / "ecd"}};
+  manifest_.recordings.resize(1);
+  manifest_.recordings[0] = RecordingSpec();
+  manifest_.recordings[0].format = RecordingFormat::kEcd;
+  std::vector<TrainingRecording> recordings(1);
+  recordings[0].file = folder_ / "ecd";
   const auto before = training_settings(manifest_, recordings);
   testing::write_file(folder_ / "ecd/images/a.png", "abd");
   EXPECT_NE(training_settings(manifest_, recordings).at("recording 0"), before.at("recording 0"));

@@ -73,7 +73,7 @@ TEST(WantedTiles, LieOnTheVolumesGrid) {
 
 VolumeLabels box_labels(Rectangle box, bool ignore = false) {
   VolumeLabels labels;
-  labels.boxes.push_back({box, box, ignore});
+  labels.boxes.push_back({box, box, ignore, {}});
   return labels;
 }
 

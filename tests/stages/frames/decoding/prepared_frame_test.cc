@@ -106,8 +106,8 @@ std::vector<std::uint8_t> random_levels(ImageSize size, int channels) {
 }
 
 TEST(PreparedFrame, GreyIsWhatThreeEqualChannelsGive) {
-  constexpr ImageSize kSize{37, 53};
-  const std::vector<std::uint8_t> grey = random_levels(kSize, 1);
+  constexpr ImageSize kSides{37, 53};
+  const std::vector<std::uint8_t> grey = random_levels(kSides, 1);
   std::vector<std::uint8_t> colour;
   for (const std::uint8_t level : grey) colour.insert(colour.end(), 3, level);
   for (const auto order : {GreyOrder::kBeforeResize, GreyOrder::kAfterResize}) {
@@ -115,22 +115,22 @@ TEST(PreparedFrame, GreyIsWhatThreeEqualChannelsGive) {
     spec.size = ImageSize{24, 40};
     spec.grey = order;
     spec.blur = 5;
-    EXPECT_EQ(prepare_frame({kSize, grey.data(), ImageView::Channels::kGrey}, spec).grey,
-              prepare_frame({kSize, colour.data()}, spec).grey);
+    EXPECT_EQ(prepare_frame({kSides, grey.data(), ImageView::Channels::kGrey}, spec).grey,
+              prepare_frame({kSides, colour.data()}, spec).grey);
   }
 }
 
 TEST(PreparedFrame, TheOrderOfChannelsChangesNothingButTheirOrder) {
-  constexpr ImageSize kSize{19, 30};
-  const std::vector<std::uint8_t> bgr = random_levels(kSize, 3);
+  constexpr ImageSize kSides{19, 30};
+  const std::vector<std::uint8_t> bgr = random_levels(kSides, 3);
   std::vector<std::uint8_t> rgb = bgr;
   for (std::size_t i = 0; i < rgb.size(); i += 3) std::swap(rgb[i], rgb[i + 2]);
   for (const auto order : {GreyOrder::kBeforeResize, GreyOrder::kAfterResize}) {
     ImageSpec spec;
     spec.size = ImageSize{25, 16};
     spec.grey = order;
-    EXPECT_EQ(prepare_frame({kSize, rgb.data(), ImageView::Channels::kRgb}, spec).grey,
-              prepare_frame({kSize, bgr.data()}, spec).grey);
+    EXPECT_EQ(prepare_frame({kSides, rgb.data(), ImageView::Channels::kRgb}, spec).grey,
+              prepare_frame({kSides, bgr.data()}, spec).grey);
   }
 }
 

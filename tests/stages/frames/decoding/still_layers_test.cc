@@ -187,7 +187,8 @@ TEST_F(StillObjects, OneThatIsHiddenAsAWholeKeepsNothingOfTheNearerOne) {
   pair_.objects = {ImageMotion(), ImageMotion{.x_px = 8}};
   const ColourFrame frame = moved();
   for_each_pixel([&](int x, int y) {
-    if (!inside(shifted(box, 8, 0), x, y, kEdge)) ASSERT_LE(at(frame, x, y), 100) << x << ", " << y;
+    if (inside(shifted(box, 8, 0), x, y, kEdge)) return;
+    ASSERT_LE(at(frame, x, y), 100) << x << ", " << y;
   });
 }
 
