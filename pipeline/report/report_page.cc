@@ -207,8 +207,7 @@ std::string origin(const Survey& survey, const PageContext& context) {
                            escaped(source_name(survey, i)), escaped(source.root),
                            to_string(source.pairs.side), stills->translation_px[0],
                            stills->translation_px[1], stills->rotation_deg, stills->scale,
-                           stills->frames,
-                           stills->objects ? "; objects move on their own" : ""));
+                           stills->frames, stills->objects ? "; objects move on their own" : ""));
       continue;
     }
     html += fact("source",

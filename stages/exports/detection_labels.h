@@ -22,8 +22,8 @@ std::string yolo_line(int class_number, const Rectangle& box, ImageSize volume);
 /// "class x1 y1 x2 y2 ...": the corners as shares of the volume's width and height, 9 decimals,
 /// each within 0..1. It is one ring, as YOLO has it: from each of the outline's rings a bridge
 /// without width leads to the next one and back, so that a reader that fills by turns (even-odd)
-/// covers what the outline does; one whose parts overlap, or one itself, is that of its mask. `outline` lies within
-/// the volume and is not empty.
+/// covers what the outline does; one whose parts overlap, or one itself, is that of its mask.
+/// `outline` lies within the volume and is not empty.
 std::string yolo_outline_line(int class_number, const Outline& outline, ImageSize volume);
 
 /// A joint of an exported person.

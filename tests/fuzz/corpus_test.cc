@@ -118,8 +118,7 @@ TEST(FuzzCorpusSeeds, AreReadWhereTheyAreSound) {
   }
   const std::pair<const char*, int> recordings[] = {{"dat", 2}, {"evt2", 2}, {"evt3", 5}};
   for (const auto& [name, count] : recordings) {
-    EXPECT_EQ(open_prophesee(corpus / "prophesee" / name).events->count(), count)
-        << name;
+    EXPECT_EQ(open_prophesee(corpus / "prophesee" / name).events->count(), count) << name;
   }
 }
 
