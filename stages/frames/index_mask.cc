@@ -236,8 +236,7 @@ class OutlinedDataset final : public WrappedDataset {
     std::vector<std::string> files = dataset_->annotation_files();
     for (const auto& [label_key, mask] : mask_of_) files.push_back(masks_.written(mask.file));
     std::ranges::sort(files);
-    const auto twice = std::ranges::unique(files);
-    files.erase(twice.begin(), twice.end());
+    files.erase(std::unique(files.begin(), files.end()), files.end());
     return files;
   }
 

@@ -266,10 +266,10 @@ struct TimeUnit {
 TimeUnit time_unit(const EventFields& columns, const TableContent& content,
                    const std::string& file) {
   const std::vector<double>& times = content.events.times_s();
-  if (columns.tick_s) return {std::round(1 / *columns.tick_s)};
+  if (columns.tick_s) return {std::round(1 / *columns.tick_s), {}};
   for (const auto& [ending, ticks_per_s] :
        {std::pair("_s", 1.0), {"_ms", 1e3}, {"_us", 1e6}, {"_ns", 1e9}}) {
-    if (columns.t.ends_with(ending)) return {ticks_per_s};
+    if (columns.t.ends_with(ending)) return {ticks_per_s, {}};
   }
   if (content.sensor) return {};
   double least = HUGE_VAL, most = -HUGE_VAL;

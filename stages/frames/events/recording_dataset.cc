@@ -140,7 +140,7 @@ class RecordingDataset final : public Dataset {
     }
     std::ranges::sort(labelled_, {}, &LabelledFrame::sample_id);
     std::ranges::sort(annotation_files_);
-    annotation_files_.erase(std::ranges::unique(annotation_files_).begin(),
+    annotation_files_.erase(std::unique(annotation_files_.begin(), annotation_files_.end()),
                             annotation_files_.end());
   }
 
