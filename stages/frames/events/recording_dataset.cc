@@ -318,6 +318,7 @@ class RecordingDataset final : public Dataset {
       const RecordingFault fault = recording_fault(folder.on_disk(name.string()), options_);
       if (fault.is_recording) {
         unreadable_.push_back(fault.reason);
+        unopened_.emplace(name.stem().string(), fault.reason);
       } else if (!is_label_file(name)) {
         left_out.push_back(name.string());
         reason = fault.reason;

@@ -199,7 +199,7 @@ TEST(CommitRecord, EveryRuleIsChecked) {
       {"/host", R"("x")",
        "$.host: expected one of the keys format, version, shard, plan_hash, sha256, size_bytes, "
        "samples, valid, quarantined, boxes, persons, classes, gaps, optional_columns, "
-       "stage_seconds, wall_seconds, peak_bytes, got an unknown key"},
+       "stage_seconds, wall_seconds, outlines, peak_bytes, got an unknown key"},
   };
   for (const BadCommitRecord& bad : table) {
     auto document = nlohmann::json::parse(to_json(sample_commit_record()));

@@ -195,10 +195,19 @@ TEST(SensorRefractory, DeadTimeLowersTheRateOfNoise) {
   Sensor sensor(spec, kSize, CounterRandom(3));
   sensor.step(log_image(kSize, -1, spec), 0);
   const std::vector<Event> events = sensor.step(log_image(kSize, -1, spec), 10);
-  // A renewal process with mean wait R + 1/r = 0.1 s and variance 1/r^2: 100 events a pixel of
-  // variance T / (r^2 mean^3) = 25, and on average (1/r^2 / mean^2 - 1)/2 + ... below 1 off that.
+  // A renewal process with mean wait R + 1/r and variance 1/r^2: T / (R + 1/r) events a pixel, on
+  // average (1/r^2 / mean^2 - 1)/2 + ... below 1 off that, of variance T / (r^2 mean^3). Over the
+  // pixels' own rates the mean is 92, and the deviation, most of it between pixels, below 30.
+  double sum = 0, weights = 0;
+  for (double z = -6; z <= 6; z += 0.01) {
+    const double rate =
+        20 * std::exp(kNoiseRateSpread * z - kNoiseRateSpread * kNoiseRateSpread / 2);
+    sum += std::exp(-z * z / 2) * 10 / (0.05 + 1 / rate);
+    weights += std::exp(-z * z / 2);
+  }
   const double pixels = 1600;
-  EXPECT_NEAR(static_cast<double>(events.size()), 100 * pixels, pixels + 4 * 5 * std::sqrt(pixels));
+  EXPECT_NEAR(static_cast<double>(events.size()), sum / weights * pixels,
+              pixels + 4 * 30 * std::sqrt(pixels));
   std::vector<double> last(kSize.pixel_count(), -1);
   for (const Event& event : events) {
     double& before = last[static_cast<std::size_t>(event.y * kSize.width + event.x)];
@@ -239,11 +248,14 @@ TEST(SensorExtremes, EventsThatDoNotFitIntoMemoryAreRefusedWithTheSettings) {
   EXPECT_NEAR(idle_event_bytes(spec, 15, 10), 15 * 10 * 1000 * 2 * sizeof(Event), 2e4);
   // The bound is one of what really comes.
   spec = {};
-  spec.shot_noise_rate_hz = 200;
-  Sensor sensor(spec, kPushedSize, CounterRandom(1));
-  sensor.step(std::vector<float>(15, 0.5f), 0);
-  EXPECT_NEAR(static_cast<double>(sensor.step(std::vector<float>(15, 0.5f), 10).size()), 30000,
-              5 * std::sqrt(30000));
+  spec.shot_noise_rate_hz = 20;
+  constexpr ImageSize kMany{50, 60};
+  Sensor sensor(spec, kMany, CounterRandom(1));
+  sensor.step(std::vector<float>(3000, 0.5f), 0);
+  const std::size_t count = sensor.step(std::vector<float>(3000, 0.5f), 1).size();
+  // The pixels' own rates deviate by 0.64 of their mean.
+  EXPECT_NEAR(static_cast<double>(count), 60000,
+              5 * std::sqrt(60000 + 3000 * std::pow(0.64 * 20, 2)));
 }
 
 TEST(SensorExtremes, BlackAndSaturatedImagesStaySilent) {
