@@ -133,7 +133,8 @@ const EventOrder& EcdEventFile::order() const {
 }
 
 std::int64_t EcdEventFile::first_byte_after(double time_s) const {
-  const auto [begin, end] = order().block_after(time_s);
+  const auto block = order().block_after(time_s);
+  const std::int64_t begin = block.begin, end = block.end;
   const std::string bytes = file_.read_between(begin, end);
   std::int64_t found = end;
   for_each_line(bytes, [&](std::string_view line, std::size_t offset) {

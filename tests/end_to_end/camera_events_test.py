@@ -270,7 +270,7 @@ class Recordings(program.InFolder):
             error = run(command, self.manifest(), expect=64)[1]
             self.assertIn('got "events"', error)
             self.assertEqual(len(error.strip().splitlines()), 1)
-        self.assertIn("expected a recording", run("plan", self.manifest({"root": "drive.csv"}), expect=66)[1])
+        self.assertIn("expected events as t, x, y, p", run("plan", self.manifest({"root": "drive.csv"}), expect=66)[1])
 
     def test_a_real_recording(self):
         if not SHARED.is_dir():

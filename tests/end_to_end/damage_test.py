@@ -12,12 +12,13 @@ import tempfile
 
 import h5py
 import numpy as np
+import PIL.Image
 
 import failing_files
 import program
 from folders import content, records, same_content, shards
 from program import run
-from small_job import save_image, small_job, write_cars, write_people
+from small_job import HEIGHT, WIDTH, save_image, small_job, write_cars, write_people
 
 
 def setUpModule():
@@ -340,6 +341,10 @@ class EveryColumn(program.InFolder):
         write_cars(self.folder / "cars", 4, random)
         with open(self.folder / "cars" / "label_2" / "000001.txt", "a") as file:  # high enough to have a difficulty
             file.write("Car 0.00 0 0.10 2.00 3.00 12.00 50.00 1.5 1.6 3.9 1.0 1.5 10.0 0.2\n")
+        mask = np.zeros((HEIGHT, WIDTH), np.uint8)
+        mask[5:20, 4:11] = len((self.folder / "cars" / "label_2" / "000001.txt").read_text().splitlines())  # that one
+        (self.folder / "masks").mkdir()
+        PIL.Image.fromarray(mask).save(self.folder / "masks" / "000001.png")
         for k in range(4):
             path = self.folder / "cars" / "calib" / f"{k:06d}.txt"
             path.parent.mkdir(exist_ok=True)
@@ -352,9 +357,10 @@ class EveryColumn(program.InFolder):
                    {"dataset": "human36m", "layout": "extracted", "root": "walk", "pairs": program.pairs([1])},
                    {"dataset": "mpii_list", "root": "people", "annotations": "people/people.json",
                     "sequences": "people/sequences", "pairs": program.pairs([2], side="around")},
-                   {"dataset": "kitti_object", "root": "cars", "split": "stills",
+                   {"dataset": "kitti_object", "root": "cars", "split": "stills", "outlines": "masks",
                     "pairs": {"from": "stills",
-                              "motion": {"translation_px": [1, 1], "rotation_deg": 1, "scale": 0.01}}}]
+                              "motion": {"translation_px": [1, 1], "rotation_deg": 1, "scale": 0.01,
+                                         "objects": {"translation_px": [1, 2]}}}}]
         path = self.write_manifest(
             program.manifest(sources, image={"width": 24, "height": 16, "fit": "letterbox", "preset": "mpii"},
                              generator={"kind": "difference", "sensor": {"threshold": [0.15, 0.3]}}))
