@@ -33,16 +33,21 @@ struct PairKey {
 };
 
 /// What tells a source's draws from those of the others of its kind, whose samples may have the
-/// same ids: the split, unless that is train; and of sources of one split their roots, but for the
-/// first root in the order of bytes. So the only source of a job has none, and one that is added
-/// moves no pair of another split, and in its own at most those of the root that was first.
+/// same ids: the split, unless that is train; and of the roots of one split their number in the
+/// manifest's order, but for the first. So it does not matter where the data lies, the only source
+/// of a job has none, and one that is added at the end moves no pair of another.
 inline std::string source_key(const std::vector<SourceSpec>& sources, std::size_t source) {
   const SourceSpec& own = sources.at(source);
-  const bool is_first = std::ranges::none_of(sources, [&](const SourceSpec& other) {
-    return other.dataset == own.dataset && other.split == own.split && other.root < own.root;
-  });
+  std::vector<std::string_view> roots;  // of its kind and split
+  for (const SourceSpec& other : sources) {
+    if (other.dataset == own.dataset && other.split == own.split &&
+        std::ranges::find(roots, other.root) == roots.end()) {
+      roots.push_back(other.root);
+    }
+  }
+  const auto number = std::ranges::find(roots, own.root) - roots.begin();
   const std::string split = own.split == "train" ? "" : own.split;
-  return is_first ? split : split + "\n" + own.root;
+  return number == 0 ? split : split + "\n" + std::to_string(number);
 }
 
 /// The contrast threshold of a pair's sensor, its mean drawn log-uniformly from the range that the

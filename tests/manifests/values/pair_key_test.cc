@@ -65,12 +65,14 @@ TEST(SourceKey, TellsSourcesOfOneKindApart) {
   const SourceSpec cars = source("a", "train", DatasetKind::kKittiObject);
   // The only one has none, whatever sources of other splits and kinds there are, and wherever.
   EXPECT_EQ(source_key({train}, 0), "");
-  EXPECT_EQ(source_key({val, cars, more, train}, 3), "");
   EXPECT_EQ(source_key({val, cars, more, train}, 1), "");
   EXPECT_EQ(source_key({val, cars, more, train}, 0), "val");
-  EXPECT_EQ(source_key({val, cars, more, train}, 2), "\nc");
-  // A source that is taken twice has the same frames.
-  EXPECT_EQ(source_key({train, train}, 1), "");
+  EXPECT_EQ(source_key({val, cars, more, train}, 2), "");
+  EXPECT_EQ(source_key({val, cars, more, train}, 3), "\n1");
+  EXPECT_EQ(source_key({val, source("b", "val", DatasetKind::kFrames)}, 1), "val\n1");
+  // A source that is taken twice has the same frames, and counts once.
+  EXPECT_EQ(source_key({train, train, more}, 1), "");
+  EXPECT_EQ(source_key({train, train, more}, 2), "\n1");
 }
 
 TEST(ThresholdSpec, IsOfItsPolaritiesAndSpreadAsTheDefaultsAre) {
