@@ -345,15 +345,29 @@ def _halved(item: Item) -> Item:
 
 
 def recordings_in(folder: pathlib.Path) -> list[pathlib.Path]:
-    """The folders of recordings with boxes: of windows (NAME.npz and NAME.txt)
-    or of drawn events (images/ and labels/)."""
+    """The folders of recordings with boxes: of windows (NAME.npz and NAME.txt) or of drawn events (images/, with labels/
+    beside it or with boxes in the boxes.csv of the folder above)."""
     found = [each for each in (folder, *sorted(folder.iterdir())) if each.is_dir()
              and (any(each.glob("*.npz")) and any(each.glob("*.txt")) or
                   (each / "images").is_dir() and (each / "labels").is_dir())]
+    for path in sorted([*folder.glob("boxes.csv"), *folder.glob("*/boxes.csv")]):
+        # sets without a person are for other tasks
+        found += sorted({path.parent / image.split("/")[0] for image, boxes in _table(path).items()
+                         if image.count("/") == 2 and len(boxes)})
     if not found:
-        raise SystemExit("expected folders with windows (NAME.npz, NAME.txt) or drawn events (images/, labels/), got "
-                         f"none, in {folder}")
+        raise SystemExit("expected folders with windows (NAME.npz, NAME.txt) or drawn events (images/ with labels/ or "
+                         f"a boxes.csv), got none, in {folder}")
     return found
+
+
+@functools.cache
+def _table(path: pathlib.Path) -> dict[str, np.ndarray]:
+    """Of a boxes.csv, by the image: the boxes of persons, f64 [N, 4] in pixels, left, top, right, bottom."""
+    boxes = collections.defaultdict(list)
+    with open(path, newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            boxes[row["image"]] += [[float(row[edge]) for edge in ("x1", "y1", "x2", "y2")]] * (row["class"] in CLASSES)
+    return {image: np.array(each).reshape(-1, 4) for image, each in boxes.items()}
 
 
 def test_items(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, int],
@@ -362,15 +376,14 @@ def test_items(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, 
     percentiles and clipped at 1; [] if it has drawings of events alone and volumes are asked for."""
     def make() -> list[Item]:
         if (folder / "images").is_dir():
-            return [_drawn(path, folder / "labels" / f"{path.stem}.txt", size)
-                    for path in sorted((folder / "images").iterdir())] if signed else []
+            return [_drawn(path, size) for path in sorted((folder / "images").iterdir())] if signed else []
         windows = DetectionDataset(windows_of(args, folder, DAVIS346, "none"), CLASSES)
         return [_smaller(windows[i], size, signed_channel if signed else _normalized) for i in range(len(windows))]
 
     return _kept(args, f"{key_of(folder)}-{size[0]}x{size[1]}{'' if signed else '-volume'}", make)
 
 
-def _drawn(path: pathlib.Path, labels: pathlib.Path, size: tuple[int, int]) -> Item:
+def _drawn(path: pathlib.Path, size: tuple[int, int]) -> Item:
     """Of an image in which somebody has drawn positive minus negative events in grey,
     stretched to 0..255 by its own range, or events without their polarity."""
     image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
@@ -380,7 +393,10 @@ def _drawn(path: pathlib.Path, labels: pathlib.Path, size: tuple[int, int]) -> I
     events = image.astype(np.float32) - np.bincount(image.ravel()).argmax()
     if events.min() == 0 or events.max() == 0:  # no polarity: one is drawn for each pixel
         events *= np.random.default_rng(zlib.crc32(path.stem.encode())).choice(np.float32([-1, 1]), events.shape)
-    boxes = torch.from_numpy(_boxes(labels, image.shape)).float()
+    folder = path.parent.parent
+    texts = folder / "labels"
+    boxes = torch.from_numpy(_boxes(texts / f"{path.stem}.txt", image.shape) if texts.is_dir() else
+                             _table(folder.parent / "boxes.csv")[f"{folder.name}/images/{path.name}"]).float()
     item = {"volume": torch.from_numpy(events[None]), "boxes": boxes,
             "labels": torch.zeros(len(boxes), dtype=torch.int64), "ignore": torch.zeros(len(boxes), dtype=torch.bool),
             "id": path.stem}

@@ -74,6 +74,13 @@ def args(tmp_path, monkeypatch):
     drawing[10:90:2, 400:600], drawing[11:91:2, 400:600] = 140, 40  # as many of both in every two pixels
     cv2.imwrite(str(real / "drawn" / "images" / "c.png"), drawing)
     (real / "drawn" / "labels" / "c.txt").write_text(f"0 {240 / 640} {200 / 360} {80 / 640} {200 / 360}\n")
+    for name in ("walking", "driving"):
+        (real / "pictures" / name / "images").mkdir(parents=True)
+        cv2.imwrite(str(real / "pictures" / name / "images" / "d.png"), drawing)
+    (real / "pictures" / "boxes.csv").write_text("image,class,x1,y1,x2,y2,track,note\n"
+                                                 "walking/images/d.png,person,200,100,280,300,,\n"
+                                                 "walking/images/d.png,car,0,0,50,50,,\n"
+                                                 "driving/images/d.png,car,0,0,50,50,,\n")
     (real / "notes").mkdir()
     return argparse.Namespace(frames=frames, real=real, test=real, out=tmp_path / "out", peers=None, steps=2)
 
@@ -113,8 +120,10 @@ def test_controls_are_of_the_frame(args):
 
 
 def test_windows_and_drawings_have_their_boxes_around_their_events(args):
-    drawn, windows = labelled_events.recordings_in(args.real)
-    assert (drawn.name, windows.name) == ("drawn", "windows") and labelled_events.recordings_in(windows) == [windows]
+    drawn, windows, walking = labelled_events.recordings_in(args.real)  # in the other pictures nobody is seen
+    assert (drawn.name, windows.name, walking.name) == ("drawn", "windows", "walking")
+    assert labelled_events.recordings_in(windows) == [windows]
+    assert labelled_events.recordings_in(walking.parent) == [walking]
     a, b = labelled_events.test_items(args, windows, (192, 320))
     scale = 192 / 260  # 346x260 in 320x192: 256 wide, 32 left of it
     expected = [100 * scale + 32, 40 * scale, 140 * scale + 32, 160 * scale]
@@ -126,6 +135,9 @@ def test_windows_and_drawings_have_their_boxes_around_their_events(args):
     np.testing.assert_allclose(b["boxes"][0], [32, 0, 288, 192], atol=0.5)
     assert (b["volume"][0, :, 32:288] > 0.99).all()  # as many events everywhere make no pattern of lines
     [c] = labelled_events.test_items(args, drawn, (192, 320))
+    [d] = labelled_events.test_items(args, walking, (192, 320))  # the same picture, its boxes in a table
+    torch.testing.assert_close(d["boxes"], c["boxes"], atol=1e-4, rtol=0)
+    assert torch.equal(d["volume"], c["volume"])
     # 640x360: half of it, 6 lines below the top
     np.testing.assert_allclose(c["boxes"][0], [100, 56, 140, 156], atol=1e-4)
     channel = c["volume"][0].float()
@@ -161,14 +173,14 @@ def test_trained_once_and_never_on_what_it_is_tested_on(args, monkeypatch):
     monkeypatch.setitem(real_cameras.DEVELOPMENT, "windows", 1)
     row = real_cameras.Row("windows", ("real windows",))
     scores = real_cameras.train_and_test(args, row, 0)
-    assert [*scores] == ["drawn"]
+    assert [*scores] == ["drawn", "walking"]
     network = real_cameras.train_and_test(args, real_cameras.Row("difference", ("difference",), images=5), 0)
-    assert [*network] == ["drawn", "windows", "windows, development"]
+    assert [*network] == ["drawn", "windows", "windows, development", "walking"]
     assert all(0 <= value <= 1 for score in network.values() for value in score.values())
     args.test = args.real.rename(args.real.with_name("others"))
     args.real.symlink_to(args.test)
     monkeypatch.setattr(real_cameras.train_detector, "train", None)  # it would fail
-    assert [*real_cameras.train_and_test(args, row, 0)] == ["drawn", "windows"]
+    assert [*real_cameras.train_and_test(args, row, 0)] == ["drawn", "windows", "walking"]
 
 
 def test_tables_compare_seed_by_seed():
