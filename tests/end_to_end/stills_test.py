@@ -136,7 +136,7 @@ class Stills(program.InFolder):
                         empty = (inside[:, 2:] <= inside[:, :2]).any(1)
                         np.testing.assert_array_equal(boxes["ignore"][rows], boxes["ignore_source"][rows] | empty)
 
-    def test_bytes_depend_on_neither_threads_nor_other_sources(self):
+    def test_bytes_depend_on_neither_threads_nor_further_sources(self):
         self.photos("voc100", 9)
         source = {"dataset": "frames", "root": "photos", "pairs": stills()}
         job = manifest([source], image={"width": 96, "height": 64, "fit": "letterbox", "preset": "mpii"})
@@ -149,7 +149,7 @@ class Stills(program.InFolder):
         first = PIL.Image.open(next((self.folder / "photos").iterdir()))
         first.save(self.folder / "sequence" / "0.png")
         first.transpose(PIL.Image.FLIP_LEFT_RIGHT).save(self.folder / "sequence" / "1.png")
-        job["sources"] = [{"dataset": "frames", "root": "sequence", "pairs": program.pairs([1])}, source]
+        job["sources"] = [source, {"dataset": "frames", "root": "sequence", "pairs": program.pairs([1])}]
         self.convert(job)
         with h5py.File(self.folder / "out" / "dataset.h5") as view:
             both, paths = view["pairs/motion"][:], view["pairs/prev_path"].asstr()[:]
