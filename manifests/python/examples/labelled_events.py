@@ -345,8 +345,8 @@ def _halved(item: Item) -> Item:
 
 
 def recordings_in(folder: pathlib.Path) -> list[pathlib.Path]:
-    """The folders of recordings with boxes: of windows (NAME.npz and NAME.txt) or of drawn events (images/, with labels/
-    beside it or with boxes in the boxes.csv of the folder above)."""
+    """The folders of recordings with boxes: of windows (NAME.npz and NAME.txt) or of drawn events (images/, with
+    labels/ beside it or with boxes in the boxes.csv of the folder above)."""
     found = [each for each in (folder, *sorted(folder.iterdir())) if each.is_dir()
              and (any(each.glob("*.npz")) and any(each.glob("*.txt")) or
                   (each / "images").is_dir() and (each / "labels").is_dir())]
