@@ -41,6 +41,11 @@ Point mapped(const AffineMap& map, Point point) {
           map[3] * point.x + map[4] * point.y + map[5]};
 }
 
+Point mapped_edge(const AffineMap& map, Point edge) {
+  const Point at = mapped(map, {edge.x - 0.5, edge.y - 0.5});
+  return {at.x + 0.5, at.y + 0.5};
+}
+
 namespace {
 
 Point centre_of(ImageSize size) { return {(size.width - 1) / 2.0, (size.height - 1) / 2.0}; }

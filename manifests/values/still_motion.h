@@ -28,6 +28,10 @@ AffineMap inverse(const AffineMap& map);
 
 Point mapped(const AffineMap& map, Point point);
 
+/// Of a place as edges are counted, which lie half a pixel before the centre of the pixel with
+/// their number.
+Point mapped_edge(const AffineMap& map, Point edge);
+
 /// Of a still's pair, which has a motion: where a point of the frame at u of the time from the
 /// previous frame (0) to the next (1) lies in the labelled image. A point of an object moves as
 /// next = image's motion(object's motion(previous)), both about centres in the labelled image.
