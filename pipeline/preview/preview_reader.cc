@@ -119,7 +119,9 @@ struct PreviewReader::State {
     manifest = parse_job_manifest(reader->header().manifest_text, frames, file.string());
     has_events = !needs_frames(manifest.generator.kind);
     shard = file;
-    const auto is_of_clips = [](const SourceSpec& spec) { return spec.pairs.clip_frames; };
+    const auto is_of_clips = [](const SourceSpec& spec) {
+      return spec.pairs.clip_frames.has_value();
+    };
     if (has_events || std::ranges::any_of(manifest.sources, is_of_clips)) find_source();
   }
 
