@@ -55,7 +55,7 @@ const ManifestCase kSimulationCases[] = {
      {}},
     {"the rate of stills, whose job tells it",
      {{"/sources/1", R"({"path": "job.json", "method": "stills", "frames_per_second": 20})"}},
-     {R"($.sources[1].frames_per_second: expected no such key for method "stills" (only for affine, clip and difference), got 20)"}},
+     {R"($.sources[1].frames_per_second: expected no such key for method "stills" (only for affine, clip, difference), got 20)"}},
     {"a clip of one frame",
      {{"/sources/0/frame_count", "1"}},
      {"$.sources[0].frame_count: expected 0 (to the end) or at least 2 frames, since events lie "
