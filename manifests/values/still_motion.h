@@ -59,7 +59,9 @@ StillPose pose_between(const StillPose& from, const StillPose& to, double u);
 
 /// The poses of a still's clip, `frames` + 1 of them; the first is the still itself. Speeds are
 /// drawn as the motions of single pairs are; directions change slowly, and now and then a thing
-/// pauses. The image stays where clip_window sees nothing beyond it. Pure.
+/// pauses. The image stays where clip_window sees nothing beyond it. An object moves by a quarter
+/// of its size a frame at most (the root of its box's area); one that lies mostly in the box of a
+/// larger one of another class moves with that. Pure.
 std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& still,
                                   const std::vector<Box>& boxes, ImageSize image, int frames);
 

@@ -246,6 +246,8 @@ class Stills(program.InFolder):
                            generator={"kind": "difference"}, image={"width": 304, "height": 240, "preset": "mpii"},
                            output={"directory": "out", "samples_per_shard": 64})
             self.convert(job)
+            _, warned = run("preview", self.folder / "out", "--out", self.folder / "preview", "--count", "3")
+            self.assertEqual(warned, "")  # their frames are made again
             shutil.rmtree(self.folder / "rvt", ignore_errors=True)
             run("export", self.folder / "out", "--to", "rvt", "--out", self.folder / "rvt", "--progress", "none")
             sequences = sorted((self.folder / "rvt" / "preprocessed").glob("*/*"))
@@ -270,8 +272,6 @@ class Stills(program.InFolder):
     def test_simulated_clips_have_the_scenes_and_the_labels_of_converted_ones(self):
         self.photos("pennfudan", 2)
         for path in (self.folder / "photos").iterdir():
-            image = PIL.Image.open(path)
-            width, height = image.size
             path.with_suffix(".txt").write_text("0 0.5 0.5 0.25 0.5\n")
         (self.folder / "labels").mkdir()
         for path in (self.folder / "photos").glob("*.txt"):

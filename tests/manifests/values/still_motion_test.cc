@@ -216,5 +216,72 @@ TEST_F(SettleMotion, PairsOfSequencesStayAsTheyAre) {
   EXPECT_TRUE(pair.objects.empty());
 }
 
+Box outlined(int class_id, const Rectangle& box) {
+  return {.class_id = class_id,
+          .xyxy = box,
+          .outline = {{{{box.left, box.top},
+                        {box.right, box.top},
+                        {box.right, box.bottom},
+                        {box.left, box.bottom}}}}};
+}
+
+/// Poses of a clip of 100 frames of an image of 640x480.
+std::vector<StillPose> poses_of(const std::vector<Box>& boxes, std::uint64_t seed) {
+  StillsSpec spec;
+  spec.objects = ObjectMotionSpec{{6, 8}, 3, 0.04, 0};
+  return clip_poses(spec, CounterRandom(seed), boxes, {480, 640}, 100);
+}
+
+TEST(ClipPoses, ARiderGoesWithHisHorse) {
+  // A rider, half in the box of the horse; his hat, in his; one beside him, and another horse in
+  // the first one's box.
+  const std::vector<Box> boxes = {
+      outlined(0, {200, 150, 260, 260}), outlined(1, {150, 200, 350, 400}),
+      outlined(2, {220, 145, 240, 165}), outlined(0, {340, 150, 400, 260}),
+      outlined(1, {160, 210, 260, 300})};
+  int apart = 0, together = 0;
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    for (const StillPose& pose : poses_of(boxes, seed)) {
+      const auto map = [&](std::size_t k) {
+        return object_in_clip({480, 640}, pose, pose.objects[k].value(), boxes[k]);
+      };
+      for (const Point corner : {Point{150, 150}, {350, 400}}) {
+        const Point of_horse = mapped(map(1), corner);
+        for (const std::size_t k : {0u, 2u}) {
+          const Point carried = mapped(map(k), corner);
+          EXPECT_NEAR(carried.x, of_horse.x, 1e-6);
+          EXPECT_NEAR(carried.y, of_horse.y, 1e-6);
+        }
+        ++together;
+        for (const std::size_t k : {3u, 4u}) {
+          const Point other = mapped(map(k), corner);
+          apart += std::hypot(other.x - of_horse.x, other.y - of_horse.y) > 2;
+        }
+      }
+    }
+  }
+  EXPECT_GT(apart, 1.5 * together);
+}
+
+TEST(ClipPoses, WhatLooksSmallMovesSlowly) {
+  const std::vector<Box> boxes = {outlined(0, {300, 200, 308, 218}),   // 12 px
+                                  outlined(0, {100, 100, 200, 300})};  // 141 px
+  double small = 0, large = 0;
+  for (const std::uint64_t seed : {1u, 2u, 3u, 4u}) {
+    const auto poses = poses_of(boxes, seed);
+    for (std::size_t i = 1; i < poses.size(); ++i) {
+      const auto step = [&](std::size_t k) {
+        const ImageMotion &a = *poses[i - 1].objects[k], &b = *poses[i].objects[k];
+        return std::hypot(b.x_px - a.x_px, b.y_px - a.y_px);
+      };
+      small = std::max(small, step(0));
+      large = std::max(large, step(1));
+    }
+  }
+  EXPECT_NEAR(small, 3, 1e-6);
+  EXPECT_GE(large, 6);
+  EXPECT_LE(large, 8 + 1e-6);
+}
+
 }  // namespace
 }  // namespace eventgan
