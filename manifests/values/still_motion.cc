@@ -176,6 +176,42 @@ void settle_motion(const PairSpec& spec, const PairKey& key, const std::vector<B
 
 namespace {
 
+double area_of(const Rectangle& box) {
+  return std::max(box.right - box.left, 0.0) * std::max(box.bottom - box.top, 0.0);
+}
+
+double shared_area(const Rectangle& a, const Rectangle& b) {
+  return area_of({std::max(a.left, b.left), std::max(a.top, b.top), std::min(a.right, b.right),
+                  std::min(a.bottom, b.bottom)});
+}
+
+}  // namespace
+
+std::vector<std::size_t> carriers(const std::vector<Box>& boxes) {
+  constexpr double kOfAnotherClass = 0.5, kOfTheSame = 0.9;  // share of the smaller one's box
+  std::vector<std::size_t> carrier(boxes.size());
+  for (std::size_t k = 0; k < boxes.size(); ++k) {
+    carrier[k] = k;
+    double most = 0;
+    const double area = area_of(boxes[k].xyxy);
+    for (std::size_t j = 0; j < boxes.size() && moves_alone(boxes[k]); ++j) {
+      const Box& other = boxes[j];
+      if (!moves_alone(other) || !(area_of(other.xyxy) > area)) continue;
+      const double share = shared_area(boxes[k].xyxy, other.xyxy) / area;
+      const bool is_same = other.class_id == boxes[k].class_id;
+      if (share <= most || share < (is_same ? kOfTheSame : kOfAnotherClass)) continue;
+      most = share;
+      carrier[k] = j;
+    }
+  }
+  for (std::size_t& last : carrier) {
+    while (carrier[last] != last) last = carrier[last];  // each is larger than the one before
+  }
+  return carrier;
+}
+
+namespace {
+
 /// How far a path leads from its start before it turns back.
 struct PathLimits {
   double radius_px;
@@ -258,40 +294,6 @@ ImageMotion held(const ImageMotion& motion, ImageSize image) {
     }
   }
   return {};
-}
-
-double area_of(const Rectangle& box) {
-  return std::max(box.right - box.left, 0.0) * std::max(box.bottom - box.top, 0.0);
-}
-
-double shared_area(const Rectangle& a, const Rectangle& b) {
-  return area_of({std::max(a.left, b.left), std::max(a.top, b.top), std::min(a.right, b.right),
-                  std::min(a.bottom, b.bottom)});
-}
-
-/// With which object each one moves: with a larger one of another class in whose box most of it
-/// lies, as a rider with his horse and a bag with who carries it; else with itself.
-std::vector<std::size_t> carriers(const std::vector<Box>& boxes) {
-  constexpr double kMost = 0.5;
-  std::vector<std::size_t> carrier(boxes.size());
-  for (std::size_t k = 0; k < boxes.size(); ++k) {
-    carrier[k] = k;
-    double most = kMost;
-    const double area = area_of(boxes[k].xyxy);
-    for (std::size_t j = 0; j < boxes.size(); ++j) {
-      const Box& other = boxes[j];
-      if (!moves_alone(other) || other.class_id == boxes[k].class_id) continue;
-      if (!(area_of(other.xyxy) > area)) continue;
-      const double share = shared_area(boxes[k].xyxy, other.xyxy) / area;
-      if (share <= most) continue;
-      most = share;
-      carrier[k] = j;
-    }
-  }
-  for (std::size_t& last : carrier) {
-    while (carrier[last] != last) last = carrier[last];  // each is larger than the one before
-  }
-  return carrier;
 }
 
 /// The motion about `centre` that is `motion` about `about`.

@@ -132,6 +132,7 @@ struct Still {
   std::vector<Box> boxes;  ///< its, with outlines of the objects that were cut out, too
   ImageSize size;
   OutlineCounts outlines;
+  std::vector<std::size_t> carriers;  ///< of `boxes`
 };
 
 /// The labels of one frame.
@@ -140,6 +141,7 @@ class FrameLabels {
   FrameLabels(const Still& still, const Frame& frame)
       : still_(still.annotation),
         boxes_(still.boxes),
+        carriers_(still.carriers),
         image_{0, 0, double(still.size.width), double(still.size.height)},
         frame_(frame),
         owner_(frame.size().pixel_count(), kNobody) {}
@@ -179,7 +181,7 @@ class FrameLabels {
       if (mask.pixels[i] == 0) continue;
       if (owner_[i] == kNobody) {
         owner_[i] = k;
-      } else {
+      } else if (carriers_[owner_[i]] != carriers_[k]) {  // else it is as it was in the still
         mask.pixels[i] = 0;
       }
     }
@@ -252,7 +254,8 @@ class FrameLabels {
       any_inside = true;
       const std::size_t owner =
           owner_[static_cast<std::size_t>(y) * frame_.size().width + static_cast<std::size_t>(x)];
-      const bool is_covered = owner != kNobody && owner != object && is_nearer(owner, person);
+      const bool is_covered =
+          owner != kNobody && !goes_with(object, owner) && is_nearer(owner, person);
       if (is_covered && joint.visible == 1) joint.visible = 0;
     }
     if (!any_inside) return;
@@ -266,12 +269,18 @@ class FrameLabels {
     moved.persons.push_back(std::move(person));
   }
 
+  /// Whether they move as one, so that one hides of the other what it did in the still.
+  bool goes_with(std::size_t object, std::size_t owner) const {
+    return object != kNobody && carriers_[object] == carriers_[owner];
+  }
+
   bool is_nearer(std::size_t k, const Person& person) const {
     return person.box && still_.boxes[k].xyxy.bottom > person.box->bottom;
   }
 
   const Annotation& still_;
-  const std::vector<Box>& boxes_;  ///< as Still's
+  const std::vector<Box>& boxes_;  ///< as Still's, and
+  const std::vector<std::size_t>& carriers_;
   Rectangle image_;
   const Frame& frame_;
   std::vector<std::size_t> owner_;  ///< of the frame's pixels: the nearest object there
@@ -389,7 +398,7 @@ class StillClips final : public WrappedDataset {
     if (is_fault(annotation)) return annotation.fault();
     const Outcome<ImageSize> size = size_of(frame);
     if (is_fault(size)) return size.fault();
-    Still still{std::move(*annotation), {}, *size, {}};
+    Still still{std::move(*annotation), {}, *size, {}, {}};
     still.boxes = still.annotation.boxes;
     if (!spec_.pairs.stills.value().objects) return still;
     const auto has_no_outline = [](const Box& box) { return !box.ignore && box.outline.empty(); };
@@ -401,6 +410,7 @@ class StillClips final : public WrappedDataset {
       image = std::move(*decoded);
     }
     still.outlines = cut_out_missing({image.size, image.bgr.data()}, still.boxes);
+    still.carriers = carriers(still.boxes);
     return still;
   }
 

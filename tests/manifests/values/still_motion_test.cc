@@ -1,5 +1,6 @@
 #include "manifests/values/still_motion.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -238,7 +239,7 @@ TEST(ClipPoses, ARiderGoesWithHisHorse) {
   const std::vector<Box> boxes = {
       outlined(0, {200, 150, 260, 260}), outlined(1, {150, 200, 350, 400}),
       outlined(2, {220, 145, 240, 165}), outlined(0, {340, 150, 400, 260}),
-      outlined(1, {160, 210, 260, 300})};
+      outlined(1, {120, 210, 220, 300})};
   int apart = 0, together = 0;
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
     for (const StillPose& pose : poses_of(boxes, seed)) {
@@ -261,6 +262,22 @@ TEST(ClipPoses, ARiderGoesWithHisHorse) {
     }
   }
   EXPECT_GT(apart, 1.5 * together);
+}
+
+TEST(Carriers, AreLargerAndHoldMostOfABox) {
+  using ::testing::ElementsAre;
+  EXPECT_TRUE(carriers({}).empty());
+  const Box large = outlined(0, {0, 0, 100, 100});
+  EXPECT_THAT(carriers({large, outlined(1, {50, 50, 70, 90}), outlined(1, {90, 0, 110, 40}),
+                        outlined(1, {91, 0, 111, 40})}),
+              ElementsAre(0, 0, 0, 3));
+  EXPECT_THAT(carriers({outlined(0, {92, 0, 112, 40}), large, outlined(0, {50, 50, 70, 90}),
+                        outlined(0, {81, 0, 101, 40}), outlined(0, {0, 0, 100, 100})}),
+              ElementsAre(0, 1, 1, 1, 4));
+  Box ignored = large, without = large;
+  ignored.ignore = true;
+  without.outline = {};
+  EXPECT_THAT(carriers({ignored, without, outlined(1, {50, 50, 70, 90})}), ElementsAre(0, 1, 2));
 }
 
 TEST(ClipPoses, WhatLooksSmallMovesSlowly) {

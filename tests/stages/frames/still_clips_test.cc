@@ -328,6 +328,23 @@ TEST_F(CutOutClips, TheBoxIsTheLabelsWhereNothingMoves) {
   EXPECT_EQ(annotation.boxes[0].xyxy, (Rectangle{41, 26, 77, 66}));  // 20 and 15 px less
 }
 
+TEST_F(StillClipsTest, ARiderIsAsVisibleOnHisHorseAsInTheStill) {
+  pairs().stills->rests = 1;
+  pairs().stills->objects = ObjectMotionSpec{{0.5, 0.8}, 3, 0.04, 0};
+  still_.boxes = {still_object({70, 40, 90, 60}), still_object({55, 40, 105, 85})};
+  still_.boxes[0].class_id = 1;
+  still_.persons.resize(1);
+  still_.persons[0].box = still_.boxes[0].xyxy;
+  still_.persons[0].joints = {{{80, 50}, 1}};
+  const Dataset& dataset = open();
+  for (const LabelledFrame& labelled : dataset.labelled_frames()) {
+    const Annotation annotation = *dataset.annotation(labelled.label_key);
+    ASSERT_EQ(annotation.boxes.size(), 2u) << labelled.sample_id;
+    EXPECT_EQ(annotation.boxes[0].occlusion, 0);
+    EXPECT_EQ(annotation.persons.at(0).joints[0].visible, 1);
+  }
+}
+
 TEST_F(StillClipsTest, ThereIsNothingToBeMadeOfOtherSources) {
   pairs().clip_frames.reset();
   const Dataset& dataset = open();
