@@ -19,10 +19,17 @@ enum class SimulationMethod {
   kDifference  ///< log intensity moves on a line from each frame to the next
 };
 
+/// What a recording is written as, and the ending of its file.
+enum class SimulatedFile {
+  kHdf5,    ///< MVSEC's layout: events, frames, flow
+  kAedat4,  ///< AEDAT 4.0: events and frames
+  kRaw      ///< Prophesee's RAW, EVT 3.0: events
+};
+
 /// A clip (a video, a folder of images) and how recordings are made of it.
 struct SimulationSource {
   std::string path;  ///< as written in the manifest
-  std::string name;  ///< the recording's file name without ".hdf5"; default: the path's stem
+  std::string name;  ///< the recording's file name without its ending; default: the path's stem
   SimulationMethod method = SimulationMethod::kClip;
   std::optional<double> frames_per_second;  ///< default: the video's, 30 for images
   std::int64_t first_frame = 0;
@@ -43,8 +50,10 @@ struct SimulationManifest : ManifestOrigin {
                                   ///< cut around the centre. None: the frames' own size
   SensorSpec sensor;
   std::string output_directory;
+  SimulatedFile file = SimulatedFile::kHdf5;
 };
 
 std::string_view to_string(SimulationMethod method);
+std::string_view to_string(SimulatedFile file);
 
 }  // namespace eventgan
