@@ -856,7 +856,7 @@ class BadInput(Export):
                                   ("davis", "--seed", "1"), ("mpii", "--classes", "x"), ("dsec", "--ignored", "keep"),
                                   ("rvt", "--full-scale", "2"), ("webdataset", "--full-scale", "2")]:
             _, err = self.export(to, option, value, expect=64)
-            self.assertRegex(err, rf"{option}: expected --to [a-z ,-]+, got --to {to}\n")
+            self.assertRegex(err, rf"{option}: expected --to [a-z0-9 ,-]+, got --to {to}\n")
         _, err = self.export("mpii", "--split", "val", expect=64)
         self.assertIn("can use", err)
         self.assertFalse(self.out.exists())
