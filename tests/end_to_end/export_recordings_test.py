@@ -365,6 +365,28 @@ class Recordings(Export):
                                     f"{time // 100_000:06d}.png") as image:
                     np.testing.assert_array_equal(pixels, image)
 
+    def test_aedat4_has_frames_in_colour_and_none_of_clips_made_of_stills(self):
+        images = np.random.default_rng(5).integers(0, 256, (2, small_job.HEIGHT, small_job.WIDTH, 3), dtype=np.uint8)
+        (self.out.parent / "clip").mkdir(parents=True)
+        for k, image in enumerate(images):
+            PIL.Image.fromarray(image).save(self.out.parent / "clip" / f"{k}.png")
+        source = {"dataset": "frames", "root": "clip"}
+        self.export("aedat4", source=self.converted(source))
+        _, _, frames = aedat4.read(self.out / "aedat4" / "train" / "clip.aedat4")
+        self.assertEqual([time for time, _ in frames], [0, 1_000_000])
+        np.testing.assert_array_equal([pixels[..., ::-1] for _, pixels in frames], images)
+
+        shutil.rmtree(self.out.parent / "out")
+        stills = self.converted({**source, "pairs": {"from": "stills", "frames": 4}}, errors=small_job.LENIENT)
+        self.export("aedat4", source=stills, out=self.out.parent / "stills")
+        count = len(self.described(self.out.parent / "stills")["samples"])
+        self.assertGreater(count, 0)
+        self.assertEqual(self.described(self.out.parent / "stills")["left_out"],
+                         {"samples' frames, made of a still (not stored)": count})
+        for path in (self.out.parent / "stills" / "aedat4" / "train").glob("*.aedat4"):
+            _, (t, *_), frames = aedat4.read(path)
+            self.assertTrue(len(t) > 0 and not frames)
+
     def test_aedat4_wants_the_frames(self):
         frames = self.converted_frames("", range(4))
         moved = self.out.parent / "elsewhere"
