@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
-#include "manifests/values/job.h"
 #include "pipeline/exports/detail/recordings.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/preview/preview_reader.h"
@@ -72,11 +71,6 @@ class FrameReaders {
   std::vector<std::unique_ptr<Reader>> free_;
 };
 
-bool is_of_made_clip(const OutgoingSample& sample) {
-  const DatasetRow* const dataset = find_dataset(sample.source.dataset);
-  return dataset != nullptr && !dataset->has_events && is_of_made_clip(sample.labels.pair);
-}
-
 /// aedat4/SPLIT/RECORDING.aedat4, and of sources with boxes RECORDING_bbox.npy beside it. Times are
 /// on the sequence's clock; a pair's frames are at the begin and the end of its window.
 class Aedat4Exporter : public RecordingsExporter {
@@ -91,14 +85,8 @@ class Aedat4Exporter : public RecordingsExporter {
     require_sides(input, check_stop, Aedat4Writer::kLargestSide, "aedat4");
   }
 
-  void account(const OutgoingSample& sample, LeftOut& left_out) const override {
-    RecordingsExporter::account(sample, left_out);
-    if (is_of_made_clip(sample)) ++left_out["samples' frames, made of a still (not stored)"];
-  }
-
  private:
   void keep_more(const OutgoingSample& sample, RecordedSample& recorded) const override {
-    if (is_of_made_clip(sample)) return;
     recorded.frames = readers_.frames(folder_ / sample.shard.outline.name, sample.slot);
   }
 

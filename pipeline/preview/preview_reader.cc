@@ -91,12 +91,6 @@ std::vector<std::uint8_t> frame_image(const Outcome<ColourFrame>& decoded, const
 
 }  // namespace
 
-bool is_of_made_clip(const FramePair& pair) {
-  return !pair.motion && pair.previous.path == pair.next.path &&
-         pair.previous.video_frame == pair.next.video_frame &&
-         pair.previous.index != pair.next.index;
-}
-
 struct PreviewReader::State {
   fs::path frames;
   std::vector<std::string>& warnings;
@@ -175,11 +169,16 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
   const DatasetRow* const dataset = find_dataset(header.dataset);
   const ImageOrientation orientation =
       dataset == nullptr ? ImageOrientation::kStored : orientation_of(dataset->value);
-  const bool is_made = !state_->has_events && is_of_made_clip(sample.pair);
+  // Of a clip (PairSpec::clip_frames) the shard has no poses.
+  const FramePair& frames = sample.pair;
+  const bool is_made = !state_->has_events && !frames.motion &&
+                       frames.previous.path == frames.next.path &&
+                       frames.previous.video_frame == frames.next.video_frame &&
+                       frames.previous.index != frames.next.index;
   if (is_made) {
     state_->warnings.push_back("expected stored frames, got those of a clip made of " +
-                               sample.pair.next.path + ", which are not shown (" +
-                               sample.sample_id + ")");
+                               frames.next.path + ", which are not shown (" + sample.sample_id +
+                               ")");
   }
   const auto frame = [&](const FrameRef& which) {
     // Of events there may be no frames, or none yet.

@@ -5,14 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "manifests/values/frames.h"
 #include "stages/events/images/preview_image.h"
 
 namespace eventgan {
-
-/// Whether a pair, of a dataset of frames, is of a clip made of a still (PairSpec::clip_frames): of
-/// these a shard has no poses, so that they are not shown.
-bool is_of_made_clip(const FramePair& pair);
 
 /// Reads samples as images show them.
 class PreviewReader {
