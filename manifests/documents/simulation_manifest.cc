@@ -92,6 +92,9 @@ void check_names(const std::vector<StrictValue>& elements,
 void list_simulation_output(Fields& fields, SimulationManifest& manifest) {
   fields.at("directory", manifest.output_directory, paths(),
             "Folder of the recordings; made if it is absent.");
+  fields.find("format", manifest.file, words(kSimulatedFileWords),
+              "hdf5: events, frames and flow in MVSEC's layout. aedat4: events and frames as AEDAT "
+              "4.0, for DV's viewer. raw: events as Prophesee's RAW files, EVT 3.0.");
 }
 
 }  // namespace

@@ -20,11 +20,18 @@ enum class SimulationMethod {
   kStills       ///< clips made of stills: layers move on their own
 };
 
+/// What a recording is written as, and the ending of its file.
+enum class SimulatedFile {
+  kHdf5,    ///< MVSEC's layout: events, frames, flow
+  kAedat4,  ///< AEDAT 4.0: events and frames
+  kRaw      ///< Prophesee's RAW, EVT 3.0: events
+};
+
 /// A clip (a video, a folder of images) and how recordings are made of it; with kStills the
 /// manifest of a job of `convert`, and its clips.
 struct SimulationSource {
   std::string path;  ///< as written in the manifest
-  std::string name;  ///< the recording's file name without ".hdf5"; default: the path's stem
+  std::string name;  ///< the recording's file name without its ending; default: the path's stem
   SimulationMethod method = SimulationMethod::kClip;
   std::optional<double> frames_per_second;  ///< default: the video's, 30 for images; not of kStills
   std::int64_t first_frame = 0;             ///< of kStills, as the next two: of the stills
@@ -45,8 +52,10 @@ struct SimulationManifest : ManifestOrigin {
                                   ///< cut around the centre. None: the frames' own size
   SensorSpec sensor;
   std::string output_directory;
+  SimulatedFile file = SimulatedFile::kHdf5;
 };
 
 std::string_view to_string(SimulationMethod method);
+std::string_view to_string(SimulatedFile file);
 
 }  // namespace eventgan

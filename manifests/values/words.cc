@@ -28,6 +28,7 @@ std::string_view to_string(ErrorPolicy policy) { return word_of(kPolicyWords, po
 std::string_view to_string(SimulationMethod method) {
   return word_of(kSimulationMethodWords, method);
 }
+std::string_view to_string(SimulatedFile file) { return word_of(kSimulatedFileWords, file); }
 
 std::string_view to_string(RecordingFormat format) {
   return word_of(kRecordingFormatWords, format);

@@ -107,6 +107,11 @@ inline constexpr std::array kSimulationMethodWords{
     Word<SimulationMethod>{"difference", SimulationMethod::kDifference},
     Word<SimulationMethod>{"stills", SimulationMethod::kStills}};
 
+inline constexpr std::array kSimulatedFileWords{
+    Word<SimulatedFile>{"hdf5", SimulatedFile::kHdf5},
+    Word<SimulatedFile>{"aedat4", SimulatedFile::kAedat4},
+    Word<SimulatedFile>{"raw", SimulatedFile::kRaw}};
+
 // The training manifest's words, in the order in which messages list them.
 
 inline constexpr auto kRecordingFormatWords = words_of(kRecordingFormats);

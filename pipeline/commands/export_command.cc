@@ -133,6 +133,9 @@ void add_export_command(CLI::App& app, int& exit_code) {
       "frames a second of images whose times are not known; default: 1")
       ->check(CLI::Range(1e-3, 1e6))
       ->option_text("NUMBER");
+  add("--frames", options.frames,
+      "the manifest's folder, which frame paths are relative to; default: as recorded by convert")
+      ->option_text("DIR");
   add("--seed", options.seed, "random seed; default: 0")->option_text("NUMBER");
   add_threads_option(*command, options.threads);
   command->add_flag("--overwrite", options.overwrite, "Replace an earlier export in FOLDER");

@@ -19,7 +19,7 @@ namespace {
 class DsecExporter : public RecordingsExporter {
  public:
   DsecExporter(const ExportInput& input, const ExportOptions& options)
-      : RecordingsExporter(input, options, /*keeps_volumes=*/false) {
+      : RecordingsExporter(input, options) {
     constexpr int kMost = std::numeric_limits<std::uint8_t>::max();
     if (numbers() != nullptr && !numbers()->names().empty() &&
         numbers()->names().rbegin()->first > kMost) {

@@ -16,11 +16,13 @@ ExportFormat events_format();
 ExportFormat dsec_format();
 ExportFormat rvt_format();
 ExportFormat raw_format();
+ExportFormat aedat4_format();
 
 const std::vector<ExportFormat>& export_formats() {
   static const std::vector<ExportFormat> kFormats = {
-      yolo_format(),       yolo_seg_format(), coco_format(), mpii_format(), davis_format(),
-      webdataset_format(), events_format(),   dsec_format(), rvt_format(),  raw_format()};
+      yolo_format(),  yolo_seg_format(),   coco_format(),   mpii_format(),
+      davis_format(), webdataset_format(), events_format(), dsec_format(),
+      rvt_format(),   raw_format(),        aedat4_format()};
   return kFormats;
 }
 

@@ -56,6 +56,7 @@ class ExportInput {
   /// UsageError for a split that it does not have.
   ExportInput(const std::filesystem::path& folder, const std::vector<std::string>& splits);
 
+  const std::filesystem::path& folder() const { return folder_; }
   const std::string& name() const { return name_; }
   const std::string& plan_hash() const { return plan_hash_; }
   /// What tells this job from others of its name: a hash of its sources as the manifest names them.

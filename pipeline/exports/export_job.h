@@ -56,6 +56,7 @@ struct ExportOptions {
   StoredType dtype = StoredType::kFloat16;  ///< or kFloat32
   EventCounts counts = EventCounts::kPoisson;
   EventFile event_file = EventFile::kText;
+  std::filesystem::path frames;  ///< where frame paths start; empty: as recorded by convert
   double frames_per_second = 1;  ///< of images whose times are not known, 1e-3..1e6
   std::uint64_t seed = 0;
   bool overwrite = false;

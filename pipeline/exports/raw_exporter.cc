@@ -1,11 +1,7 @@
-#include <fmt/core.h>
-
-#include <algorithm>
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "manifests/values/faults.h"
 #include "pipeline/exports/detail/recordings.h"
 #include "stages/recordings/evt3_writer.h"
 
@@ -16,18 +12,10 @@ namespace {
 /// from the recording's begin, as those of Prophesee's programs do.
 class RawExporter : public RecordingsExporter {
  public:
-  RawExporter(const ExportInput& input, const ExportOptions& options)
-      : RecordingsExporter(input, options, /*keeps_volumes=*/false) {}
+  using RecordingsExporter::RecordingsExporter;
 
   void check(const ExportInput& input, const std::function<void()>& check_stop) const override {
-    for (const ExportShard& shard : input.shards()) {
-      check_stop();
-      const ImageSize size = input.open(shard).header().volume.size;
-      if (std::max(size.width, size.height) <= Evt3Writer::kLargestSide) continue;
-      throw UsageError(fmt::format(
-          "expected volumes of at most {} pixels a side for --to raw, got {} (--to dsec has them)",
-          Evt3Writer::kLargestSide, to_string(size)));
-    }
+    require_sides(input, check_stop, Evt3Writer::kLargestSide, "raw");
   }
 
  private:

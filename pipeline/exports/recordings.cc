@@ -181,9 +181,8 @@ std::vector<Event> drawn_events(const OutgoingSample& sample, const ExportOption
                        options.counts, key.pair());
 }
 
-RecordingsExporter::RecordingsExporter(const ExportInput& input, const ExportOptions& options,
-                                       bool keeps_volumes)
-    : options_(options), keeps_volumes_(keeps_volumes) {
+RecordingsExporter::RecordingsExporter(const ExportInput& input, const ExportOptions& options)
+    : options_(options) {
   if (std::ranges::any_of(input.sources(), &ExportSource::has_boxes)) {
     numbers_ = std::make_unique<ClassNumbers>(input, options, 0);
   } else if (options.classes) {
@@ -200,7 +199,7 @@ std::string RecordingsExporter::settings() const {
 
 RecordedSample RecordingsExporter::recorded(const OutgoingSample& sample,
                                             const SampleWindow& window) const {
-  RecordedSample result{sample.labels.sample_id, {}, {}, {}};
+  RecordedSample result{sample.labels.sample_id, {}, {}, {}, {}};
   const std::int64_t length_us = window.end_us - window.begin_us;
   const auto events =
       drawn_events(sample, options_, static_cast<double>(length_us) / kMicroseconds);
@@ -220,7 +219,7 @@ RecordedSample RecordingsExporter::recorded(const OutgoingSample& sample,
     };
     for_each_box(sample, *numbers_, /*keep_ignored=*/false, take, [](const std::string&) {});
   }
-  if (keeps_volumes_) result.volume = sample.reader.volume(sample.slot);
+  keep_more(sample, result);
   return result;
 }
 
@@ -330,6 +329,18 @@ std::vector<std::string> RecordingsExporter::notes() const {
                   "(--frames-per-second)",
                   count_text(untimed_, "sample"), options_.frames_per_second,
                   options_.frames_per_second == 1 ? "frame" : "frames")};
+}
+
+void require_sides(const ExportInput& input, const std::function<void()>& check_stop, int most,
+                   std::string_view word) {
+  for (const ExportShard& shard : input.shards()) {
+    check_stop();
+    const ImageSize size = input.open(shard).header().volume.size;
+    if (std::max(size.width, size.height) <= most) continue;
+    throw UsageError(fmt::format(
+        "expected volumes of at most {} pixels a side for --to {}, got {} (--to dsec has them)",
+        most, word, to_string(size)));
+  }
 }
 
 void number_tracks(std::vector<RecordedBox>& boxes, const OutgoingRecording& recording) {

@@ -47,8 +47,7 @@ std::vector<std::uint16_t> negative_first(const std::vector<float>& volume) {
 /// Times count from the recording's begin.
 class RvtExporter : public RecordingsExporter {
  public:
-  RvtExporter(const ExportInput& input, const ExportOptions& options)
-      : RecordingsExporter(input, options, /*keeps_volumes=*/true) {}
+  using RecordingsExporter::RecordingsExporter;
 
   void account(const OutgoingSample& sample, LeftOut& left_out) const override {
     RecordingsExporter::account(sample, left_out);
@@ -70,6 +69,10 @@ class RvtExporter : public RecordingsExporter {
     };
     for_each_box(sample, *numbers(), /*keep_ignored=*/false, take, [](const std::string&) {});
     return is_any_left;
+  }
+
+  void keep_more(const OutgoingSample& sample, RecordedSample& recorded) const override {
+    recorded.volume = sample.reader.volume(sample.slot);
   }
 
   void write_recording(const OutgoingRecording& recording, const ForEachSample& for_each,

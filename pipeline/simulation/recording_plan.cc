@@ -1,5 +1,7 @@
 #include "pipeline/simulation/recording_plan.h"
 
+#include <fmt/core.h>
+
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
 
@@ -7,14 +9,11 @@
 #include "manifests/documents/manifest_fields.h"
 #include "manifests/documents/plan.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/words.h"
 #include "pipeline/planning/fingerprint.h"
-#include "stages/base/files/input_file.h"
-#include "stages/base/hdf5/detail/hdf5.h"
 
 namespace eventgan {
 namespace {
-
-constexpr char kSettingsAttribute[] = "simulation";
 
 nlohmann::json source_json(const SimulationSource& source) {
   nlohmann::json json = {{"path", source.path}, {"method", to_string(source.method)}};
@@ -49,20 +48,6 @@ std::string recording_settings(const SimulationManifest& manifest, const Simulat
     json["size"] = {{"width", manifest.size->width}, {"height", manifest.size->height}};
   }
   return dump_json(json);
-}
-
-std::optional<std::string> settings_on_disk(const std::filesystem::path& file) {
-  if (!std::filesystem::exists(file)) return std::nullopt;
-  require_regular_file(file);
-  const Hdf5Lock lock;
-  try {
-    return read_text_attribute(open_hdf5_file(file), kSettingsAttribute);
-  } catch (const Hdf5Error&) {
-    std::throw_with_nested(
-        InputError("expected no file, or a recording that eventgan simulate has written, got "
-                   "another file, in " +
-                   file.string() + " (choose another output folder, or remove it yourself)"));
-  }
 }
 
 void check_same_clip(const std::filesystem::path& file, const std::string& found,
@@ -113,7 +98,7 @@ std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest
                        std::int64_t frame_count) {
     std::optional<std::int64_t> number;
     if (position) number = clip.number(*position);
-    recordings.push_back({name, folder / (name + ".hdf5"),
+    recordings.push_back({name, folder / fmt::format("{}.{}", name, to_string(manifest.file)),
                           recording_settings(manifest, source, name, clip.files_hash(), number),
                           position, frame_count});
   };

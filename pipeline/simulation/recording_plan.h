@@ -13,7 +13,7 @@
 namespace eventgan {
 
 /// Everything that decides a recording's bytes, as JSON: program, seed, name, source, the clip's
-/// files, sensor. It is in the recording as the attribute `simulation`, says where a recording
+/// files, sensor. It is in the recording as `simulation`, says where a recording
 /// came from, and tells whether an existing one is what a job would make. What the manifest says of
 /// other recordings is left out, so that they may change.
 ///
@@ -22,10 +22,6 @@ namespace eventgan {
 std::string recording_settings(const SimulationManifest& manifest, const SimulationSource& source,
                                const std::string& recording, const std::string& files_hash,
                                std::optional<std::int64_t> image, const std::string& still = "");
-
-/// The settings that a recording on disk was made with; none if there is no such file. Throws
-/// InputError if it is no recording of a simulation. Thread safe.
-std::optional<std::string> settings_on_disk(const std::filesystem::path& file);
 
 /// Throws UsageError if the recording with the settings `found` was made of another clip than one
 /// with `expected` would be: it is somebody else's.
@@ -38,7 +34,7 @@ void check_same_settings(const std::filesystem::path& file, const std::string& f
 
 /// A recording that a source gives.
 struct PlannedRecording {
-  std::string name;  ///< and random key; the file is NAME.hdf5
+  std::string name;  ///< and random key; the file is NAME with the ending of its format
   std::filesystem::path file;
   std::string settings;  ///< recording_settings()
   /// kAffine: position of its image among the clip's frames; kStills: of its clip.

@@ -17,6 +17,7 @@
 #include "pipeline/runtime/memory.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/simulation/clip_frames.h"
+#include "pipeline/simulation/recording_output.h"
 #include "pipeline/simulation/recording_plan.h"
 #include "pipeline/simulation/scene.h"
 #include "pipeline/simulation/still_scenes.h"
@@ -25,7 +26,6 @@
 #include "stages/base/files/unfinished_files.h"
 #include "stages/events/simulation/sensor.h"
 #include "stages/events/simulation/simulate_pair.h"
-#include "stages/recordings/mvsec_writer.h"
 
 namespace eventgan {
 namespace {
@@ -53,9 +53,9 @@ RecordingSummary record(Scene& scene, const SensorSpec& spec, CounterRandom rand
   RecordingSummary summary;
   summary.name = file.stem().string();
   summary.pixels = static_cast<std::int64_t>(size.pixel_count());
-  MvsecWriter writer(file, size, settings);
+  const auto writer = open_recording_output(file, size, settings);
   const auto add_frame = [&](const FlowField* flow) {
-    writer.add_frame(scene.frame(), scene.time_s(), flow);
+    writer->add_frame(scene.frame(), scene.time_s(), flow);
     ++summary.frames;
     on_frame();
   };
@@ -68,7 +68,7 @@ RecordingSummary record(Scene& scene, const SensorSpec& spec, CounterRandom rand
     check_events_fit(spec, size, scene.time_s() - from_s, memory_limit_bytes());
     std::vector<Event> events;
     feed_interval(sensor, *interval, from_s, scene.time_s(), events);
-    writer.add_events(events);
+    writer->add_events(events);
     std::optional<FlowField> flow;
     if (scene.has_flow()) {
       FlowDisplacement moved = interval->flow();
@@ -79,7 +79,7 @@ RecordingSummary record(Scene& scene, const SensorSpec& spec, CounterRandom rand
     summary.events += std::ssize(events);
     summary.duration_s += scene.time_s() - std::exchange(from_s, scene.time_s());
   }
-  writer.commit();
+  writer->commit();
   return summary;
 }
 

@@ -44,8 +44,9 @@ std::string to_text(const SimulationReport& report);
 std::string to_json(const SimulationReport& report);
 
 /// Lets a sensor look at a scene to its end and writes frames, events and flows as a recording
-/// (MvsecWriter), which appears under its name when it is whole. `on_frame` is called after each
-/// frame. Throws what scene, sensor and writer throw. Thread safe for different scenes and files.
+/// (open_recording_output), which appears under its name when it is whole. `on_frame` is called
+/// after each frame. Throws what scene, sensor and writer throw. Thread safe for different scenes
+/// and files.
 RecordingSummary record(Scene& scene, const SensorSpec& sensor, CounterRandom random,
                         const std::filesystem::path& file, const std::string& settings,
                         const std::function<void()>& on_frame);

@@ -2,18 +2,24 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <stdexcept>
+#include <string_view>
+
+#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 namespace {
 
 constexpr std::size_t kBytesAtOnce = 1 << 16;
 constexpr int kLowBits = 12;
+constexpr std::string_view kSettings = "% simulation ";
 enum WordType : unsigned { kRow = 0x0, kColumn = 0x2, kTimeLow = 0x6, kTimeHigh = 0x8 };
 
 }  // namespace
 
-Evt3Writer::Evt3Writer(const std::filesystem::path& file, ImageSize size)
+Evt3Writer::Evt3Writer(const std::filesystem::path& file, ImageSize size,
+                       const std::string& settings)
     : file_(file), size_(size) {
   if (size.height < 1 || size.width < 1 || size.height > kLargestSide ||
       size.width > kLargestSide) {
@@ -29,8 +35,10 @@ Evt3Writer::Evt3Writer(const std::filesystem::path& file, ImageSize size)
       "% geometry {1}x{0}\n"
       "% plugin_integrator_name Prophesee\n"
       "% plugin_name hal_plugin_prophesee\n"
+      "{2}{3}{4}"
       "% end\n",
-      size.height, size.width);
+      size.height, size.width, settings.empty() ? "" : kSettings, settings,
+      settings.empty() ? "" : "\n");
 }
 
 void Evt3Writer::add_events(std::span<const StampedEvent> events) {
@@ -49,6 +57,18 @@ void Evt3Writer::commit(std::int64_t end_us) {
   go_to(end_us);
   write_if_full(0);
   file_.publish();
+}
+
+std::optional<std::string> evt3_settings(const std::filesystem::path& path) {
+  const InputFile file(path);
+  const std::string start = file.read(0, std::min<std::uint64_t>(file.size_bytes(), kBytesAtOnce));
+  for (std::size_t at = 0; at < start.size() && start[at] == '%';) {
+    const std::size_t end = std::min(start.find('\n', at), start.size());
+    const std::string_view line = std::string_view(start).substr(at, end - at);
+    if (line.starts_with(kSettings)) return std::string(line.substr(kSettings.size()));
+    at = end + 1;
+  }
+  return std::nullopt;
 }
 
 void Evt3Writer::go_to(std::int64_t t_us) {

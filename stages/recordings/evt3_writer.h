@@ -27,9 +27,10 @@ class Evt3Writer {
  public:
   static constexpr int kLargestSide = 2048;
 
+  /// `settings`: a line of text, kept in the header as `simulation`; none if empty.
   /// Throws std::invalid_argument for a size that is empty, or beyond 2048 pixels a side, which the
   /// words do not hold.
-  Evt3Writer(const std::filesystem::path& file, ImageSize size);
+  Evt3Writer(const std::filesystem::path& file, ImageSize size, const std::string& settings = "");
 
   /// Events in time order over all calls, within the size, their times from 0 on. Throws
   /// std::invalid_argument if these rules are broken; then nothing was added.
@@ -51,5 +52,9 @@ class Evt3Writer {
   std::int64_t high_ = -1;
   std::optional<std::int64_t> low_, y_;
 };
+
+/// The settings that a writer was given for this file; none if it is no such file. Throws
+/// InputError if it cannot be read. Thread safe.
+std::optional<std::string> evt3_settings(const std::filesystem::path& file);
 
 }  // namespace eventgan

@@ -1,4 +1,5 @@
-"""Exports of whole recordings, DSEC's and RVT's, read as these read them: with numpy and h5py."""
+"""Exports of whole recordings, DSEC's, RVT's, Prophesee's and DV's, read as these read them: with numpy and h5py, or
+as their pages describe the bytes."""
 
 import json
 import pathlib
@@ -9,6 +10,7 @@ import h5py
 import numpy as np
 import PIL.Image
 
+import aedat4
 import exported_demo as demo
 import program
 import small_job
@@ -191,25 +193,32 @@ class Recordings(Export):
                          sum((s["boxes"]["ignore"] == 1).sum() for s in self.samples.values()))
         self.assertEqual(len(self.described()["quarantined"]), 6)
 
-    def test_frames_without_times_are_a_second_each(self):
-        root = self.out.parent / "frames"
-        for k in (3, 4, 5, 6):
-            small_job.save_image(root / "a b" / f"{k:04d}.png", np.random.default_rng(k))
+    def converted(self, source, **changes):
+        """The finalized folder of a job of one source."""
         manifest = self.out.parent / "manifest.json"
-        manifest.write_text(
-            json.dumps(program.manifest([{"dataset": "frames", "root": str(root), "pairs": program.pairs([1])}],
-                                        generator={"kind": "difference"})))
+        manifest.write_text(json.dumps(program.manifest([{"pairs": program.pairs([1]), **source}],
+                                                        generator={"kind": "difference"}, **changes)))
         run("convert", manifest, "--progress", "none")
         run("finalize", manifest.parent / "out")
-        said, _ = self.export("dsec", source=manifest.parent / "out")
+        return manifest.parent / "out"
+
+    def converted_frames(self, sequence, numbers, **source):
+        """The same of images of these numbers, in a folder `sequence` of the source's, or in it."""
+        for k in numbers:
+            small_job.save_image(self.out.parent / "clip" / sequence / f"{k:04d}.png", np.random.default_rng(k))
+        return self.converted({"dataset": "frames", "root": "clip", **source})
+
+    def test_frames_without_times_are_a_second_each(self):
+        frames = self.converted_frames("a b", (3, 4, 5, 6))
+        said, _ = self.export("dsec", source=frames)
         self.assertIn("3 samples are of images without times: their clock counts 1 frame a second", said)
         self.assertEqual(len(self.described()["notes"]), 1)
-        said, _ = self.export("dsec", source=manifest.parent / "out")  # which is done
+        said, _ = self.export("dsec", source=frames)  # which is done
         self.assertIn("images without times", said)
         recording, = (self.out / "dsec" / "train").iterdir()
         self.assertEqual(recording.name, "a%20b")
         windows = read_windows(recording / "windows.txt")
-        found = read_samples(manifest.parent / "out")
+        found = read_samples(frames)
         self.assertEqual({window[4]: window[:2] for window in windows},
                          {key[2]: tuple(int(sample["pairs"][name]) * 10 ** 6 for name in ("prev_index", "next_index"))
                           for key, sample in found.items()})
@@ -217,30 +226,14 @@ class Recordings(Export):
         self.assertFalse((recording / "object_detections").exists())
 
     def test_every_tenth_frame_of_25_a_second(self):
-        root = self.out.parent / "frames"
-        for k in (30, 40, 50, 60):
-            small_job.save_image(root / "clip" / f"{k:04d}.png", np.random.default_rng(k))
-        manifest = self.out.parent / "manifest.json"
-        manifest.write_text(
-            json.dumps(program.manifest([{"dataset": "frames", "root": str(root), "pairs": program.pairs([1])}],
-                                        generator={"kind": "difference"})))
-        run("convert", manifest, "--progress", "none")
-        run("finalize", manifest.parent / "out")
-        said, _ = self.export("raw", "--frames-per-second", "25", source=manifest.parent / "out")
+        frames = self.converted_frames("clip", (30, 40, 50, 60))
+        said, _ = self.export("raw", "--frames-per-second", "25", source=frames)
         self.assertIn("25 frames a second", said)
         windows = read_windows(self.out / "raw" / "train" / "clip_windows.txt")
         self.assertEqual([window[:2] for window in windows], [(0, 40000), (40000, 80000), (80000, 120000)])
 
     def test_a_folder_of_images_is_one_sequence(self):
-        root = self.out.parent / "clip"
-        for k in range(4):
-            small_job.save_image(root / f"{k:04d}.png", np.random.default_rng(k))
-        manifest = self.out.parent / "manifest.json"
-        source = {"dataset": "frames", "root": str(root), "frames_per_second": 20, "pairs": program.pairs([1])}
-        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"})))
-        run("convert", manifest, "--progress", "none")
-        run("finalize", manifest.parent / "out")
-        self.export("dsec", source=manifest.parent / "out")
+        self.export("dsec", source=self.converted_frames("", range(4), frames_per_second=20))
         recording, = (self.out / "dsec" / "train").iterdir()
         self.assertEqual(recording.name, "clip")
         self.assertEqual([window[:2] for window in read_windows(recording / "windows.txt")],
@@ -320,6 +313,69 @@ class Recordings(Export):
                 self.assertEqual(of_rvt.read_bytes() if of_rvt.exists() else b"",
                                  of_raw.read_bytes() if ending == "_windows.txt" or len(np.load(of_raw)) else b"")
 
+    def test_aedat4_has_the_events_and_boxes_of_raw_and_the_frames(self):
+        raw, dv = self.out / "raw", self.out / "dv"
+        self.export("raw", source=self.source, out=raw)
+        self.export("aedat4", source=self.source, out=dv)
+        recordings = sorted((dv / "aedat4").glob("*/*.aedat4"))
+        self.assertEqual([path.stem for path in recordings], sorted(path.stem for path in raw.rglob("*.raw")))
+        for path in recordings:
+            of_raw = raw / "raw" / path.parent.name / path.stem
+            windows = read_windows(path.with_name(f"{path.stem}_windows.txt"))
+            clock = windows[0][0]
+            self.assertEqual([tuple(time - clock for time in window[:3]) + window[3:] for window in windows],
+                             read_windows(of_raw.with_name(f"{path.stem}_windows.txt")))
+            (width, height), (t, x, y, p), frames = aedat4.read(path)
+            size, (t_raw, *others) = decode_evt3(of_raw.with_suffix(".raw").read_bytes())
+            self.assertEqual((height, width), size)
+            for found, expected in ((t, t_raw + clock), *zip((x, y, p), others)):
+                np.testing.assert_array_equal(found, expected)
+            boxes, raw_boxes = (np.load(at.with_name(f"{path.stem}_bbox.npy")) for at in (path, of_raw))
+            self.assertEqual(list(boxes["t"]), list(raw_boxes["t"] + clock))
+            boxes["t"] = raw_boxes["t"]
+            self.assertEqual(boxes.tobytes(), raw_boxes.tobytes())
+            # A frame takes 0.1 s; a pair's are at the ends of its window, and are there once.
+            self.assertEqual([time for time, _ in frames], sorted({time for window in windows for time in window[:2]}))
+            for time, pixels in frames:
+                with PIL.Image.open(self.drive / "image_02" / path.stem.split("~")[0].replace("%62", "b") /
+                                    f"{time // 100_000:06d}.png") as image:
+                    np.testing.assert_array_equal(pixels, image)
+
+    def test_aedat4_has_frames_in_colour_and_those_of_clips_made_of_stills(self):
+        images = np.random.default_rng(5).integers(0, 256, (2, small_job.HEIGHT, small_job.WIDTH, 3), dtype=np.uint8)
+        (self.out.parent / "clip").mkdir(parents=True)
+        for k, image in enumerate(images):
+            PIL.Image.fromarray(image).save(self.out.parent / "clip" / f"{k}.png")
+        source = {"dataset": "frames", "root": "clip"}
+        self.export("aedat4", source=self.converted(source))
+        _, _, frames = aedat4.read(self.out / "aedat4" / "train" / "clip.aedat4")
+        self.assertEqual([time for time, _ in frames], [0, 1_000_000])
+        np.testing.assert_array_equal([pixels[..., ::-1] for _, pixels in frames], images)
+
+        shutil.rmtree(self.out.parent / "out")
+        stills = self.converted({**source, "pairs": {"from": "stills", "frames": 4}}, errors=small_job.LENIENT)
+        self.export("aedat4", source=stills, out=self.out.parent / "stills")
+        recordings = sorted((self.out.parent / "stills" / "aedat4" / "train").glob("*.aedat4"))
+        self.assertEqual(len(recordings), 2)
+        for path in recordings:
+            _, (t, *_), frames = aedat4.read(path)
+            self.assertGreater(len(t), 0)
+            self.assertEqual([pixels.ndim for _, pixels in frames], [3] * 4)
+            for (_, before), (_, after) in zip(frames, frames[1:]):
+                self.assertFalse(np.array_equal(before, after))
+
+    def test_aedat4_wants_the_frames(self):
+        frames = self.converted_frames("", range(4))
+        moved = self.out.parent / "elsewhere"
+        moved.mkdir()
+        (self.out.parent / "clip").rename(moved / "clip")
+        _, err = self.export("aedat4", source=frames, expect=66)
+        self.assertIn("0000.png", err)
+        self.assertIn("--frames names the folder", err)
+        self.export("aedat4", "--frames", moved, source=frames)
+        _, _, found = aedat4.read(self.out / "aedat4" / "train" / "clip.aedat4")
+        self.assertEqual(len(found), 4)
+
     def test_raw_says_at_once_that_its_pixels_have_eleven_bits(self):
         manifest = small_job.small_job(self.out.parent / "wide", cars=2, people=0, errors=small_job.LENIENT,
                                        image={"width": 2560, "height": 16, "preset": "mpii"})
@@ -330,14 +386,9 @@ class Recordings(Export):
         self.assertFalse(self.out.exists())
 
     def test_rvt_names_files_of_gen1_as_its_preprocessing_does_and_leaves_no_bbox_in_a_name(self):
-        manifest = self.out.parent / "manifest.json"
         source = {"dataset": "kitti_tracking", "root": str(self.drive), "pairs": program.pairs([2])}
-        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"},
-                                                        errors=small_job.LENIENT,
-                                                        image={"width": 304, "height": 240, "preset": "mpii"})))
-        run("convert", manifest, "--progress", "none")
-        run("finalize", manifest.parent / "out")
-        self.export("rvt", source=manifest.parent / "out")
+        self.export("rvt", source=self.converted(source, errors=small_job.LENIENT,
+                                                 image={"width": 304, "height": 240, "preset": "mpii"}))
         self.assertEqual({path.name.split("_")[0] for path in (self.out / "raw" / "train").glob("*_td.dat.h5")}
                          - {"0000", "0000~2"}, {"%62box"})
 
@@ -348,22 +399,20 @@ class Recordings(Export):
         shutil.copytree(self.drive, black)
         for path in (black / "image_02").rglob("*.png"):
             PIL.Image.new("L", (small_job.WIDTH, small_job.HEIGHT)).save(path)
-        manifest = self.out.parent / "manifest.json"
-        source = {"dataset": "kitti_tracking", "root": str(black), "pairs": program.pairs([1])}
-        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"})))
-        run("convert", manifest, "--progress", "none")
-        run("finalize", manifest.parent / "out")
-        for to in ("dsec", "rvt"):
-            self.export(to, "--classes", classes, source=manifest.parent / "out", out=self.out / to)
+        source = self.converted({"dataset": "kitti_tracking", "root": str(black)})
+        for to in ("dsec", "rvt", "aedat4"):
+            self.export(to, "--classes", classes, source=source, out=self.out / to)
             self.assertEqual(json.loads((self.out / to / "label_map_dictionary.json").read_text()),
                              {"0": "Pedestrian", "2": "Car"})
         with h5py.File(self.out / "dsec/dsec/train/0000/events/left/events.h5") as file:
             self.assertEqual(file["events/t"].shape, (0,))
             np.testing.assert_array_equal(file["ms_to_idx"][:], np.zeros(1101))
+        _, (t, *_), frames = aedat4.read(self.out / "aedat4/aedat4/train/0000.aedat4")
+        self.assertEqual((len(t), len(frames)), (0, 12))
         tracks = np.load(self.out / "dsec/dsec/train/0000/object_detections/left/tracks.npy")
         self.assertEqual(set(tracks["class_id"]), {0, 2})
         classes.write_text(json.dumps({"Car": 256}))
-        _, err = self.export("dsec", "--classes", classes, source=manifest.parent / "out", expect=64)
+        _, err = self.export("dsec", "--classes", classes, source=source, expect=64)
         self.assertIn("at most 255", err)
 
 

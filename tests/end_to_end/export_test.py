@@ -30,7 +30,7 @@ from program import run, text
 
 TRAINERS = program.SHARED.parent / "trainers"
 PIXELS = 0.01  # the largest error of a label that is mapped back
-FORMATS = ["yolo", "coco", "mpii", "davis", "webdataset", "events", "dsec", "rvt", "raw"]
+FORMATS = ["yolo", "coco", "mpii", "davis", "webdataset", "events", "dsec", "rvt", "raw", "aedat4"]
 BY_POINT = ("joints", "joints_source", "joints3d_mm", "visible")  # null is said of each joint
 PAIR_UNKNOWN = {"prev_video_frame": -1, "next_video_frame": -1}
 LABEL_UNKNOWN = {"truncation": -1, "occlusion": -1, "alpha": -10, "box3d": [-1, -1, -1, -1000, -1000, -1000, -10],
@@ -856,7 +856,7 @@ class BadInput(Export):
                                   ("davis", "--seed", "1"), ("mpii", "--classes", "x"), ("dsec", "--ignored", "keep"),
                                   ("rvt", "--full-scale", "2"), ("webdataset", "--full-scale", "2")]:
             _, err = self.export(to, option, value, expect=64)
-            self.assertRegex(err, rf"{option}: expected --to [a-z ,-]+, got --to {to}\n")
+            self.assertRegex(err, rf"{option}: expected --to [a-z0-9 ,-]+, got --to {to}\n")
         _, err = self.export("mpii", "--split", "val", expect=64)
         self.assertIn("can use", err)
         self.assertFalse(self.out.exists())

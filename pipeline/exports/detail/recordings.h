@@ -1,10 +1,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pipeline/exports/detail/exporter.h"
@@ -65,7 +67,10 @@ struct RecordedSample {
   std::string sample_id;
   std::vector<StampedEvent> events;  ///< within the window
   std::vector<RecordedBox> boxes;    ///< those that are exported, at label_us
-  std::vector<float> volume;         ///< [2 bins, H, W]; where the exporter keeps it
+  // Where the exporter keeps them:
+  std::vector<float> volume;  ///< [2 bins, H, W]
+  /// Previous and next, [y, x] or [y, x, channel] uint8 (blue, green, red); empty: there is none.
+  std::array<std::vector<std::uint8_t>, 2> frames;
 };
 
 /// An exporter of recordings. Samples of a sequence whose frames' times are known share its clock;
@@ -78,7 +83,7 @@ struct RecordedSample {
 /// Prophesee's datasets have them.
 class RecordingsExporter : public Exporter {
  public:
-  RecordingsExporter(const ExportInput& input, const ExportOptions& options, bool keeps_volumes);
+  RecordingsExporter(const ExportInput& input, const ExportOptions& options);
 
   std::string settings() const override;
   bool works_by_shard() const override { return false; }
@@ -96,6 +101,9 @@ class RecordingsExporter : public Exporter {
   virtual void write_recording(const OutgoingRecording& recording, const ForEachSample& for_each,
                                ExportFolder::Step& step) const = 0;
 
+  /// Keeps what else the format has of a sample. Called side by side.
+  virtual void keep_more(const OutgoingSample&, RecordedSample&) const {}
+
   /// Whether a sample has a label that the format has a use for.
   virtual bool is_labelled(const OutgoingSample&) const { return true; }
 
@@ -110,11 +118,15 @@ class RecordingsExporter : public Exporter {
 
   ExportOptions options_;
   std::unique_ptr<ClassNumbers> numbers_;
-  bool keeps_volumes_;
   // Of `finish`:
   mutable std::int64_t unlabelled_ = 0;  ///< samples of recordings without labels
   mutable std::int64_t untimed_ = 0;     ///< samples whose clock counts frames
 };
+
+/// Throws UsageError for volumes of more than `most` pixels a side, which `word`'s files do not
+/// hold.
+void require_sides(const ExportInput& input, const std::function<void()>& check_stop, int most,
+                   std::string_view word);
 
 /// Gives each box without a track a number of its own, beyond those that there are: an object that
 /// was seen once. Throws std::runtime_error for a number beyond 2^32 - 1, which RVT's fields do not

@@ -128,6 +128,12 @@ void AtomicFile::write(std::string_view bytes) {
   }
 }
 
+void AtomicFile::overwrite(std::int64_t byte, std::string_view bytes) {
+  if (::lseek(descriptor_, byte, SEEK_SET) < 0) fail("cannot write " + temporary_.string());
+  write(bytes);
+  if (::lseek(descriptor_, 0, SEEK_END) < 0) fail("cannot write " + temporary_.string());
+}
+
 void AtomicFile::sync() {
   if (descriptor_ < 0) {
     sync_to_disk(temporary_);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -55,6 +56,9 @@ class AtomicFile {
   /// Steps 1 and 2 for bytes.
   void create();
   void write(std::string_view bytes);
+
+  /// Puts `bytes` in the place of as many that were written before, from `byte` on.
+  void overwrite(std::int64_t byte, std::string_view bytes);
 
   /// Step 3, for those who want to hash what is on disk.
   void sync();

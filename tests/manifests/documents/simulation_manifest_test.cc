@@ -110,6 +110,7 @@ TEST(SimulationManifest, HasTheDefaultsOfItsHeader) {
   EXPECT_EQ(manifest.seed, 0u);
   EXPECT_EQ(manifest.size, std::nullopt);
   EXPECT_EQ(manifest.sensor, SensorSpec());
+  EXPECT_EQ(manifest.file, SimulatedFile::kHdf5);
   const SimulationSource& clip = manifest.sources.at(0);
   EXPECT_EQ(clip.name, "clip");
   EXPECT_EQ(clip.method, SimulationMethod::kClip);
@@ -130,7 +131,7 @@ TEST(SimulationManifest, HoldsEveryValueGiven) {
       "first_frame": 3, "frame_count": 4, "frame_step": 5, "frames_per_image": 6,
       "max_displacement_px": 7.5}],
     "size": {"width": 346, "height": 260}, "sensor": {"log_epsilon": 0.01},
-    "output": {"directory": "o"}})");
+    "output": {"directory": "o", "format": "aedat4"}})");
   EXPECT_EQ(manifest.seed, 9u);
   const SimulationSource& source = manifest.sources.at(0);
   EXPECT_EQ(source.path, "p");
@@ -145,6 +146,7 @@ TEST(SimulationManifest, HoldsEveryValueGiven) {
   EXPECT_EQ(manifest.size, (ImageSize{.height = 260, .width = 346}));
   EXPECT_EQ(manifest.sensor.log_epsilon, 0.01);
   EXPECT_EQ(manifest.output_directory, "o");
+  EXPECT_EQ(manifest.file, SimulatedFile::kAedat4);
 }
 
 TEST(SimulationSchema, IsClosedDescribedAndStatesTheDefaults) {

@@ -402,6 +402,9 @@ def test_sampled_events():
     events = eventgan.sample_events(volume, duration_s=0.5, counts="rounded")
     assert events.dtype.names == ("t", "x", "y", "p")
     assert events.tolist() == [(0.0, 2, 1, 1)] * 2 + [(0.25, 0, 3, 0)] * 3 + [(0.5, 2, 1, 1)]
+    events["t"] *= 1e6  # tonic's events, as python.md makes them
+    tonic = events[["x", "y", "t", "p"]].astype([("x", np.int16), ("y", np.int16), ("t", np.int64), ("p", bool)])
+    assert tonic.tolist() == [(2, 1, 0, True)] * 2 + [(0, 3, 250_000, False)] * 3 + [(2, 1, 500_000, True)]
     assert len(eventgan.sample_events(np.zeros((2, 3, 3)))) == 0
     drawn = eventgan.sample_events(np.full((18, 60, 80), 0.5, np.float32), seed=3)
     assert abs(len(drawn) - 0.5 * 18 * 60 * 80) < 5 * np.sqrt(0.5 * 18 * 60 * 80)  # Poisson's deviation

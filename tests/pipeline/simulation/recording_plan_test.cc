@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "manifests/values/faults.h"
-#include "stages/recordings/mvsec_writer.h"
+#include "pipeline/simulation/recording_output.h"
 #include "tests/pipeline/simulation/moving_clip.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -40,13 +40,19 @@ TEST(RecordingSettings, HowManyImagesFollowDoesNotMatter) {
 
 TEST(RecordingSettings, AreReadBackFromARecording) {
   const testing::TemporaryFolder folder;
-  EXPECT_EQ(settings_on_disk(folder / "a.hdf5"), std::nullopt);
-  MvsecWriter writer(folder / "a.hdf5", {2, 3}, "{\"a\": 1}");
-  writer.add_frame(GreyImage{{2, 3}, std::vector<std::uint8_t>(6)}, 0, nullptr);
-  writer.commit();
-  EXPECT_EQ(settings_on_disk(folder / "a.hdf5"), "{\"a\": 1}");
-  testing::write_file(folder / "b.hdf5", "no HDF5");
-  EXPECT_THROW(settings_on_disk(folder / "b.hdf5"), InputError);
+  const std::string settings = R"({"a<&>": "\u00b5 %"})";
+  for (const std::string ending : {".hdf5", ".aedat4", ".raw"}) {
+    SCOPED_TRACE(ending);
+    EXPECT_EQ(settings_on_disk(folder / ("a" + ending)), std::nullopt);
+    const auto output = open_recording_output(folder / ("a" + ending), {2, 3}, settings);
+    output->add_frame(GreyImage{{2, 3}, std::vector<std::uint8_t>(6)}, 0, nullptr);
+    output->commit();
+    EXPECT_EQ(settings_on_disk(folder / ("a" + ending)), settings);
+    for (const char* other : {"", "no recording", "#!AER-DAT4.0\r\n", "% evt 3.0\n% end\n"}) {
+      testing::write_file(folder / ("b" + ending), other);
+      EXPECT_THROW(settings_on_disk(folder / ("b" + ending)), InputError) << other;
+    }
+  }
 }
 
 TEST(RecordingSettings, DifferencesAreToldByField) {

@@ -146,6 +146,49 @@ TEST_F(Simulate, MakesEveryRecording) {
   EXPECT_FALSE(fade->flow(0).has_value());
 }
 
+// Times are rounded to microseconds.
+TEST_F(Simulate, WritesTheSameRecordingsForDvAndMetavision) {
+  run("out");
+  SimulationManifest manifest = testing::moving_clip_manifest(folder_.path(), kSources);
+  SimulationOptions options;
+  options.output = folder_ / "out";
+  for (const SimulatedFile file : {SimulatedFile::kAedat4, SimulatedFile::kRaw}) {
+    manifest.file = file;
+    EXPECT_EQ(simulate(manifest, options).made.size(), 4u);
+    EXPECT_EQ(simulate(manifest, options).kept.size(), 4u);
+    for (const std::string name : {"clip", "fade", "still-000", "still-001"}) {
+      const auto mvsec =
+          open_recording(folder_ / "out" / (name + ".hdf5"), RecordingFormat::kMvsec);
+      const std::filesystem::path path =
+          folder_ / "out" / (name + "." + std::string(to_string(file)));
+      const bool has_frames = file == SimulatedFile::kAedat4;
+      const auto recording =
+          open_recording(path, has_frames ? RecordingFormat::kAedat4 : RecordingFormat::kProphesee);
+      const auto expected = mvsec->events_in(-1, 10), found = recording->events_in(-1, 10);
+      ASSERT_EQ(found.size(), expected.size());
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        EXPECT_NEAR(found[i].t_s, expected[i].t_s, 0.51e-6);
+        EXPECT_TRUE(found[i].x == expected[i].x && found[i].y == expected[i].y &&
+                    found[i].positive == expected[i].positive);
+      }
+      ASSERT_EQ(recording->frame_count(), has_frames ? mvsec->frame_count() : 0);
+      for (std::int64_t i = 0; i < recording->frame_count(); ++i) {
+        EXPECT_EQ(recording->frame(i), mvsec->frame(i));
+        EXPECT_NEAR(recording->frame_time_s(i), mvsec->frame_time_s(i), 0.51e-6);
+      }
+    }
+  }
+}
+
+TEST_F(Simulate, RefusesASensorThatRawDoesNotHold) {
+  testing::write_moving_clip(folder_ / "wide", {16, 2049}, 2);
+  SimulationManifest manifest =
+      testing::moving_clip_manifest(folder_.path(), R"({"path": "wide", "method": "difference"})");
+  manifest.file = SimulatedFile::kRaw;
+  EXPECT_THAT([&] { simulate(manifest, {}); },
+              ::testing::ThrowsMessage<UsageError>(::testing::HasSubstr("1 to 2048 pixels")));
+}
+
 TEST_F(Simulate, ThreadsAndOtherSourcesDoNotChangeBytes) {
   run("one", 1);
   run("four", 4);

@@ -44,6 +44,17 @@ TEST(AtomicFile, WritesAndReplaces) {
   EXPECT_THAT(names_in(folder.path()), ElementsAre("a.json"));
 }
 
+TEST(AtomicFile, PutsBytesInThePlaceOfWrittenOnes) {
+  const TemporaryFolder folder;
+  AtomicFile file(folder / "a");
+  file.create();
+  file.write("abcdef");
+  file.overwrite(1, "XY");
+  file.write("gh");
+  file.publish();
+  EXPECT_EQ(read_file(folder / "a"), "aXYdefgh");
+}
+
 TEST(RequireNoLink, NamesALinkBelowTheFolder) {
   const TemporaryFolder folder;
   const TemporaryFolder elsewhere;
