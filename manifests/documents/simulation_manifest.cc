@@ -16,12 +16,14 @@ constexpr int kLargestSensorSide = 8192;
 void list_clip(Fields& fields, SimulationSource& source) {
   using enum SimulationMethod;
   fields.at("path", source.path, paths(),
-            "A video, or a folder of images, taken in the order of their names.");
+            "A video, or a folder of images, taken in the order of their names. With method stills "
+            "the manifest of a job of convert.");
   // Without a name it is the path's stem, where that can be part of a file name.
   source.name = std::filesystem::path(source.path).stem().string();
   constexpr char kName[] =
-      "Name of the recording, NAME.hdf5; with method affine NAME-000.hdf5 and so on, one for each "
-      "image. Default: the path's last part without extension.";
+      "Name of the recording, NAME.hdf5; with methods affine and stills NAME-000.hdf5 and so on, "
+      "one "
+      "for each image. Default: the path's last part without extension.";
   if (source.path.empty() || is_name(source.name)) {
     fields.find("name", source.name, names(), kName);
   } else {
@@ -30,20 +32,26 @@ void list_clip(Fields& fields, SimulationSource& source) {
   fields.kind("method", source.method, words(kSimulationMethodWords),
               "clip: things move between frames along the dense optical flow. affine: each image "
               "moves by one random affine motion. difference: each pixel's log intensity moves on "
-              "a line from frame to frame.");
-  fields.find("frames_per_second", source.frames_per_second, numbers(1e-6, 1e6),
-              "Frame rate of the whole clip. Default: the video's own times; 30 for images.");
+              "a line from frame to frame. stills: the clips that convert makes of photographs "
+              "(pairs from stills, with frames), each a recording with its labels beside it.");
+  fields.only_for({kAffine, kClip, kDifference})
+      .find("frames_per_second", source.frames_per_second, numbers(1e-6, 1e6),
+            "frame rate of the whole clip. Default: the video's own times; 30 for images.");
   fields.find("first_frame", source.first_frame, integers(0, kMostClipFrames),
-              "The first frame that is used, counted from 0.");
-  const auto count =
-      fields.find("frame_count", source.frame_count, integers(0, kMostClipFrames),
-                  "How many frames are used, with method affine how many images; 0 = to the end.");
-  if (count && source.frame_count == 1 && fields.is_sound("method") && source.method != kAffine) {
+              "The first frame that is used, counted from 0; with method stills the first still.");
+  const auto count = fields.find(
+      "frame_count", source.frame_count, integers(0, kMostClipFrames),
+      "How many frames are used, with methods affine and stills how many images; 0 = to "
+      "the end.");
+  if (count && source.frame_count == 1 && fields.is_sound("method") && source.method != kAffine &&
+      source.method != kStills) {
     count->fault("0 (to the end) or at least 2 frames, since events lie between frames");
   }
-  fields.rule(R"({"if": {"required": ["method"], "properties": {"method": {"const": "affine"}}},
+  fields.rule(
+      R"({"if": {"required": ["method"], "properties": {"method": {"enum": ["affine", "stills"]}}},
                   "else": {"properties": {"frame_count": {"not": {"const": 1}}}}})");
-  fields.find("frame_step", source.frame_step, integers(1, 100), "Uses each n-th frame.");
+  fields.find("frame_step", source.frame_step, integers(1, 100),
+              "Uses each n-th frame, with method stills each n-th still.");
   fields.only_for({kAffine}).find("frames_per_image", source.frames_per_image, integers(2, 100),
                                   "frames of the motion of one image.");
   fields.only_for({kAffine}).find("max_displacement_px", source.max_displacement_px,
@@ -52,8 +60,8 @@ void list_clip(Fields& fields, SimulationSource& source) {
                                   "drawn uniformly from 0 to this, for each image.");
 }
 
-/// "a" for "a-000": the affine source that could have a recording of this name.
-std::string_view possible_affine_name(std::string_view name) {
+/// "a" for "a-000": the source of numbered recordings that could have one of this name.
+std::string_view possible_numbered_name(std::string_view name) {
   const std::size_t dash = name.find_last_not_of("0123456789");
   const bool numbered = dash != std::string_view::npos && name[dash] == '-';
   return numbered ? name.substr(0, dash) : std::string_view();
@@ -62,17 +70,21 @@ std::string_view possible_affine_name(std::string_view name) {
 /// No two recordings may have one name.
 void check_names(const std::vector<StrictValue>& elements,
                  const std::vector<SimulationSource>& sources) {
-  std::set<std::string_view> names, affine_names;
+  std::set<std::string_view> names, numbered_names;
   for (const SimulationSource& source : sources) {
-    if (source.method == SimulationMethod::kAffine) affine_names.insert(source.name);
+    if (source.method == SimulationMethod::kAffine || source.method == SimulationMethod::kStills) {
+      numbered_names.insert(source.name);
+    }
   }
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const std::string& name = sources[i].name;
     if (name.empty()) continue;  // faulty, as is reported already
     if (!names.insert(name).second) {
       elements[i].fault("a name that no other source has", "\"" + name + "\" again");
-    } else if (!affine_names.contains(name) && affine_names.contains(possible_affine_name(name))) {
-      elements[i].fault("a name that no recording of an affine source has", "\"" + name + "\"");
+    } else if (!numbered_names.contains(name) &&
+               numbered_names.contains(possible_numbered_name(name))) {
+      elements[i].fault("a name that no numbered recording of another source has",
+                        "\"" + name + "\"");
     }
   }
 }
@@ -91,8 +103,9 @@ void list_simulation(Fields& fields, SimulationManifest& manifest) {
   if (!fields.has_format("eventgan-simulation", 1)) return;
   fields.at("name", manifest.name, names(), "Name of the job.");
   fields.find("seed", manifest.seed, seeds(), kSeedField);
-  const auto sources = fields.at("sources", manifest.sources, lists(objects(list_clip), 1),
-                                 "The clips, each a recording or, with method affine, several.");
+  const auto sources =
+      fields.at("sources", manifest.sources, lists(objects(list_clip), 1),
+                "The clips, each a recording or, with methods affine and stills, several.");
   if (sources && sources->is_array()) check_names(sources->elements(), manifest.sources);
   fields.find("size", manifest.size, sizes(kSmallestSensorSide, kLargestSensorSide),
               "Size of the sensor in pixels: frames are scaled to cover it and cut around the "

@@ -14,9 +14,10 @@ namespace eventgan {
 
 /// How the intensity between the given images comes about.
 enum class SimulationMethod {
-  kAffine,     ///< ESIM as the EventGAN paper uses it: a random affine motion of each image
-  kClip,       ///< a real clip, frames between its frames by dense optical flow
-  kDifference  ///< log intensity moves on a line from each frame to the next
+  kAffine,      ///< ESIM as the EventGAN paper uses it: a random affine motion of each image
+  kClip,        ///< a real clip, frames between its frames by dense optical flow
+  kDifference,  ///< log intensity moves on a line from each frame to the next
+  kStills       ///< clips made of stills: layers move on their own
 };
 
 /// What a recording is written as, and the ending of its file.
@@ -26,13 +27,14 @@ enum class SimulatedFile {
   kRaw      ///< Prophesee's RAW, EVT 3.0: events
 };
 
-/// A clip (a video, a folder of images) and how recordings are made of it.
+/// A clip (a video, a folder of images) and how recordings are made of it; with kStills the
+/// manifest of a job of `convert`, and its clips.
 struct SimulationSource {
   std::string path;  ///< as written in the manifest
   std::string name;  ///< the recording's file name without its ending; default: the path's stem
   SimulationMethod method = SimulationMethod::kClip;
-  std::optional<double> frames_per_second;  ///< default: the video's, 30 for images
-  std::int64_t first_frame = 0;
+  std::optional<double> frames_per_second;  ///< default: the video's, 30 for images; not of kStills
+  std::int64_t first_frame = 0;             ///< of kStills, as the next two: of the stills
   std::int64_t frame_count = 0;  ///< 0: to the end. With kAffine the number of images used
   std::int64_t frame_step = 1;   ///< takes each n-th frame, 1..100
   int frames_per_image = 7;      ///< kAffine: frames of the motion of one image, 2..100

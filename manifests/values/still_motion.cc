@@ -41,6 +41,11 @@ Point mapped(const AffineMap& map, Point point) {
           map[3] * point.x + map[4] * point.y + map[5]};
 }
 
+Point mapped_edge(const AffineMap& map, Point edge) {
+  const Point at = mapped(map, {edge.x - 0.5, edge.y - 0.5});
+  return {at.x + 0.5, at.y + 0.5};
+}
+
 namespace {
 
 Point centre_of(ImageSize size) { return {(size.width - 1) / 2.0, (size.height - 1) / 2.0}; }
@@ -171,6 +176,42 @@ void settle_motion(const PairSpec& spec, const PairKey& key, const std::vector<B
 
 namespace {
 
+double area_of(const Rectangle& box) {
+  return std::max(box.right - box.left, 0.0) * std::max(box.bottom - box.top, 0.0);
+}
+
+double shared_area(const Rectangle& a, const Rectangle& b) {
+  return area_of({std::max(a.left, b.left), std::max(a.top, b.top), std::min(a.right, b.right),
+                  std::min(a.bottom, b.bottom)});
+}
+
+}  // namespace
+
+std::vector<std::size_t> carriers(const std::vector<Box>& boxes) {
+  constexpr double kOfAnotherClass = 0.5, kOfTheSame = 0.9;  // share of the smaller one's box
+  std::vector<std::size_t> carrier(boxes.size());
+  for (std::size_t k = 0; k < boxes.size(); ++k) {
+    carrier[k] = k;
+    double most = 0;
+    const double area = area_of(boxes[k].xyxy);
+    for (std::size_t j = 0; j < boxes.size() && moves_alone(boxes[k]); ++j) {
+      const Box& other = boxes[j];
+      if (!moves_alone(other) || !(area_of(other.xyxy) > area)) continue;
+      const double share = shared_area(boxes[k].xyxy, other.xyxy) / area;
+      const bool is_same = other.class_id == boxes[k].class_id;
+      if (share <= most || share < (is_same ? kOfTheSame : kOfAnotherClass)) continue;
+      most = share;
+      carrier[k] = j;
+    }
+  }
+  for (std::size_t& last : carrier) {
+    while (carrier[last] != last) last = carrier[last];  // each is larger than the one before
+  }
+  return carrier;
+}
+
+namespace {
+
 /// How far a path leads from its start before it turns back.
 struct PathLimits {
   double radius_px;
@@ -255,6 +296,24 @@ ImageMotion held(const ImageMotion& motion, ImageSize image) {
   return {};
 }
 
+/// The motion about `centre` that is `motion` about `about`.
+ImageMotion carried(const ImageMotion& motion, Point about, Point centre) {
+  const Point at = mapped(map_of(motion, about), centre);
+  return {at.x - centre.x, at.y - centre.y, motion.angle_deg, motion.scale};
+}
+
+/// A step no longer than a quarter of the object's size: what looks small is far away.
+ImageMotion fitting(ImageMotion step, const Rectangle& box) {
+  constexpr double kLongest = 0.25;
+  const double longest_px = kLongest * std::sqrt(area_of(box));
+  const double length_px = std::hypot(step.x_px, step.y_px);
+  if (length_px > longest_px) {
+    step.x_px *= longest_px / length_px;
+    step.y_px *= longest_px / length_px;
+  }
+  return step;
+}
+
 }  // namespace
 
 std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& still,
@@ -269,15 +328,18 @@ std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& s
                  of_image);
   }
   std::vector<std::optional<Path>> paths(boxes.size());
+  const std::vector<std::size_t> carrier = carriers(boxes);
   StillPose pose{{}, std::vector<std::optional<ImageMotion>>(any_moves ? boxes.size() : 0)};
   for (std::size_t k = 0; k < pose.objects.size(); ++k) {
     if (!moves_alone(boxes[k])) continue;
     pose.objects[k] = ImageMotion();
+    if (carrier[k] != k) continue;
     const CounterRandom random = still.keyed("objects").keyed(std::to_string(k));
     const auto& objects = *spec.objects;
     if (!image_rests && random.uniform(kRests) < objects.rests) continue;
-    paths[k].emplace(draw(objects.translation_px, objects.rotation_deg, objects.scale, random),
-                     random.keyed("clip"), of_object);
+    const ImageMotion step =
+        draw(objects.translation_px, objects.rotation_deg, objects.scale, random);
+    paths[k].emplace(fitting(step, boxes[k].xyxy), random.keyed("clip"), of_object);
   }
   std::vector<StillPose> poses{pose};
   for (int i = 0; i < frames; ++i) {
@@ -289,6 +351,12 @@ std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& s
       if (!paths[k]) continue;
       paths[k]->advance();
       pose.objects[k] = paths[k]->at();
+    }
+    for (std::size_t k = 0; k < pose.objects.size(); ++k) {
+      if (!pose.objects[k] || carrier[k] == k) continue;
+      const std::size_t by = carrier[k];
+      pose.objects[k] =
+          carried(pose.objects[by].value(), centre_of(boxes[by].xyxy), centre_of(boxes[k].xyxy));
     }
     poses.push_back(pose);
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -27,6 +28,10 @@ AffineMap compose(const AffineMap& second, const AffineMap& first);
 AffineMap inverse(const AffineMap& map);
 
 Point mapped(const AffineMap& map, Point point);
+
+/// Of a place as edges are counted, which lie half a pixel before the centre of the pixel with
+/// their number.
+Point mapped_edge(const AffineMap& map, Point edge);
 
 /// Of a still's pair, which has a motion: where a point of the frame at u of the time from the
 /// previous frame (0) to the next (1) lies in the labelled image. A point of an object moves as
@@ -55,12 +60,18 @@ StillPose pose_between(const StillPose& from, const StillPose& to, double u);
 
 /// The poses of a still's clip, `frames` + 1 of them; the first is the still itself. Speeds are
 /// drawn as the motions of single pairs are; directions change slowly, and now and then a thing
-/// pauses. The image stays where clip_window sees nothing beyond it. Pure.
+/// pauses. The image stays where clip_window sees nothing beyond it. An object moves by a quarter
+/// of its size a frame at most (the root of its box's area), and as its carrier does. Pure.
 std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& still,
                                   const std::vector<Box>& boxes, ImageSize image, int frames);
 
 /// Whether the object of a box can move on its own: it has an outline, and is not to be ignored.
 bool moves_alone(const Box& box);
+
+/// With which object of a clip each one moves: with a larger one, in whose box at least half of its
+/// own lies, as a rider with his horse and a bag with who carries it, or nearly all of it if they
+/// are of one class; else with itself. Of those that move with others the last one. Pure.
+std::vector<std::size_t> carriers(const std::vector<Box>& boxes);
 
 /// The image's motion of a still's pair; none at all (the identity) of as many as `spec` lets rest.
 /// The seed draws each number on its own, so that the limits of one do not change the others.

@@ -104,7 +104,8 @@ inline constexpr std::array kPolicyWords{Word<ErrorPolicy>{"fail", ErrorPolicy::
 inline constexpr std::array kSimulationMethodWords{
     Word<SimulationMethod>{"affine", SimulationMethod::kAffine},
     Word<SimulationMethod>{"clip", SimulationMethod::kClip},
-    Word<SimulationMethod>{"difference", SimulationMethod::kDifference}};
+    Word<SimulationMethod>{"difference", SimulationMethod::kDifference},
+    Word<SimulationMethod>{"stills", SimulationMethod::kStills}};
 
 inline constexpr std::array kSimulatedFileWords{
     Word<SimulatedFile>{"hdf5", SimulatedFile::kHdf5},

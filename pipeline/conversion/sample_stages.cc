@@ -103,6 +103,7 @@ void SampleStages::read(SampleMessage& message) const try {
     read_events(message, *datasets_[source]);
   } else {
     read_frames(message, boxes);
+    if (!message.failed()) message.outlines += made->outlines;
   }
   read_labels(message, *datasets_[source], std::move(annotation));
 } catch (const std::bad_alloc&) {

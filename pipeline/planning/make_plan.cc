@@ -301,7 +301,8 @@ void note_outlines(const SourceSpec& spec, const Dataset& dataset,
   const std::size_t looked_at = std::min(frames.size(), kMostFrames);
   std::int64_t boxes = 0, outlined = 0;
   for (std::size_t i = 0; i < looked_at; ++i) {
-    const auto annotation = dataset.annotation(frames[i * frames.size() / looked_at].label_key);
+    const auto annotation =
+        dataset.still_annotation(frames[i * frames.size() / looked_at].label_key);
     if (is_fault(annotation)) continue;
     for (const Box& box : annotation->boxes) {
       boxes += !box.ignore;

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <exception>
 #include <memory>
 #include <optional>
@@ -17,6 +18,8 @@
 #include "stages/frames/decoding/cut_out.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/decoding/prepared_frame.h"
+#include "stages/frames/decoding/still_clip.h"
+#include "stages/frames/still_clips.h"
 #include "stages/recordings/recording.h"
 #include "stages/shards/shard_reader.h"
 
@@ -100,10 +103,12 @@ struct PreviewReader::State {
   std::optional<ShardReader> reader{};
   JobManifest manifest{};
   bool has_events = false;  ///< is made of a camera's events
-  /// Of events: the source that `shard` is of; null if nothing tells.
+  /// Of events and of clips of stills: the source that `shard` is of; null if nothing tells.
   const SourceSpec* source = nullptr;
-  fs::path planned{};                     ///< the folder whose plan was asked for
-  std::optional<FrozenOutline> frozen{};  ///< if it has a sound one
+  std::vector<std::unique_ptr<Dataset>> clips{};   ///< opened is that of one source
+  std::pair<std::string, std::size_t> clips_of{};  ///< the hash of its plan, its number there
+  fs::path planned{};                              ///< the folder whose plan was asked for
+  std::optional<FrozenOutline> frozen{};           ///< if it has a sound one
 
   void open(const fs::path& file) {
     if (reader && shard == file) return;
@@ -114,7 +119,46 @@ struct PreviewReader::State {
     manifest = parse_job_manifest(reader->header().manifest_text, frames, file.string());
     has_events = !needs_frames(manifest.generator.kind);
     shard = file;
-    if (has_events) find_source();
+    const auto is_of_clips = [](const SourceSpec& spec) {
+      return spec.pairs.clip_frames.has_value();
+    };
+    if (has_events || std::ranges::any_of(manifest.sources, is_of_clips)) find_source();
+  }
+
+  /// The frames of a sample of a clip that is made of a still, made again: the shard has neither
+  /// the still's boxes nor its poses, but the manifest that they follow from.
+  Outcome<std::array<ColourFrame, 2>> made_frames(const ShardSample& sample) try {
+    if (source == nullptr) {
+      return SampleFault{
+          "expected the shard's plan beside it, since its manifest has several such "
+          "sources, got none"};
+    }
+    const auto number = static_cast<std::size_t>(source - manifest.sources.data());
+    if (clips.empty() || clips_of != std::pair(reader->header().plan_hash, number)) {
+      clips.clear();
+      clips.resize(manifest.sources.size());
+      clips[number] = open_dataset(*source, manifest.directory);
+      make_clips(manifest, clips);
+      clips_of = {reader->header().plan_hash, number};
+    }
+    const Dataset& dataset = *clips[number];
+    const std::vector<LabelledFrame>& all = dataset.labelled_frames();
+    const auto labelled =
+        std::ranges::lower_bound(all, sample.sample_id, {}, &LabelledFrame::sample_id);
+    if (labelled == all.end() || labelled->sample_id != sample.sample_id) {
+      return SampleFault{"expected its still, got none, in " + source->root};
+    }
+    Outcome<MadePair> made = dataset.made_pair(labelled->label_key);
+    if (is_fault(made)) return made.fault();
+    const Outcome<ColourFrame> image = decoder.decode(
+        labelled->frame, source->every, orientation_of(source->dataset), manifest.image.range);
+    if (is_fault(image)) return image.fault();
+    const StillClip clip({image->size, image->bgr.data()}, std::move(made->boxes),
+                         made->poses.at(0));
+    return std::array{ColourFrame{clip.size(), clip.frame(made->poses.at(0))},
+                      ColourFrame{clip.size(), clip.frame(made->poses.at(1))}};
+  } catch (const std::runtime_error& error) {
+    return SampleFault{error.what()};
   }
 
   /// The plan beside the shard says which source it is of; without it the manifest does, if it has
@@ -169,20 +213,14 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
   const DatasetRow* const dataset = find_dataset(header.dataset);
   const ImageOrientation orientation =
       dataset == nullptr ? ImageOrientation::kStored : orientation_of(dataset->value);
-  // Of a clip (PairSpec::clip_frames) the shard has no poses.
   const FramePair& frames = sample.pair;
   const bool is_made = !state_->has_events && !frames.motion &&
                        frames.previous.path == frames.next.path &&
                        frames.previous.video_frame == frames.next.video_frame &&
                        frames.previous.index != frames.next.index;
-  if (is_made) {
-    state_->warnings.push_back("expected stored frames, got those of a clip made of " +
-                               frames.next.path + ", which are not shown (" + sample.sample_id +
-                               ")");
-  }
   const auto frame = [&](const FrameRef& which) {
     // Of events there may be no frames, or none yet.
-    if (!sample.valid || is_made || (state_->has_events && which.video_frame < 0)) {
+    if (!sample.valid || (state_->has_events && which.video_frame < 0)) {
       return std::vector<std::uint8_t>();
     }
     return frame_image(
@@ -192,8 +230,22 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
                                      state_->manifest.image.range),
         which, sample, state_->manifest.image, state_->warnings);
   };
-  content.previous_bgr = frame(sample.pair.previous);
-  content.next_bgr = frame(sample.pair.next);
+  if (is_made && sample.valid) {
+    Outcome<std::array<ColourFrame, 2>> made = state_->made_frames(sample);
+    if (is_fault(made)) {
+      state_->warnings.push_back(made.fault().reason + " (" + sample.sample_id + ")");
+    } else {
+      const auto laid = [&](ColourFrame& image, const FrameRef& which) {
+        return frame_image(std::move(image), which, sample, state_->manifest.image,
+                           state_->warnings);
+      };
+      content.previous_bgr = laid((*made)[0], frames.previous);
+      content.next_bgr = laid((*made)[1], frames.next);
+    }
+  } else {
+    content.previous_bgr = frame(frames.previous);
+    content.next_bgr = frame(frames.next);
+  }
   const FramePair& pair = sample.pair;
   const auto moving = std::ranges::count_if(
       pair.objects, [](const auto& motion) { return motion && *motion != ImageMotion(); });
@@ -201,7 +253,9 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
       moving > 0 ? ", " + count_text(moving, "object") + (moving == 1 ? " moves" : " move") : "";
   content.title = header.dataset + " " + sample.sample_id +
                   (state_->has_events ? fmt::format(", {:.4g} s", pair.gap_s())
-                                      : (pair.motion ? ", still" + objects + ", gap " : ", gap ") +
+                                      : (pair.motion ? ", still" + objects + ", gap "
+                                         : is_made   ? ", clip of a still, gap "
+                                                     : ", gap ") +
                                             std::to_string(pair.gap_frames)) +
                   (sample.valid ? "" : ", QUARANTINED");
   content.label_position = sample.pair.label_position;

@@ -4,7 +4,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "manifests/values/faults.h"
-#include "manifests/values/placement.h"
 #include "stages/base/files/sha256.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/frames/sequences/frames_dataset.h"
@@ -13,21 +12,38 @@
 
 namespace eventgan {
 
-GreyImage sensor_image(const ColourFrame& frame, std::optional<ImageSize> size) try {
+namespace {
+
+// OpenCV takes no const data; nothing writes to it here.
+cv::Mat matrix(ImageSize size, int type, const std::vector<std::uint8_t>& pixels) {
+  return {size.height, size.width, type, const_cast<std::uint8_t*>(pixels.data())};
+}
+
+}  // namespace
+
+GreyImage grey_image(const ColourFrame& frame) try {
+  GreyImage grey{frame.size, std::vector<std::uint8_t>(frame.size.pixel_count())};
+  cv::cvtColor(matrix(frame.size, CV_8UC3, frame.bgr), matrix(grey.size, CV_8UC1, grey.pixels),
+               cv::COLOR_BGR2GRAY);
+  return grey;
+} catch (const cv::Exception&) {
+  std::throw_with_nested(InputError("expected a frame of pixels, got none"));
+}
+
+Placement sensor_placement(ImageSize frame, std::optional<ImageSize> size) {
   ImageSpec spec;
   spec.size = size;
   spec.fit = ImageFit::kCrop;
-  const Placement placement = place(frame.size, spec);
-  const VisiblePart part = visible_part(placement);
+  return place(frame, spec);
+}
 
-  // OpenCV takes no const data; nothing writes to it here.
-  const cv::Mat colour(frame.size.height, frame.size.width, CV_8UC3,
-                       const_cast<std::uint8_t*>(frame.bgr.data()));
-  cv::Mat grey;
-  cv::cvtColor(colour, grey, cv::COLOR_BGR2GRAY);
+GreyImage sensor_image(const GreyImage& frame, std::optional<ImageSize> size) try {
+  const Placement placement = sensor_placement(frame.size, size);
+  const VisiblePart part = visible_part(placement);
   cv::Mat scaled;
   const bool shrinks = placement.scaled.width < frame.size.width;
-  cv::resize(grey, scaled, cv::Size(placement.scaled.width, placement.scaled.height), 0, 0,
+  cv::resize(matrix(frame.size, CV_8UC1, frame.pixels), scaled,
+             cv::Size(placement.scaled.width, placement.scaled.height), 0, 0,
              shrinks ? cv::INTER_AREA : cv::INTER_LINEAR);
 
   GreyImage image{part.size, std::vector<std::uint8_t>(part.size.pixel_count())};
@@ -131,7 +147,7 @@ GreyImage ClipFrames::frame(std::int64_t position) {
     throw InputError("expected a frame of " + to_string(*frame_size_) + " as the first one, got " +
                      to_string(frame.size) + ", in " + ref.path);
   }
-  return sensor_image(frame, size_);
+  return sensor_image(grey_image(frame), size_);
 }
 
 }  // namespace eventgan

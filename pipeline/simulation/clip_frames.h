@@ -7,17 +7,24 @@
 #include <vector>
 
 #include "manifests/values/frames.h"
+#include "manifests/values/placement.h"
 #include "manifests/values/simulation.h"
 #include "stages/base/images/image_file.h"
 #include "stages/frames/decoding/frame_decoder.h"
 
 namespace eventgan {
 
-/// A frame as a simulated sensor of `size` sees it: grey (ITU-R BT.601, 8 bit), scaled to cover the
-/// sensor, averaging over areas when it shrinks and bilinear when it grows, cut around the centre.
-/// Without a size: grey alone. No blur, which would take away the contrast that makes events.
-/// Throws InputError if it cannot be resized. Thread safe.
-GreyImage sensor_image(const ColourFrame& frame, std::optional<ImageSize> size);
+/// ITU-R BT.601, 8 bit. Throws InputError if OpenCV refuses it. Thread safe, as all of these.
+GreyImage grey_image(const ColourFrame& frame);
+
+/// A frame as a simulated sensor of `size` sees it: scaled to cover the sensor, averaging over
+/// areas when it shrinks and bilinear when it grows, cut around the centre. Without a size: as it
+/// is. No blur, which would take away the contrast that makes events. Throws InputError if it
+/// cannot be resized.
+GreyImage sensor_image(const GreyImage& frame, std::optional<ImageSize> size);
+
+/// Where frames of this size lie in it. Throws std::invalid_argument for an empty frame.
+Placement sensor_placement(ImageSize frame, std::optional<ImageSize> size);
 
 /// The frames of a clip that a simulation uses: every `frame_step`-th from `first_frame` on of a
 /// video, or of a folder of images in the order of their numbers or names. Not thread safe.

@@ -16,10 +16,10 @@ namespace eventgan {
 namespace {
 
 nlohmann::json source_json(const SimulationSource& source) {
-  nlohmann::json json = {{"path", source.path},
-                         {"method", to_string(source.method)},
-                         {"first_frame", source.first_frame},
-                         {"frame_step", source.frame_step}};
+  nlohmann::json json = {{"path", source.path}, {"method", to_string(source.method)}};
+  if (source.method == SimulationMethod::kStills) return json;  // each is what it is of
+  json["first_frame"] = source.first_frame;
+  json["frame_step"] = source.frame_step;
   if (source.frames_per_second) json["frames_per_second"] = *source.frames_per_second;
   if (source.method == SimulationMethod::kAffine) {
     json["frames_per_image"] = source.frames_per_image;
@@ -34,7 +34,7 @@ nlohmann::json source_json(const SimulationSource& source) {
 
 std::string recording_settings(const SimulationManifest& manifest, const SimulationSource& source,
                                const std::string& recording, const std::string& files_hash,
-                               std::optional<std::int64_t> image) {
+                               std::optional<std::int64_t> image, const std::string& still) {
   nlohmann::json json = {{"program", program_version()},
                          {"libraries", "OpenCV " + cv::getVersionString()},
                          {"seed", manifest.seed},
@@ -43,6 +43,7 @@ std::string recording_settings(const SimulationManifest& manifest, const Simulat
                          {"files", files_hash},
                          {"sensor", nlohmann::json::parse(to_json(manifest.sensor))}};
   if (image) json["image"] = *image;
+  if (!still.empty()) json["still"] = still;
   if (manifest.size) {
     json["size"] = {{"width", manifest.size->width}, {"height", manifest.size->height}};
   }
@@ -107,6 +108,21 @@ std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest
     for (std::int64_t i = 0; i < clip.count(); ++i) {
       add(numbered(source.name, i), i, source.frames_per_image);
     }
+  }
+  return recordings;
+}
+
+std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest,
+                                              const SimulationSource& source,
+                                              const StillScenes& scenes,
+                                              const std::filesystem::path& folder) {
+  std::vector<PlannedRecording> recordings;
+  for (std::int64_t i = 0; i < scenes.count(); ++i) {
+    const std::string name = numbered(source.name, i);
+    recordings.push_back(
+        {name, folder / (name + ".hdf5"),
+         recording_settings(manifest, source, name, scenes.hash(i), std::nullopt, scenes.still(i)),
+         i, scenes.frame_count(i)});
   }
   return recordings;
 }

@@ -8,6 +8,7 @@
 
 #include "manifests/values/simulation.h"
 #include "pipeline/simulation/clip_frames.h"
+#include "pipeline/simulation/still_scenes.h"
 
 namespace eventgan {
 
@@ -16,10 +17,11 @@ namespace eventgan {
 /// came from, and tells whether an existing one is what a job would make. What the manifest says of
 /// other recordings is left out, so that they may change.
 ///
-/// `image`: kAffine, the number of the image within its clip; none for a whole clip.
+/// `image`: kAffine, the number of the image within its clip; none for a whole clip. `still`:
+/// kStills, its name; else empty.
 std::string recording_settings(const SimulationManifest& manifest, const SimulationSource& source,
                                const std::string& recording, const std::string& files_hash,
-                               std::optional<std::int64_t> image);
+                               std::optional<std::int64_t> image, const std::string& still = "");
 
 /// Throws UsageError if the recording with the settings `found` was made of another clip than one
 /// with `expected` would be: it is somebody else's.
@@ -34,8 +36,9 @@ void check_same_settings(const std::filesystem::path& file, const std::string& f
 struct PlannedRecording {
   std::string name;  ///< and random key; the file is NAME with the ending of its format
   std::filesystem::path file;
-  std::string settings;               ///< recording_settings()
-  std::optional<std::int64_t> image;  ///< kAffine: position of its image among the clip's frames
+  std::string settings;  ///< recording_settings()
+  /// kAffine: position of its image among the clip's frames; kStills: of its clip.
+  std::optional<std::int64_t> image;
   std::int64_t frame_count = 0;
 };
 
@@ -44,6 +47,12 @@ struct PlannedRecording {
 std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest,
                                               const SimulationSource& source,
                                               const ClipFrames& clip,
+                                              const std::filesystem::path& folder);
+
+/// One for each clip, NAME-000 and so on. Throws as StillScenes::hash.
+std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest,
+                                              const SimulationSource& source,
+                                              const StillScenes& scenes,
                                               const std::filesystem::path& folder);
 
 }  // namespace eventgan

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "manifests/documents/detail/json_text.h"
+#include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "pipeline/runtime/memory.h"
 #include "pipeline/runtime/threads.h"
@@ -19,6 +20,9 @@
 #include "pipeline/simulation/recording_output.h"
 #include "pipeline/simulation/recording_plan.h"
 #include "pipeline/simulation/scene.h"
+#include "pipeline/simulation/still_scenes.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/base/files/input_file.h"
 #include "stages/base/files/unfinished_files.h"
 #include "stages/events/simulation/sensor.h"
 #include "stages/events/simulation/simulate_pair.h"
@@ -83,13 +87,28 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A source, its clip, and the recordings of it that are to be made.
+/// A source, its clip, and the recordings of it that are to be made, one after another. Clips of
+/// stills, which read nothing in order, have one each.
 struct SourceWork {
   const SimulationSource* source = nullptr;
-  std::unique_ptr<ClipFrames> clip;
+  std::unique_ptr<ClipFrames> clip;  ///< or else
+  std::shared_ptr<const StillScenes> stills;
   std::vector<PlannedRecording> to_do;
   std::vector<RecordingSummary> made;
 };
+
+/// Labels beside a recording. Throws UsageError rather than replace another file.
+void write_labels(const fs::path& recording, const std::string& labels) {
+  const fs::path file = fs::path(recording).replace_extension(".json");
+  constexpr std::string_view kBegin = R"({"format":"eventgan-labels")";
+  if (fs::exists(file) && !read_text_file(file).starts_with(kBegin)) {
+    throw UsageError(
+        "expected labels that eventgan simulate has written, or no file, got another, "
+        "in " +
+        file.string() + " (choose another output folder, or remove it yourself)");
+  }
+  write_file_atomically(file, labels);
+}
 
 /// Opens every source's clip and leaves out the recordings that are there, or with `overwrite`
 /// makes sure that they are of this clip.
@@ -97,38 +116,51 @@ std::vector<SourceWork> plan_work(const SimulationManifest& manifest, const fs::
                                   bool overwrite, std::vector<std::string>& kept) {
   std::vector<SourceWork> works;
   for (const SimulationSource& source : manifest.sources) {
-    SourceWork work{&source, std::make_unique<ClipFrames>(source, manifest), {}, {}};
-    for (PlannedRecording& recording : plan_recordings(manifest, source, *work.clip, folder)) {
+    const auto is_to_do = [&](const PlannedRecording& recording) {
       const auto found = settings_on_disk(recording.file);
       if (found && overwrite) check_same_clip(recording.file, *found, recording.settings);
-      if (!found || overwrite) {
-        work.to_do.push_back(std::move(recording));
-        continue;
-      }
+      if (!found || overwrite) return true;
       check_same_settings(recording.file, *found, recording.settings);
       kept.push_back(recording.name);
+      return false;
+    };
+    if (source.method == SimulationMethod::kStills) {
+      const auto stills = std::make_shared<const StillScenes>(source, manifest);
+      for (PlannedRecording& recording : plan_recordings(manifest, source, *stills, folder)) {
+        if (!is_to_do(recording)) continue;
+        works.push_back({&source, nullptr, stills, {}, {}});
+        works.back().to_do.push_back(std::move(recording));
+      }
+      continue;
+    }
+    SourceWork work{&source, std::make_unique<ClipFrames>(source, manifest), nullptr, {}, {}};
+    for (PlannedRecording& recording : plan_recordings(manifest, source, *work.clip, folder)) {
+      if (is_to_do(recording)) work.to_do.push_back(std::move(recording));
     }
     works.push_back(std::move(work));
   }
   return works;
 }
 
-std::unique_ptr<Scene> make_scene(const SimulationSource& source, ClipFrames& clip,
-                                  const PlannedRecording& recording, CounterRandom random) {
+std::unique_ptr<Scene> make_scene(const SourceWork& work, const PlannedRecording& recording,
+                                  CounterRandom random) {
+  const SimulationSource& source = *work.source;
   switch (source.method) {
     case SimulationMethod::kClip:
-      return std::make_unique<ClipScene>(clip, ClipMotion::kFlow);
+      return std::make_unique<ClipScene>(*work.clip, ClipMotion::kFlow);
     case SimulationMethod::kDifference:
-      return std::make_unique<ClipScene>(clip, ClipMotion::kFade);
+      return std::make_unique<ClipScene>(*work.clip, ClipMotion::kFade);
+    case SimulationMethod::kStills:
+      return work.stills->scene(recording.image.value());
     case SimulationMethod::kAffine:
       break;
   }
-  GreyImage image = clip.frame(recording.image.value());
+  GreyImage image = work.clip->frame(recording.image.value());
   const int frames = source.frames_per_image;
   const double a_frame_px = source.max_displacement_px * random.keyed("displacement").uniform(0);
   const AffineMotion motion =
       random_affine_motion(image.size, a_frame_px * frames, random.keyed("motion"));
-  return std::make_unique<AffineScene>(std::move(image), motion, frames, 1 / clip.rate_hz());
+  return std::make_unique<AffineScene>(std::move(image), motion, frames, 1 / work.clip->rate_hz());
 }
 
 std::int64_t frame_total(const std::vector<SourceWork>& works) {
@@ -143,7 +175,10 @@ void run(SourceWork& work, const SimulationManifest& manifest,
          const std::function<void()>& on_frame) {
   for (const PlannedRecording& recording : work.to_do) {
     const CounterRandom random = CounterRandom(manifest.seed).keyed(recording.name);
-    const auto scene = make_scene(*work.source, *work.clip, recording, random);
+    const auto scene = make_scene(work, recording, random);
+    if (work.stills) {
+      write_labels(recording.file, work.stills->labels(recording.image.value()));
+    }
     work.made.push_back(record(*scene, manifest.sensor, random.keyed("sensor"), recording.file,
                                recording.settings, on_frame));
   }

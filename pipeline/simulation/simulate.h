@@ -59,8 +59,9 @@ struct SimulationOptions {
   std::function<std::unique_ptr<Progress>(std::int64_t)> make_progress;
 };
 
-/// The job: makes every recording of the manifest that is not there yet, sources in parallel. A
-/// recording is there when a file of its name is: files appear whole. All random numbers come from
+/// The job: makes every recording of the manifest that is not there yet, sources, and the clips of
+/// stills, in parallel. A recording is there when a file of its name is: files appear whole. Those
+/// of stills have their labels beside them, NAME.json. All random numbers come from
 /// the manifest's seed and the recording's name, so neither threads nor other sources change it.
 ///
 /// Throws UsageError if a recording on disk was made with other settings, InputError if a clip

@@ -27,13 +27,19 @@ class RenumberedDataset final : public WrappedDataset {
 
   const LabelSchema& label_schema() const override { return schema_; }
   Outcome<Annotation> annotation(const std::string& label_key) const override {
-    Outcome<Annotation> read = dataset_->annotation(label_key);
+    return renumbered(dataset_->annotation(label_key));
+  }
+  Outcome<Annotation> still_annotation(const std::string& label_key) const override {
+    return renumbered(dataset_->still_annotation(label_key));
+  }
+
+ private:
+  Outcome<Annotation> renumbered(Outcome<Annotation> read) const {
     if (is_fault(read)) return read;
     for (Box& box : read->boxes) box.class_id = numbers_.at(static_cast<std::size_t>(box.class_id));
     return read;
   }
 
- private:
   LabelSchema schema_;
   std::vector<int> numbers_;  ///< by the dataset's own
 };

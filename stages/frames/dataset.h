@@ -12,6 +12,7 @@
 #include "manifests/values/frames.h"
 #include "manifests/values/job.h"
 #include "manifests/values/labels.h"
+#include "manifests/values/outline_counts.h"
 
 namespace eventgan {
 
@@ -51,8 +52,9 @@ struct EventWindow {
 
 /// What the frames of a pair are made of, if they are not stored: of a clip made of a still.
 struct MadePair {
-  std::vector<Box> boxes = {};        ///< of the still
+  std::vector<Box> boxes = {};        ///< of the still, with outlines of all that moves on its own
   std::vector<StillPose> poses = {};  ///< as FramePair::poses; empty: the frames are stored
+  OutlineCounts outlines = {};        ///< of `boxes`, in the first pair of a clip
 };
 
 class ImageSizes;  // stages/frames/decoding/frame_decoder.h
@@ -81,6 +83,11 @@ class Dataset {
 
   /// Reads one annotation. A fault if it is malformed ("expected X, got Y, in PATH:LINE").
   virtual Outcome<Annotation> annotation(const std::string& label_key) const = 0;
+
+  /// Of a frame that is made of a still, the still's own annotation; else as `annotation`.
+  virtual Outcome<Annotation> still_annotation(const std::string& label_key) const {
+    return annotation(label_key);
+  }
 
   /// Of the pair of a labelled frame, what its frames are made of. A fault if it cannot be told.
   virtual Outcome<MadePair> made_pair(const std::string& /*label_key*/) const { return MadePair(); }

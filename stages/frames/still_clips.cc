@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -19,14 +20,18 @@
 #include "manifests/values/outlines.h"
 #include "manifests/values/pair_key.h"
 #include "manifests/values/still_motion.h"
+#include "stages/frames/decoding/cut_out.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/decoding/shared_results.h"
 #include "stages/frames/wrapped_dataset.h"
 
 namespace eventgan {
 namespace {
 
 constexpr double kUsualRate_hz = 20;
-constexpr double kLeastSeen = 0.05;  // of a box, or it is left out
+constexpr double kLeastSeen = 0.05;      // of a box, or it is left out
+constexpr std::size_t kKeptStills = 64;  // read once for all frames of their clips
+constexpr int kKeptVideoFrames = 2;
 
 /// Where a still's points lie in a frame of its clip.
 class Frame {
@@ -67,10 +72,9 @@ class Frame {
   }
 
  private:
-  /// Edges lie half a pixel before the centre of the pixel with their number.
   Point edge(const AffineMap& map, Point p) const {
-    p = mapped(map, {p.x - 0.5, p.y - 0.5});
-    return {p.x + 0.5 - window_.x, p.y + 0.5 - window_.y};
+    p = mapped_edge(map, p);
+    return {p.x - window_.x, p.y - window_.y};
   }
 
   ImageSize image_;
@@ -80,6 +84,10 @@ class Frame {
 
 double area_of(const Rectangle& box) {
   return std::max(box.right - box.left, 0.0) * std::max(box.bottom - box.top, 0.0);
+}
+
+double scale_of(const AffineMap& map) {
+  return std::sqrt(std::abs(map[0] * map[4] - map[1] * map[3]));
 }
 
 Rectangle cut(const Rectangle& box, const Rectangle& area) {
@@ -118,11 +126,25 @@ void forget_space(Box& box) {
   box.box3d = unknown.box3d;
 }
 
+/// A still, and what of it moves on its own.
+struct Still {
+  Annotation annotation;   ///< the labels' own
+  std::vector<Box> boxes;  ///< its, with outlines of the objects that were cut out, too
+  ImageSize size;
+  OutlineCounts outlines;
+  std::vector<std::size_t> carriers;  ///< of `boxes`
+};
+
 /// The labels of one frame.
 class FrameLabels {
  public:
-  FrameLabels(const Annotation& still, const Frame& frame)
-      : still_(still), frame_(frame), owner_(frame.size().pixel_count(), kNobody) {}
+  FrameLabels(const Still& still, const Frame& frame)
+      : still_(still.annotation),
+        boxes_(still.boxes),
+        carriers_(still.carriers),
+        image_{0, 0, double(still.size.width), double(still.size.height)},
+        frame_(frame),
+        owner_(frame.size().pixel_count(), kNobody) {}
 
   Annotation labels() {
     Annotation moved = still_;
@@ -150,7 +172,8 @@ class FrameLabels {
   /// What can be seen of an object; none of one of which hardly anything can.
   std::optional<Box> object(std::size_t k) {
     Box box = still_.boxes[k];
-    const Outline whole = frame_.outline(frame_.object_map(k, box), box.outline);
+    const AffineMap map = frame_.object_map(k, box);
+    const Outline whole = frame_.outline(map, boxes_[k].outline);
     GreyImage mask = mask_of(whole, frame_.size());
     const double pixels = static_cast<double>(covered_pixels(whole, frame_.size()));
     const double inside = static_cast<double>(count(mask));
@@ -158,14 +181,19 @@ class FrameLabels {
       if (mask.pixels[i] == 0) continue;
       if (owner_[i] == kNobody) {
         owner_[i] = k;
-      } else {
+      } else if (carriers_[owner_[i]] != carriers_[k]) {  // else it is as it was in the still
         mask.pixels[i] = 0;
       }
     }
     const double seen = static_cast<double>(count(mask));
     if (seen == 0 || seen < kLeastSeen * pixels) return std::nullopt;
-    box.outline = outline_of(mask);
-    box.xyxy = bounds(box.outline);
+    const Outline visible = outline_of(mask);
+    if (box.outline.empty()) {
+      box.xyxy = box_around(bounds(visible), bounds(whole), k, scale_of(map));
+    } else {
+      box.outline = visible;
+      box.xyxy = bounds(visible);
+    }
     box.truncation = truncated(box.truncation, 1 - inside / pixels);
     const double hidden = 1 - seen / inside;
     constexpr double kHardly = 0.05, kHalf = 0.5;
@@ -174,6 +202,23 @@ class FrameLabels {
     if (box.track_id < 0) box.track_id = static_cast<std::int64_t>(k);
     forget_space(box);
     return box;
+  }
+
+  /// The box of what is seen of an object that was cut out of its box: of the still's box around
+  /// it as much is left on each side where nothing covers it. So it is that box where nothing
+  /// moves.
+  Rectangle box_around(const Rectangle& seen, const Rectangle& whole, std::size_t k,
+                       double scale) const {
+    constexpr double kRounding_px = 1;
+    const Rectangle box = cut(still_.boxes[k].xyxy, image_), inner = bounds(boxes_[k].outline);
+    const auto margin = [&](double of_seen, double of_whole, double width) {
+      return std::abs(of_seen - of_whole) <= kRounding_px ? std::max(width, 0.0) * scale : 0;
+    };
+    return cut({seen.left - margin(seen.left, whole.left, inner.left - box.left),
+                seen.top - margin(seen.top, whole.top, inner.top - box.top),
+                seen.right + margin(seen.right, whole.right, box.right - inner.right),
+                seen.bottom + margin(seen.bottom, whole.bottom, box.bottom - inner.bottom)},
+               frame_.area());
   }
 
   std::optional<Box> part_of_image(std::size_t k) const {
@@ -209,13 +254,13 @@ class FrameLabels {
       any_inside = true;
       const std::size_t owner =
           owner_[static_cast<std::size_t>(y) * frame_.size().width + static_cast<std::size_t>(x)];
-      const bool is_covered = owner != kNobody && owner != object && is_nearer(owner, person);
+      const bool is_covered =
+          owner != kNobody && !goes_with(object, owner) && is_nearer(owner, person);
       if (is_covered && joint.visible == 1) joint.visible = 0;
     }
     if (!any_inside) return;
     person.center = frame_.point(map, person.center);
-    const double factor = std::sqrt(std::abs(map[0] * map[4] - map[1] * map[3]));
-    if (person.scale >= 0) person.scale *= factor;
+    if (person.scale >= 0) person.scale *= scale_of(map);
     if (person.head_box) person.head_box = frame_.box(map, *person.head_box);
     if (person.box) person.box = frame_.box(map, *person.box);
     person.joints3d_mm.clear();
@@ -224,14 +269,24 @@ class FrameLabels {
     moved.persons.push_back(std::move(person));
   }
 
+  /// Whether they move as one, so that one hides of the other what it did in the still.
+  bool goes_with(std::size_t object, std::size_t owner) const {
+    return object != kNobody && carriers_[object] == carriers_[owner];
+  }
+
   bool is_nearer(std::size_t k, const Person& person) const {
     return person.box && still_.boxes[k].xyxy.bottom > person.box->bottom;
   }
 
   const Annotation& still_;
+  const std::vector<Box>& boxes_;  ///< as Still's, and
+  const std::vector<std::size_t>& carriers_;
+  Rectangle image_;
   const Frame& frame_;
   std::vector<std::size_t> owner_;  ///< of the frame's pixels: the nearest object there
 };
+
+using SharedStill = std::shared_ptr<const Outcome<Still>>;
 
 class StillClips final : public WrappedDataset {
  public:
@@ -240,7 +295,9 @@ class StillClips final : public WrappedDataset {
         spec_(manifest.sources[source]),
         seed_(manifest.seed),
         key_(source_key(manifest.sources, source)),
-        base_(manifest.directory) {
+        base_(manifest.directory),
+        range_(manifest.image.range),
+        decoder_(manifest.directory, kKeptVideoFrames) {
     const int last = spec_.pairs.clip_frames.value();
     const int first = spec_.pairs.side == PairSide::kBefore ? 1 : 0;
     for (const LabelledFrame& still : dataset_->labelled_frames()) {
@@ -265,24 +322,25 @@ class StillClips final : public WrappedDataset {
 
   Outcome<Annotation> annotation(const std::string& label_key) const override {
     const Scene scene = scene_of(label_key);
-    const Outcome<Annotation> still = dataset_->annotation(scene.still->label_key);
-    if (is_fault(still)) return still;
-    const Outcome<ImageSize> size = size_of(*scene.still);
-    if (is_fault(size)) return size.fault();
-    const StillPose pose = poses(*scene.still, still->boxes, *size, scene.frame).back();
-    const Frame frame(*size, pose);
-    return FrameLabels(*still, frame).labels();
+    const SharedStill still = still_of(*scene.still);
+    if (is_fault(*still)) return still->fault();
+    const StillPose pose = poses(*scene.still, **still, scene.frame).back();
+    const Frame frame((*still)->size, pose);
+    return FrameLabels(**still, frame).labels();
+  }
+
+  Outcome<Annotation> still_annotation(const std::string& label_key) const override {
+    return dataset_->annotation(scene_of(label_key).still->label_key);
   }
 
   Outcome<MadePair> made_pair(const std::string& label_key) const override {
     const Scene scene = scene_of(label_key);
-    Outcome<Annotation> still = dataset_->annotation(scene.still->label_key);
-    if (is_fault(still)) return still.fault();
-    const Outcome<ImageSize> size = size_of(*scene.still);
-    if (is_fault(size)) return size.fault();
+    const SharedStill still = still_of(*scene.still);
+    if (is_fault(*still)) return still->fault();
     const int next = spec_.pairs.side == PairSide::kBefore ? scene.frame : scene.frame + 1;
-    std::vector<StillPose> all = poses(*scene.still, still->boxes, *size, next);
-    return MadePair{std::move(still->boxes), {all.end() - 2, all.end()}};
+    const std::vector<StillPose> all = poses(*scene.still, **still, next);
+    const OutlineCounts counts = next == 1 ? (*still)->outlines : OutlineCounts();
+    return MadePair{(*still)->boxes, {all.end() - 2, all.end()}, counts};
   }
 
   std::optional<ImageSize> made_size(const std::string& label_key) const override {
@@ -324,19 +382,53 @@ class StillClips final : public WrappedDataset {
     return sizes.of(base_ / still.frame.path, orientation_of(spec_.dataset));
   }
 
-  std::vector<StillPose> poses(const LabelledFrame& still, const std::vector<Box>& boxes,
-                               ImageSize size, int last) const {
-    const PairKey key{seed_, to_string(spec_.dataset), still.sample_id, key_};
-    return clip_poses(spec_.pairs.stills.value(), key.pair(), boxes, size, last);
+  SharedStill still_of(const LabelledFrame& frame) const {
+    return shared_.get(frame.label_key, [&] {
+      try {
+        return std::make_shared<const Outcome<Still>>(read_still(frame));
+      } catch (const std::runtime_error& error) {
+        return std::make_shared<const Outcome<Still>>(
+            SampleFault{fmt::format("{}, in {}", error.what(), frame.frame.path)});
+      }
+    });
+  }
+
+  Outcome<Still> read_still(const LabelledFrame& frame) const {
+    Outcome<Annotation> annotation = dataset_->annotation(frame.label_key);
+    if (is_fault(annotation)) return annotation.fault();
+    const Outcome<ImageSize> size = size_of(frame);
+    if (is_fault(size)) return size.fault();
+    Still still{std::move(*annotation), {}, *size, {}, {}};
+    still.boxes = still.annotation.boxes;
+    if (!spec_.pairs.stills.value().objects) return still;
+    const auto has_no_outline = [](const Box& box) { return !box.ignore && box.outline.empty(); };
+    ColourFrame image;  // which nobody needs else
+    if (std::ranges::any_of(still.boxes, has_no_outline)) {
+      Outcome<ColourFrame> decoded =
+          decoder_.decode(frame.frame, spec_.every, orientation_of(spec_.dataset), range_);
+      if (is_fault(decoded)) return decoded.fault();
+      image = std::move(*decoded);
+    }
+    still.outlines = cut_out_missing({image.size, image.bgr.data()}, still.boxes);
+    still.carriers = carriers(still.boxes);
+    return still;
+  }
+
+  std::vector<StillPose> poses(const LabelledFrame& frame, const Still& still, int last) const {
+    const PairKey key{seed_, to_string(spec_.dataset), frame.sample_id, key_};
+    return clip_poses(spec_.pairs.stills.value(), key.pair(), still.boxes, still.size, last);
   }
 
   SourceSpec spec_;
   std::uint64_t seed_;
   std::string key_;
   std::filesystem::path base_;
+  std::optional<ValueRange> range_;
   std::vector<LabelledFrame> frames_;
   std::unordered_map<std::string, const LabelledFrame*> stills_;  ///< by their labels' keys
+  FrameDecoder decoder_;
   mutable ImageSizes sizes_;
+  mutable SharedResults<SharedStill> shared_{kKeptStills};
 };
 
 }  // namespace

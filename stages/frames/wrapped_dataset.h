@@ -11,7 +11,8 @@
 
 namespace eventgan {
 
-/// A dataset as another one has it, but for what a class derived from it says.
+/// A dataset as another one has it, but for what a class derived from it says. (Its
+/// still_annotation is its annotation, which may be more than the other one's.)
 class WrappedDataset : public Dataset {
  public:
   const LabelSchema& label_schema() const override { return dataset_->label_schema(); }

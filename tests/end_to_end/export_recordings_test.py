@@ -16,6 +16,7 @@ import program
 import small_job
 from exported_demo import Export, of, read_samples
 from program import run
+from rvt_sequence import RvtSequence
 
 setUpModule, tearDownModule = demo.set_up, demo.tear_down
 
@@ -64,31 +65,6 @@ def decode_evt3(data):
     events = words >> 12 == 2
     return (height, width), (t[events], words[events] & 0x7ff, last(0, words & 0x7ff)[1][events],
                              words[events] >> 11 & 1)
-
-
-class RvtSequence:
-    """What RVT's SequenceBase and ObjectLabelFactory make of a sequence; their assertions stay."""
-
-    def __init__(self, path, representation, size):
-        folder = path / "event_representations_v2" / representation
-        with np.load(path / "labels_v2" / "labels.npz") as data:
-            self.labels, self.label_idx = data["labels"], data["objframe_idx_2_label_idx"]
-        self.repr_idx = np.load(folder / "objframe_idx_2_repr_idx.npy")
-        self.repr_times = np.load(folder / "timestamps_us.npy")
-        self.frame_times = np.load(path / "labels_v2" / "timestamps_us.npy")
-        with h5py.File(folder / "event_representations.h5") as file:
-            assert file["data"].chunks == (1, *file["data"].shape[1:])
-            self.data = file["data"][:]
-        assert len(self.label_idx) == len(np.unique(self.labels["t"])) == len(self.repr_idx) == len(self.frame_times)
-        x, y, w, h = (self.labels[name].astype("float32") for name in "xywh")
-        for begin, extent, side in ((x, w, size[1]), (y, h, size[0])):
-            assert (np.clip(begin + extent, 0, side - 1) - np.clip(begin, 0, side - 1) > 0).all()
-
-    def frame(self, k):
-        """Boxes, and the representation they are of."""
-        end = self.label_idx[k + 1] if k + 1 < len(self.label_idx) else len(self.labels)
-        assert end > self.label_idx[k]
-        return self.labels[self.label_idx[k]:end], self.repr_idx[k]
 
 
 class Recordings(Export):

@@ -10,6 +10,7 @@ import PIL.Image
 
 import program
 from program import SHARED, manifest, run, text
+from rvt_sequence import RvtSequence
 
 PHOTOS = SHARED / "labelled_frames"
 
@@ -213,6 +214,104 @@ class Stills(program.InFolder):
         self.assertTrue(list((self.folder / "preview").rglob("*.png")))
         run("report", self.folder / "out", "--out", self.folder / "report.html")
         self.assertIn("stills of", (self.folder / "report.html").read_text())
+
+    def test_rvt_reads_sequences_of_clips_with_labels_in_every_window(self):
+        """As many windows as a sequence of RVT's has; with outlines, and from boxes alone."""
+        windows = 21
+        folder = self.photos("coco256", 256)
+        coco = json.loads((PHOTOS / "coco256" / "instances.json").read_text())
+        # Persons who fill a good part of the picture, and so do not leave it: RVT wants labels in each window.
+        large = {}
+        sizes = {image["id"]: image for image in coco["images"]}
+        for one in coco["annotations"]:
+            image, (x, y, w, h) = sizes[one["image_id"]], one["bbox"]
+            centred = abs(x + w / 2 - image["width"] / 2) < image["width"] / 8
+            if not one.get("iscrowd") and w * h > 0.1 * image["width"] * image["height"] and centred:
+                large.setdefault(one["image_id"], []).append(one)
+        chosen = [name for name in sorted(large) if (folder / sizes[name]["file_name"]).is_file()][:2]
+        self.assertEqual(len(chosen), 2)
+        kept = {sizes[name]["file_name"] for name in chosen}
+        for path in folder.iterdir():
+            if path.name not in kept:
+                path.unlink()
+        for outlines in (True, False):
+            boxes = [{key: value for key, value in one.items() if outlines or key != "segmentation"}
+                     for name in chosen for one in large[name]]
+            (self.folder / "coco.json").write_text(json.dumps(
+                {"images": [sizes[name] for name in chosen], "annotations": boxes,
+                 "categories": coco["categories"]}))
+            pairs = stills(objects={"translation_px": [1, 4]})
+            job = manifest([{"dataset": "frames", "root": "photos", "pairs": {**pairs, "frames": windows},
+                             "labels": {"format": "coco", "path": "coco.json"}}],
+                           generator={"kind": "difference"}, image={"width": 304, "height": 240, "preset": "mpii"},
+                           output={"directory": "out", "samples_per_shard": 64})
+            self.convert(job)
+            _, warned = run("preview", self.folder / "out", "--out", self.folder / "preview", "--count", "3")
+            self.assertEqual(warned, "")  # their frames are made again
+            shutil.rmtree(self.folder / "rvt", ignore_errors=True)
+            run("export", self.folder / "out", "--to", "rvt", "--out", self.folder / "rvt", "--progress", "none")
+            sequences = sorted((self.folder / "rvt" / "preprocessed").glob("*/*"))
+            self.assertEqual(len(sequences), len(chosen))
+            for path in sequences:
+                sequence = RvtSequence(path, "eventgan_nbins=9", (240, 304))
+                self.assertEqual(len(sequence.data), windows)
+                np.testing.assert_array_equal(np.diff(sequence.repr_times), 50000)
+                np.testing.assert_array_equal(sequence.repr_idx, np.arange(windows))
+                (data, labels), = sequence.random_access(windows)
+                self.assertEqual(data.shape, (windows, 18, 240, 304))
+                self.assertTrue((data.reshape(windows, -1).max(1) > 0).sum() > windows // 2)  # now and then all rests
+                self.assertFalse(any(boxes is None for boxes in labels))
+                self.assertGreater(len({tuple(boxes[0][["x", "y", "w", "h"]]) for boxes in labels}), windows // 2)
+                for track in set(labels[0]["track_id"]):
+                    seen = [boxes[boxes["track_id"] == track] for boxes in labels]
+                    places = np.array([(box["x"] + box["w"] / 2, box["y"] + box["h"] / 2) for box in seen if len(box)])
+                    self.assertLess(np.abs(np.diff(places[..., 0], axis=0)).max(), 40)
+                self.assertEqual(len(sequence.random_access(5)), windows - 4)
+                self.assertEqual([len(data) for data, _ in sequence.streams(5)], [5, 5, 5, 5, 1])
+
+    def test_simulated_clips_have_the_scenes_and_the_labels_of_converted_ones(self):
+        self.photos("pennfudan", 2)
+        for path in (self.folder / "photos").iterdir():
+            path.with_suffix(".txt").write_text("0 0.5 0.5 0.25 0.5\n")
+        (self.folder / "labels").mkdir()
+        for path in (self.folder / "photos").glob("*.txt"):
+            path.rename(self.folder / "labels" / path.name)
+        (self.folder / "labels" / "classes.txt").write_text("person\n")
+        job = manifest([{"dataset": "frames", "root": "photos", "labels": {"format": "yolo", "path": "labels"},
+                         "pairs": {**stills(objects={"translation_px": [2, 4]}), "frames": 5}}],
+                       generator={"kind": "esim"}, image={"width": 120, "height": 100, "fit": "crop", "preset": "mpii"})
+        path = self.write_manifest(job)
+        run("convert", path, "--progress", "none")
+        run("finalize", self.folder / "out")
+        (self.folder / "simulate.json").write_text(json.dumps({
+            "format": "eventgan-simulation", "version": 1, "name": "s", "size": {"width": 120, "height": 100},
+            "sources": [{"path": "manifest.json", "method": "stills", "name": "clip"}],
+            "output": {"directory": "recordings"}}))
+        run("simulate", self.folder / "simulate.json", "--progress", "none", "--threads", "2")
+        with h5py.File(self.folder / "out" / "dataset.h5") as view:
+            ids, offsets = view["pairs/sample_id"].asstr()[:], view["labels/boxes/offsets"][:]
+            xyxy = view["labels/boxes/xyxy"][:]
+        for number, name in enumerate(sorted({one.rsplit("/", 1)[0] for one in ids})):
+            labels = json.loads((self.folder / "recordings" / f"clip-{number:03}.json").read_text())["samples"]
+            self.assertEqual([round(one["time_s"], 6) for one in labels], [0.05, 0.1, 0.15, 0.2, 0.25])
+            with h5py.File(self.folder / "recordings" / f"clip-{number:03}.hdf5") as file:
+                self.assertEqual(file["davis/left/image_raw"].shape, (6, 100, 120))
+                self.assertEqual(json.loads(file.attrs["simulation"])["still"], name)
+            for k, one in enumerate(labels):
+                row = list(ids).index(f"{name}/{k + 1:04}")
+                np.testing.assert_allclose(
+                    [[box[edge] for edge in ("left", "top", "right", "bottom")] for box in one["boxes"]],
+                    xyxy[offsets[row]:offsets[row + 1]], atol=1e-6)
+        # And as recordings with labels they are converted like any camera's.
+        job = manifest([{"dataset": "recording", "root": "recordings", "window_s": 0.05}],
+                       generator={"kind": "events"}, output={"directory": "windows", "samples_per_shard": 64}, image={})
+        run("convert", self.write_manifest(job, "windows.json"), "--progress", "none")
+        shard, = (self.folder / "windows").glob("*-of-*.h5")
+        with h5py.File(shard) as file:
+            self.assertEqual(len(file["valid"]), 10)
+            self.assertTrue(file["valid"][:].all())
+            self.assertEqual(set(file["labels/boxes/track_id"][:]), {0})
+            self.assertTrue(file["events/volume"][:].any(axis=(1, 2, 3)).all())
 
 
 if __name__ == "__main__":

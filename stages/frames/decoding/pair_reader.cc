@@ -1,7 +1,6 @@
 #include "stages/frames/decoding/pair_reader.h"
 
 #include <algorithm>
-#include <exception>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -12,43 +11,6 @@
 #include "stages/frames/decoding/prepared_frame.h"
 
 namespace eventgan {
-
-SharedImages::SharedImages(std::size_t most) : most_(std::max<std::size_t>(most, 1)) {}
-
-SharedFrame SharedImages::get(const std::string& name, const std::function<SharedFrame()>& make) {
-  std::promise<SharedFrame> promise;
-  {
-    std::unique_lock lock(mutex_);
-    if (const auto found = by_name_.find(name); found != by_name_.end()) {
-      images_.splice(images_.begin(), images_, found->second);
-      const std::shared_future<SharedFrame> frame = found->second->frame;
-      lock.unlock();
-      return frame.get();
-    }
-    add(name, promise.get_future().share());
-  }
-  try {
-    SharedFrame frame = make();
-    promise.set_value(frame);
-    return frame;
-  } catch (...) {
-    promise.set_exception(std::current_exception());
-    throw;
-  }
-}
-
-bool SharedImages::has(const std::string& name) {
-  const std::lock_guard lock(mutex_);
-  return by_name_.contains(name);
-}
-
-void SharedImages::add(const std::string& name, std::shared_future<SharedFrame> frame) {
-  images_.push_front({name, std::move(frame)});
-  by_name_[images_.front().name] = images_.begin();
-  if (images_.size() <= most_) return;
-  by_name_.erase(images_.back().name);
-  images_.pop_back();
-}
 
 void FilesAhead::expect(const std::filesystem::path& file) {
   {
@@ -98,7 +60,7 @@ SharedFrame frame_or_fault(Prepare prepare) {
   }
 }
 
-/// What SharedImages call an image.
+/// What images_ call an image.
 std::string name_of(const FrameRef& frame, ImageOrientation orientation) {
   return (orientation == ImageOrientation::kUpright ? "upright " : "stored ") + frame.path;
 }
@@ -114,7 +76,8 @@ PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_und
     : base_(std::move(base)),
       spec_(std::move(spec)),
       tells_between_(tells_between),
-      images_(std::make_unique<SharedImages>(2 * pairs_under_way + kLongestGap + kMargin)),
+      images_(std::make_unique<SharedResults<SharedFrame>>(2 * pairs_under_way + kLongestGap +
+                                                           kMargin)),
       files_(std::make_unique<FilesAhead>()),
       stills_(base_, pairs_under_way + kMargin),
       videos_(std::make_unique<OpenVideos<SharedFrame>>(

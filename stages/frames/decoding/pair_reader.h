@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <future>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -21,43 +20,10 @@
 #include "manifests/values/placement.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/decoding/prepared_frame.h"
+#include "stages/frames/decoding/shared_results.h"
 #include "stages/frames/decoding/video_frames.h"
 
 namespace eventgan {
-
-/// The images used last, so that pairs that share a frame decode it once.
-///
-/// Thread safe. Of several threads that want one image at the same time the first makes it and
-/// the others wait for it; no lock is held meanwhile, so images are made in parallel. A thread
-/// waits only for one that is making an image and itself waits for none: no deadlock.
-class SharedImages {
- public:
-  /// Keeps `most` images (at least one), whatever their size.
-  explicit SharedImages(std::size_t most);
-
-  /// The image of that name: kept, or under way in another thread, or else what `make` returns
-  /// (never null). A fault is kept like an image, and so is what `make` throws: every `get` that
-  /// finds it throws the same. `make` must not call `get`, nor lend its thread to tasks that may
-  /// (as an algorithm that runs in parallel in the same thread pool does).
-  SharedFrame get(const std::string& name, const std::function<SharedFrame()>& make);
-
-  /// Whether `get` would not call `make`, at this moment.
-  bool has(const std::string& name);
-
- private:
-  struct Image {
-    std::string name;
-    std::shared_future<SharedFrame> frame;
-  };
-
-  /// Puts a promised image in front, and the one unused for longest out.
-  void add(const std::string& name, std::shared_future<SharedFrame> frame);
-
-  std::size_t most_;
-  std::mutex mutex_;
-  std::list<Image> images_;  ///< most recently used first
-  std::unordered_map<std::string_view, std::list<Image>::iterator> by_name_;
-};
 
 /// Files of images that will be read soon: open, and being loaded by the system. Thread safe.
 class FilesAhead {
@@ -128,7 +94,7 @@ class PairReader {
   std::filesystem::path base_;
   ImageSpec spec_;
   bool tells_between_;
-  std::unique_ptr<SharedImages> images_;
+  std::unique_ptr<SharedResults<SharedFrame>> images_;
   std::unique_ptr<FilesAhead> files_;
   FrameDecoder stills_;
   std::unique_ptr<OpenVideos<SharedFrame>> videos_;

@@ -13,6 +13,8 @@
 #include "manifests/values/outlines.h"
 #include "manifests/values/still_motion.h"
 #include "stages/frames/decoding/detail/still_layers.h"
+#include "stages/frames/decoding/detail/unless_refused.h"
+#include "stages/frames/decoding/still_clip.h"
 
 namespace eventgan {
 
@@ -80,13 +82,6 @@ cv::Mat scaled_grey(const Resizable& whole, const Placement& placement, const Im
   return blurred;
 }
 
-const cv::Mat& checked_still(const cv::Mat& image) {
-  if (std::max(image.rows, image.cols) <= kMostStillSide) return image;
-  throw std::invalid_argument("expected a still of at most " + std::to_string(kMostStillSide) +
-                              " pixels a side, got " +
-                              to_string(ImageSize{image.rows, image.cols}));
-}
-
 /// How far the map moves a corner at most: of an affine one no point between them moves farther.
 double farthest(const AffineMap& map, const Rectangle& around) {
   double most = 0;
@@ -100,20 +95,19 @@ double farthest(const AffineMap& map, const Rectangle& around) {
   return most;
 }
 
-// How far an object goes on behind another beyond its outline: in a frame that nobody labels, as it
-// would; in one with labels of its own, not beyond these.
-constexpr double kFarthestBehind_px = 40, kLabelled_px = 0;
+// How far an object goes on behind another beyond its outline, in a frame that nobody labels.
+constexpr double kFarthestBehind_px = 40;
 
 /// A still that moves from the previous frame of its pair to the next.
 class MovingStill {
  public:
-  /// `image` is shared.
-  MovingStill(const cv::Mat& image, const FramePair& pair, const std::vector<Box>& boxes)
-      : size_{image.rows, image.cols},
-        image_(image),
+  /// The image is shared.
+  MovingStill(const Resizable& still, const FramePair& pair, const std::vector<Box>& boxes)
+      : size_{still.image.rows, still.image.cols},
+        image_(still.image),
         pair_(pair),
         boxes_(boxes),
-        layers_(checked_still(image), objects(), kFarthestBehind_px) {}
+        layers_(image_, objects(), kFarthestBehind_px) {}
 
   /// The frame at u, 0 previous to 1 next; it may be the image itself. Thread safe.
   cv::Mat at(double u) const {
@@ -188,64 +182,25 @@ class MovingStill {
 /// Two frames of a clip that is made of a still, and what is between them.
 class ClipFrames {
  public:
-  ClipFrames(const cv::Mat& image, const FramePair& pair, const std::vector<Box>& boxes)
-      : size_{image.rows, image.cols},
-        window_(clip_window(size_)),
-        pair_(pair),
-        boxes_(boxes),
-        layers_(checked_still(image), objects(), kLabelled_px) {}
+  ClipFrames(const Resizable& still, const FramePair& pair, const std::vector<Box>& boxes)
+      : from_(pair.poses.at(0)),
+        to_(pair.poses.at(1)),
+        type_(still.image.type()),
+        clip_({{still.image.rows, still.image.cols}, still.image.data, still.channels}, boxes,
+              from_) {}
 
   /// The frame at u, 0 previous to 1 next. Thread safe.
   cv::Mat at(double u) const {
-    const StillPose pose = pose_between(pair_.poses.at(0), pair_.poses.at(1), u);
-    std::vector<AffineMap> objects(pose.objects.size());
-    for (std::size_t k = 0; k < objects.size(); ++k) {
-      if (is_object(k)) objects[k] = inverse(object_map(pose, k));
-    }
-    return layers_.frame(inverse(image_in_clip(size_, pose)), objects)(
-        cv::Rect(window_.x, window_.y, window_.size.width, window_.size.height));
+    std::vector<std::uint8_t> pixels = clip_.frame(pose_between(from_, to_, u));
+    return cv::Mat(clip_.size().height, clip_.size().width, type_, pixels.data()).clone();
   }
 
-  double displacement_px() const {
-    const StillPose &before = pair_.poses.at(0), &after = pair_.poses.at(1);
-    const auto moves = [](const AffineMap& from, const AffineMap& to, const Rectangle& around) {
-      return farthest(compose(to, inverse(from)), around);
-    };
-    double most = moves(image_in_clip(size_, before), image_in_clip(size_, after),
-                        {-0.5, -0.5, size_.width - 0.5, size_.height - 0.5});
-    for (std::size_t k = 0; k < pair_.poses[0].objects.size(); ++k) {
-      if (!is_object(k)) continue;
-      most = std::max(most, moves(object_map(before, k), object_map(after, k), boxes_[k].xyxy));
-    }
-    return most;
-  }
+  double displacement_px() const { return clip_.displacement_px(from_, to_); }
 
  private:
-  bool is_object(std::size_t k) const {
-    return k < boxes_.size() && pair_.poses.at(0).objects.at(k).has_value() &&
-           !boxes_[k].outline.empty();
-  }
-
-  AffineMap object_map(const StillPose& pose, std::size_t k) const {
-    return object_in_clip(size_, pose, *pose.objects.at(k), boxes_.at(k));
-  }
-
-  /// All that hides anything may move any distance within a clip, and what it hides is the same in
-  /// all of its pairs.
-  std::vector<StillObject> objects() const {
-    const double far_px = size_.width + size_.height;
-    std::vector<StillObject> objects;
-    for (std::size_t k = 0; k < pair_.poses.at(0).objects.size(); ++k) {
-      if (is_object(k)) objects.push_back({k, boxes_[k].outline, boxes_[k].xyxy.bottom, far_px});
-    }
-    return objects;
-  }
-
-  ImageSize size_;
-  ClipWindow window_;
-  FramePair pair_;
-  std::vector<Box> boxes_;
-  StillLayers layers_;
+  StillPose from_, to_;
+  int type_;
+  StillClip clip_;
 };
 
 std::vector<std::uint8_t> cut(const cv::Mat& grey, const VisiblePart& part) {
@@ -266,19 +221,6 @@ constexpr auto kInputOfGrey = [] {
   return table;
 }();
 
-/// What `prepare` returns; what OpenCV and `place` throw becomes a std::runtime_error.
-template <class Prepare>
-auto unless_refused(Prepare prepare) {
-  try {
-    return prepare();
-  } catch (const cv::Exception& exception) {
-    std::throw_with_nested(
-        std::runtime_error("expected frames that can be resized, got " + exception.err));
-  } catch (const std::invalid_argument& exception) {
-    std::throw_with_nested(std::runtime_error(exception.what()));
-  }
-}
-
 PreparedFrame prepare(const Resizable& image, const Placement& placement, const ImageSpec& spec) {
   return {cut(scaled_grey(image, placement, spec), visible_part(placement)), placement};
 }
@@ -298,12 +240,12 @@ std::array<PreparedFrame, 2> prepare_still(const ColourView& image, const FrameP
     const Resizable still = grey_if_first(image, spec);
     if (!pair.poses.empty()) {
       const Placement placement = place(clip_window(image.size).size, spec);
-      const ClipFrames clip(still.image, pair, boxes);
+      const ClipFrames clip(still, pair, boxes);
       return std::array{prepare({clip.at(0), still.channels}, placement, spec),
                         prepare({clip.at(1), still.channels}, placement, spec)};
     }
     const Placement placement = place(image.size, spec, pair);
-    const MovingStill moving(still.image, pair, boxes);
+    const MovingStill moving(still, pair, boxes);
     std::array<PreparedFrame, 2> frames = {
         prepare({moving.at(moving.moved_end()), still.channels}, placement, spec),
         prepare(still, placement, spec)};
@@ -315,7 +257,8 @@ std::array<PreparedFrame, 2> prepare_still(const ColourView& image, const FrameP
 ColourFrame move_still(const ColourFrame& image, const FramePair& pair,
                        const std::vector<Box>& boxes) {
   return unless_refused([&] {
-    const MovingStill moving(matrix_of({image.size, image.bgr.data()}), pair, boxes);
+    const MovingStill moving({matrix_of({image.size, image.bgr.data()}), Channels::kBgr}, pair,
+                             boxes);
     const cv::Mat result = moving.at(moving.moved_end());
     return ColourFrame{image.size, {result.datastart, result.dataend}};
   });
@@ -335,7 +278,7 @@ FramesBetween between_of(ColourFrame image, const FramePair& pair, const ImageSp
          const std::vector<Box>& boxes)
         : image(std::move(frame)),
           still(grey_if_first({image.size, image.bgr.data()}, spec)),
-          moving(still.image, pair, boxes) {}
+          moving(still, pair, boxes) {}
   };
   const auto kept = std::make_shared<const Kept>(std::move(image), pair, spec, boxes);
   return {[kept, spec, placement](double u) {

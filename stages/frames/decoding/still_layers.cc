@@ -5,9 +5,12 @@
 #include <cmath>
 #include <cstdint>
 #include <opencv2/imgproc.hpp>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "manifests/values/outlines.h"
+#include "stages/frames/decoding/prepared_frame.h"
 
 namespace eventgan {
 namespace {
@@ -82,6 +85,13 @@ cv::Rect grown(const cv::Rect& area, int room, const cv::Mat& image) {
          whole(image);
 }
 
+const cv::Mat& checked(const cv::Mat& image) {
+  if (std::max(image.rows, image.cols) <= kMostStillSide) return image;
+  throw std::invalid_argument("expected a still of at most " + std::to_string(kMostStillSide) +
+                              " pixels a side, got " +
+                              to_string(ImageSize{image.rows, image.cols}));
+}
+
 bool is_identity(const AffineMap& map) {
   constexpr AffineMap kIdentity{1, 0, 0, 0, 1, 0};
   constexpr double kRounding = 1e-9;
@@ -126,7 +136,7 @@ void lay_over(const cv::Mat& colour, const cv::Mat& cover, cv::Mat frame) {
 }  // namespace
 
 StillLayers::StillLayers(const cv::Mat& image, std::vector<StillObject> objects, double behind_px)
-    : behind_px_(behind_px), background_(image) {
+    : behind_px_(behind_px), background_(checked(image)) {
   const auto moves = [](const StillObject& object) { return object.reach_px > 0; };
   if (std::ranges::none_of(objects, moves)) return;
   std::ranges::stable_sort(objects, {}, &StillObject::lower_edge);

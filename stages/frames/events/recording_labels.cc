@@ -193,6 +193,8 @@ class CsvLabels {
 constexpr std::string_view kFormat = "eventgan-labels";
 constexpr int kVersion = 1;
 
+constexpr std::int64_t kMostTracks = std::int64_t{1} << 53;  // as far as JSON's numbers are exact
+
 double pixel(const StrictValue& value) { return value.number(-kFarthest_px, kFarthest_px); }
 
 Rectangle read_rectangle(const StrictValue& value) {
@@ -216,6 +218,8 @@ Box read_box(const StrictValue& value, ClassNumbers& classes) {
     box.difficulty = counts.difficulty;
     box.ignore = counts.ignore;
   }
+  if (const auto track = object.find("track"))
+    box.track_id = track->integer(std::int64_t{0}, kMostTracks);
   object.finish();
   return box;
 }
@@ -367,10 +371,11 @@ class BboxReader {
       box.xyxy.top = value("y", y, -kFarthest_px, kFarthest_px);
       box.xyxy.right = box.xyxy.left + value("w", w, 0, kFarthest_px);
       box.xyxy.bottom = box.xyxy.top + value("h", h, 0, kFarthest_px);
-      constexpr double kMostClasses = 1e6, kMostTracks = 9007199254740992;
+      constexpr double kMostClasses = 1e6;
       box.class_id = classes.of(class_name(value("class_id", class_id, 0, kMostClasses)));
       if (track_id != nullptr) {
-        box.track_id = static_cast<std::int64_t>(value("track_id", *track_id, -1, kMostTracks));
+        box.track_id =
+            static_cast<std::int64_t>(value("track_id", *track_id, -1, double(kMostTracks)));
       }
       Annotation& annotation = labels.annotations[time_s];
       annotation.boxes.push_back(box);

@@ -21,7 +21,8 @@ struct RecordingLabels {
 ///
 /// NAME.csv: a header line with time_s, left, top, right, bottom, class and perhaps category, in
 /// any order, then a line a box; a line with a time alone is a time without boxes. The original
-/// annotation of a time is its lines. NAME.json: boxes and persons; the original is the entry.
+/// annotation of a time is its lines. NAME.json: boxes, perhaps with tracks, and
+/// persons; the original is the entry.
 ///
 /// NAME.npy: Prophesee's boxes, a structured array with t (or ts, µs), x, y (the top left corner),
 /// w, h, class_id, and perhaps track_id; DSEC-Det's tracks are the same. A class is called as

@@ -1,5 +1,6 @@
 #include "manifests/values/still_motion.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -214,6 +215,89 @@ TEST_F(SettleMotion, PairsOfSequencesStayAsTheyAre) {
   settle_motion(spec_, {7, "frames", "1"}, {outlined()}, ImageSize{4, 4}, pair);
   EXPECT_FALSE(pair.motion);
   EXPECT_TRUE(pair.objects.empty());
+}
+
+Box outlined(int class_id, const Rectangle& box) {
+  return {.class_id = class_id,
+          .xyxy = box,
+          .outline = {{{{box.left, box.top},
+                        {box.right, box.top},
+                        {box.right, box.bottom},
+                        {box.left, box.bottom}}}}};
+}
+
+/// Poses of a clip of 100 frames of an image of 640x480.
+std::vector<StillPose> poses_of(const std::vector<Box>& boxes, std::uint64_t seed) {
+  StillsSpec spec;
+  spec.objects = ObjectMotionSpec{{6, 8}, 3, 0.04, 0};
+  return clip_poses(spec, CounterRandom(seed), boxes, {480, 640}, 100);
+}
+
+TEST(ClipPoses, ARiderGoesWithHisHorse) {
+  // A rider, half in the box of the horse; his hat, in his; one beside him, and another horse in
+  // the first one's box.
+  const std::vector<Box> boxes = {
+      outlined(0, {200, 150, 260, 260}), outlined(1, {150, 200, 350, 400}),
+      outlined(2, {220, 145, 240, 165}), outlined(0, {340, 150, 400, 260}),
+      outlined(1, {120, 210, 220, 300})};
+  int apart = 0, together = 0;
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    for (const StillPose& pose : poses_of(boxes, seed)) {
+      const auto map = [&](std::size_t k) {
+        return object_in_clip({480, 640}, pose, pose.objects[k].value(), boxes[k]);
+      };
+      for (const Point corner : {Point{150, 150}, {350, 400}}) {
+        const Point of_horse = mapped(map(1), corner);
+        for (const std::size_t k : {0u, 2u}) {
+          const Point carried = mapped(map(k), corner);
+          EXPECT_NEAR(carried.x, of_horse.x, 1e-6);
+          EXPECT_NEAR(carried.y, of_horse.y, 1e-6);
+        }
+        ++together;
+        for (const std::size_t k : {3u, 4u}) {
+          const Point other = mapped(map(k), corner);
+          apart += std::hypot(other.x - of_horse.x, other.y - of_horse.y) > 2;
+        }
+      }
+    }
+  }
+  EXPECT_GT(apart, 1.5 * together);
+}
+
+TEST(Carriers, AreLargerAndHoldMostOfABox) {
+  using ::testing::ElementsAre;
+  EXPECT_TRUE(carriers({}).empty());
+  const Box large = outlined(0, {0, 0, 100, 100});
+  EXPECT_THAT(carriers({large, outlined(1, {50, 50, 70, 90}), outlined(1, {90, 0, 110, 40}),
+                        outlined(1, {91, 0, 111, 40})}),
+              ElementsAre(0, 0, 0, 3));
+  EXPECT_THAT(carriers({outlined(0, {92, 0, 112, 40}), large, outlined(0, {50, 50, 70, 90}),
+                        outlined(0, {81, 0, 101, 40}), outlined(0, {0, 0, 100, 100})}),
+              ElementsAre(0, 1, 1, 1, 4));
+  Box ignored = large, without = large;
+  ignored.ignore = true;
+  without.outline = {};
+  EXPECT_THAT(carriers({ignored, without, outlined(1, {50, 50, 70, 90})}), ElementsAre(0, 1, 2));
+}
+
+TEST(ClipPoses, WhatLooksSmallMovesSlowly) {
+  const std::vector<Box> boxes = {outlined(0, {300, 200, 308, 218}),   // 12 px
+                                  outlined(0, {100, 100, 200, 300})};  // 141 px
+  double small = 0, large = 0;
+  for (const std::uint64_t seed : {1u, 2u, 3u, 4u}) {
+    const auto poses = poses_of(boxes, seed);
+    for (std::size_t i = 1; i < poses.size(); ++i) {
+      const auto step = [&](std::size_t k) {
+        const ImageMotion &a = *poses[i - 1].objects[k], &b = *poses[i].objects[k];
+        return std::hypot(b.x_px - a.x_px, b.y_px - a.y_px);
+      };
+      small = std::max(small, step(0));
+      large = std::max(large, step(1));
+    }
+  }
+  EXPECT_NEAR(small, 3, 1e-6);
+  EXPECT_GE(large, 6);
+  EXPECT_LE(large, 8 + 1e-6);
 }
 
 }  // namespace

@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/convert.h"
+#include "pipeline/preview/preview_reader.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/image_file.h"
@@ -149,6 +151,53 @@ TEST_F(Preview, WarnsOfFramesThatAreGone) {
   EXPECT_EQ(draw(shard_).size(), 1u);
   EXPECT_THAT(warnings_, ::testing::Each(HasSubstr("clip/f_1")));
   EXPECT_EQ(warnings_.size(), 2u);
+}
+
+TEST(PreviewOfClips, MakesTheFramesOfAStillAgain) {
+  const testing::TemporaryFolder folder;
+  constexpr ImageSize kStill{64, 96};
+  std::vector<int> levels;
+  for (int i = 0; i < 64 * 96; ++i) levels.push_back((i % 96 / 4 * 37 + i / 96 / 4 * 53) % 251);
+  testing::write_index_image(folder / "photos/a.png", kStill, levels);
+  const JobManifest job = parse_job_manifest(R"({
+    "format": "eventgan-manifest", "version": 1, "name": "job", "seed": 3,
+    "sources": [{ "dataset": "frames", "root": "photos", "pairs": { "from": "stills", "frames": 5,
+                  "motion": { "translation_px": [2, 3] } } }],
+    "image": { "preset": "mpii" }, "generator": { "weights": "untrained:1" },
+    "output": { "directory": "out" } })",
+                                             folder.path(), "manifest.json");
+  ConversionOptions options;
+  options.output = folder / "out";
+  convert(job, testing::FakeGenerator(), "weights", options);
+  const std::filesystem::path shard = folder / "out/job-train-00000-of-00001.h5";
+  std::vector<std::string> warnings;
+  {
+    PreviewReader reader(folder.path(), warnings);
+    std::vector<std::uint8_t> last;
+    for (int slot = 0; slot < 5; ++slot) {
+      const PreviewContent content = reader.content(shard, slot);
+      EXPECT_THAT(content.title, HasSubstr("clip of a still"));
+      ASSERT_EQ(content.previous_bgr.size(), 3u * 48 * 72) << "an eighth less on each side";
+      if (slot == 0) {
+        for (int y = 0; y < 48; ++y) {
+          for (int x = 0; x < 72; ++x) {
+            ASSERT_EQ(content.previous_bgr[static_cast<std::size_t>(3 * (72 * y + x))],
+                      levels[static_cast<std::size_t>(96 * (y + 8) + x + 12)]);
+          }
+        }
+      } else {
+        EXPECT_EQ(content.previous_bgr, last) << "they follow each other";
+      }
+      EXPECT_NE(content.next_bgr, content.previous_bgr);
+      last = content.next_bgr;
+    }
+  }
+  EXPECT_THAT(warnings, ::testing::IsEmpty());
+  std::filesystem::remove(folder / "photos/a.png");
+  std::filesystem::create_directories(folder / "photos/b");
+  const PreviewContent without = PreviewReader(folder.path(), warnings).content(shard, 0);
+  EXPECT_TRUE(without.next_bgr.empty());
+  EXPECT_EQ(warnings.size(), 1u);
 }
 
 TEST_F(Preview, WithoutShardsThereIsNothingToDraw) {

@@ -16,25 +16,24 @@
 namespace eventgan {
 namespace {
 
-/// Grey columns of these values.
-ColourFrame columns(int height, const std::vector<int>& values) {
-  ColourFrame frame{{height, static_cast<int>(values.size())}, {}};
+/// Columns of these values.
+GreyImage columns(int height, const std::vector<int>& values) {
+  GreyImage frame{{height, static_cast<int>(values.size())}, {}};
   for (int y = 0; y < height; ++y) {
-    for (const int value : values)
-      frame.bgr.insert(frame.bgr.end(), 3, static_cast<std::uint8_t>(value));
+    frame.pixels.insert(frame.pixels.end(), values.begin(), values.end());
   }
   return frame;
 }
 
-TEST(SensorImage, IsGreyByBt601) {
+TEST(GreyImageOfAFrame, IsByBt601) {
   // 0.114 x 200 = 22.8 of blue alone.
   const ColourFrame blue{{1, 1}, {200, 0, 0}};
-  EXPECT_EQ(sensor_image(blue, std::nullopt), (GreyImage{{1, 1}, {23}}));
+  EXPECT_EQ(grey_image(blue), (GreyImage{{1, 1}, {23}}));
 }
 
 TEST(SensorImage, ShrinksByAveragingAndCutsAroundTheCentre) {
   // 8 x 2 covers 2 x 1 by the scale 1/2: 4 x 1, of which the middle two are left.
-  const ColourFrame frame = columns(2, {0, 0, 10, 30, 100, 200, 0, 0});
+  const GreyImage frame = columns(2, {0, 0, 10, 30, 100, 200, 0, 0});
   EXPECT_EQ(sensor_image(frame, ImageSize{1, 2}), (GreyImage{{1, 2}, {20, 150}}));
 }
 
@@ -44,7 +43,7 @@ TEST(SensorImage, GrowsToCover) {
 }
 
 TEST(SensorImage, OfItsOwnSizeIsUntouched) {
-  const ColourFrame frame = columns(3, {0, 255, 3});
+  const GreyImage frame = columns(3, {0, 255, 3});
   EXPECT_EQ(sensor_image(frame, ImageSize{3, 3}), sensor_image(frame, std::nullopt));
   EXPECT_EQ(sensor_image(frame, std::nullopt).pixels,
             (std::vector<std::uint8_t>{0, 255, 3, 0, 255, 3, 0, 255, 3}));

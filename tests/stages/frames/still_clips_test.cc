@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -207,6 +208,141 @@ TEST_F(StillClipsTest, WhatIsCoveredIsToldAndJointsBehindItAreHidden) {
   EXPECT_EQ(annotation.persons[0].joints[0].visible, 1);
   EXPECT_EQ(annotation.persons[0].joints[1].visible, 0);
   EXPECT_EQ(annotation.persons[1].joints[1].visible, 1);
+}
+
+/// The pixels brighter than `level`, as a rectangle.
+Rectangle brighter(const GreyImage& image, int level) {
+  Rectangle around{1e9, 1e9, -1, -1};
+  for (int y = 0; y < image.size.height; ++y) {
+    for (int x = 0; x < image.size.width; ++x) {
+      if (image.pixels[static_cast<std::size_t>(y * image.size.width + x)] <= level) continue;
+      around = {std::min(around.left, double(x)), std::min(around.top, double(y)),
+                std::max(around.right, x + 1.0), std::max(around.bottom, y + 1.0)};
+    }
+  }
+  return around;
+}
+
+/// A bright square on noise, whose label has a box alone, `kRoom` px larger on each side.
+class CutOutClips : public StillClipsTest {
+ protected:
+  static constexpr int kRoom = 4;
+
+  CutOutClips() {
+    cv::Mat image(kStillSize.height, kStillSize.width, CV_8UC1);
+    cv::RNG random(5);
+    random.fill(image, cv::RNG::UNIFORM, 10, 60);
+    image(cv::Rect(65, 45, 28, 32)) = kNear;
+    for (const char* name : {"0000.png", "0001.png"}) {
+      cv::imwrite((folder_ / "clip" / name).string(), image);
+    }
+    still_.boxes = {{.class_id = 0, .xyxy = {65 - kRoom, 45 - kRoom, 93 + kRoom, 77 + kRoom}}};
+    pairs().stills->objects->rotation_deg = 0;
+    pairs().stills->objects->rests = 0;
+  }
+};
+
+TEST_F(CutOutClips, ABoxAloneMovesWithTheObjectInIt) {
+  pairs().stills->objects->translation_px = {2, 3};
+  for (const double rests : {0.0, 1.0}) {
+    SCOPED_TRACE(rests);
+    pairs().stills->rests = rests;
+    pairs().stills->rotation_deg = 0;
+    const Dataset& dataset = open();
+    int seen = 0;
+    double left = 1e9, right = -1e9;
+    for (const LabelledFrame& labelled : dataset.labelled_frames()) {
+      const Annotation annotation = *dataset.annotation(labelled.label_key);
+      if (annotation.boxes.empty()) continue;
+      const Box& box = annotation.boxes[0];
+      EXPECT_TRUE(box.outline.empty()) << "the label has none";
+      EXPECT_EQ(box.track_id, 0);
+      EXPECT_EQ(box.occlusion, 0);
+      const GreyImage shown = frames(dataset, labelled)[1];
+      const Rectangle bright = brighter(shown, 140);
+      const auto near = [&](double edge, double of_object, double end) {
+        // Cut at the frame's border, and within a pixel or two of where the room ends.
+        EXPECT_NEAR(edge, std::clamp(of_object, 0.0, end), 2.0) << labelled.sample_id;
+      };
+      near(box.xyxy.left, bright.left - kRoom, kFrame.width);
+      near(box.xyxy.right, bright.right + kRoom, kFrame.width);
+      near(box.xyxy.top, bright.top - kRoom, kFrame.height);
+      near(box.xyxy.bottom, bright.bottom + kRoom, kFrame.height);
+      ++seen;
+      left = std::min(left, box.xyxy.left);
+      right = std::max(right, box.xyxy.left);
+    }
+    EXPECT_GT(seen, 30);
+    EXPECT_GT(right - left, 5);
+  }
+}
+
+TEST_F(CutOutClips, IsDoneOnceForAllFramesOfAClip) {
+  const Dataset& dataset = open();
+  const auto& all = dataset.labelled_frames();
+  const auto counts = [&](int i) {
+    return dataset.made_pair(all[static_cast<std::size_t>(i)].label_key)->outlines;
+  };
+  EXPECT_EQ(counts(0), (OutlineCounts{0, 1, 0}));
+  std::filesystem::remove_all(folder_ / "clip");
+  EXPECT_EQ(counts(1), OutlineCounts());
+  EXPECT_FALSE(is_fault(dataset.annotation(all[20].label_key))) << "the first still is known";
+  EXPECT_TRUE(is_fault(dataset.annotation(all[30].label_key))) << "the second is not";
+  const Outcome<Annotation> still = dataset.still_annotation(all[30].label_key);
+  ASSERT_FALSE(is_fault(still)) << "which takes no image";
+  EXPECT_EQ(still->boxes, still_.boxes);
+}
+
+TEST_F(CutOutClips, WhatIsTooSmallIsAnEllipseAndWhatIsIgnoredIsNone) {
+  still_.boxes.push_back({.class_id = 0, .xyxy = {30, 30, 42, 40}});
+  still_.boxes.push_back({.class_id = 0, .xyxy = {100, 60, 130, 90}, .ignore = true});
+  still_.boxes.push_back(still_object({30, 60, 50, 80}));
+  const Dataset& dataset = open();
+  const MadePair made = *dataset.made_pair(dataset.labelled_frames()[0].label_key);
+  EXPECT_EQ(made.outlines, (OutlineCounts{1, 1, 1}));
+  ASSERT_EQ(made.boxes.size(), 4u);
+  EXPECT_FALSE(made.boxes[1].outline.empty());
+  EXPECT_TRUE(made.boxes[2].outline.empty());
+  EXPECT_EQ(made.boxes[3].outline, still_.boxes[3].outline);
+  for (const StillPose& pose : made.poses) {
+    ASSERT_EQ(pose.objects.size(), 4u);
+    EXPECT_TRUE(pose.objects[1].has_value());
+    EXPECT_FALSE(pose.objects[2].has_value());
+  }
+}
+
+TEST_F(CutOutClips, NothingIsCutOutWhereObjectsDoNotMove) {
+  pairs().stills = StillsSpec();
+  const Dataset& dataset = open();
+  const MadePair made = *dataset.made_pair(dataset.labelled_frames()[0].label_key);
+  EXPECT_EQ(made.outlines, OutlineCounts());
+  EXPECT_TRUE(made.boxes[0].outline.empty());
+}
+
+TEST_F(CutOutClips, TheBoxIsTheLabelsWhereNothingMoves) {
+  pairs().stills = StillsSpec{{0, 0}, 0, 0};
+  pairs().stills->objects = ObjectMotionSpec{{0, 0}, 0, 0, 0};
+  const Dataset& dataset = open();
+  const Annotation annotation = *dataset.annotation(dataset.labelled_frames()[3].label_key);
+  ASSERT_EQ(annotation.boxes.size(), 1u);
+  EXPECT_EQ(annotation.boxes[0].xyxy, (Rectangle{41, 26, 77, 66}));  // 20 and 15 px less
+}
+
+TEST_F(StillClipsTest, ARiderIsAsVisibleOnHisHorseAsInTheStill) {
+  pairs().stills->rests = 1;
+  pairs().stills->objects = ObjectMotionSpec{{0.5, 0.8}, 3, 0.04, 0};
+  still_.boxes = {still_object({70, 40, 90, 60}), still_object({55, 40, 105, 85})};
+  still_.boxes[0].class_id = 1;
+  still_.persons.resize(1);
+  still_.persons[0].box = still_.boxes[0].xyxy;
+  still_.persons[0].joints = {{{80, 50}, 1}};
+  const Dataset& dataset = open();
+  for (const LabelledFrame& labelled : dataset.labelled_frames()) {
+    const Annotation annotation = *dataset.annotation(labelled.label_key);
+    ASSERT_EQ(annotation.boxes.size(), 2u) << labelled.sample_id;
+    EXPECT_EQ(annotation.boxes[0].occlusion, 0);
+    EXPECT_EQ(annotation.persons.at(0).joints[0].visible, 1);
+  }
 }
 
 TEST_F(StillClipsTest, ThereIsNothingToBeMadeOfOtherSources) {

@@ -25,7 +25,8 @@ struct StillObject {
 class StillLayers {
  public:
   /// `image`: [y, x] uint8 of one channel or three; shared, and left as it is. `behind_px`: how far
-  /// a farther object may go on beyond its outline where nearer ones hide it.
+  /// a farther object may go on beyond its outline where nearer ones hide it. Throws
+  /// std::invalid_argument of an image with a side beyond kMostStillSide.
   StillLayers(const cv::Mat& image, std::vector<StillObject> objects, double behind_px);
 
   /// The image as it is once the background and every object (by box; those of other boxes are not

@@ -25,6 +25,8 @@ namespace {
 using ::testing::HasSubstr;
 using testing::TemporaryFolder;
 
+using SharedImages = SharedResults<SharedFrame>;
+
 /// An image of one pixel.
 SharedFrame image(int level) {
   return std::make_shared<Outcome<PreparedFrame>>(

@@ -1,0 +1,149 @@
+#include "stages/frames/decoding/still_clip.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <opencv2/core.hpp>
+#include <utility>
+
+#include "manifests/values/outlines.h"
+#include "manifests/values/still_motion.h"
+#include "stages/frames/decoding/detail/still_layers.h"
+#include "stages/frames/decoding/detail/unless_refused.h"
+
+namespace eventgan {
+namespace {
+
+// A frame with labels of its own shows no more of an object behind another than these have.
+constexpr double kFarthestBehind_px = 0;
+
+bool is_object(const Box& box, const StillPose& pose, std::size_t k) {
+  return k < pose.objects.size() && pose.objects[k].has_value() && !box.outline.empty();
+}
+
+/// All that hides anything may move any distance within a clip, and what it hides is the same in
+/// all of its frames.
+std::vector<StillObject> objects_of(const std::vector<Box>& boxes, const StillPose& pose,
+                                    ImageSize image) {
+  const double far_px = image.width + image.height;
+  std::vector<StillObject> objects;
+  for (std::size_t k = 0; k < boxes.size(); ++k) {
+    if (!is_object(boxes[k], pose, k)) continue;
+    objects.push_back({k, boxes[k].outline, boxes[k].xyxy.bottom, far_px});
+  }
+  return objects;
+}
+
+cv::Mat matrix_of(const ImageView& image) {
+  return {image.size.height, image.size.width,
+          image.channels == ImageView::Channels::kGrey ? CV_8UC1 : CV_8UC3,
+          const_cast<std::uint8_t*>(image.pixels)};
+}
+
+/// How far apart the maps lead a point of the still at most; of affine ones a corner.
+double farthest_apart(const AffineMap& from, const AffineMap& to, const Rectangle& around) {
+  double most = 0;
+  for (const Point corner : {Point{around.left, around.top},
+                             {around.right, around.top},
+                             {around.left, around.bottom},
+                             {around.right, around.bottom}}) {
+    const Point a = mapped(from, corner), b = mapped(to, corner);
+    most = std::max(most, std::hypot(b.x - a.x, b.y - a.y));
+  }
+  return most;
+}
+
+}  // namespace
+
+struct StillClip::State {
+  State(const ImageView& view, std::vector<Box> of_still, const StillPose& pose)
+      : image(view.size),
+        window(clip_window(view.size)),
+        boxes(std::move(of_still)),
+        objects(objects_of(boxes, pose, image)),
+        layers(matrix_of(view), objects, kFarthestBehind_px) {
+    std::ranges::stable_sort(objects, {}, &StillObject::lower_edge);
+  }
+
+  AffineMap object_map(const StillPose& pose, std::size_t k) const {
+    return object_in_clip(image, pose, pose.objects.at(k).value(), boxes[k]);
+  }
+
+  ImageSize image;
+  ClipWindow window;
+  std::vector<Box> boxes;
+  std::vector<StillObject> objects;  ///< farther ones first
+  StillLayers layers;
+};
+
+StillClip::StillClip(const ImageView& image, std::vector<Box> boxes, const StillPose& pose)
+    : state_(unless_refused(
+          [&] { return std::make_shared<const State>(image, std::move(boxes), pose); })) {}
+
+ImageSize StillClip::size() const { return state_->window.size; }
+
+std::vector<std::uint8_t> StillClip::frame(const StillPose& pose) const {
+  return unless_refused([&] {
+    const ClipWindow& window = state_->window;
+    std::vector<AffineMap> maps(state_->boxes.size());
+    for (const StillObject& object : state_->objects) {
+      maps[object.box] = inverse(state_->object_map(pose, object.box));
+    }
+    const cv::Mat whole = state_->layers.frame(inverse(image_in_clip(state_->image, pose)), maps);
+    std::vector<std::uint8_t> pixels;
+    const std::size_t bytes = whole.elemSize();
+    pixels.reserve(bytes * window.size.pixel_count());
+    for (int y = window.y; y < window.y + window.size.height; ++y) {
+      const std::uint8_t* row = whole.ptr(y) + bytes * static_cast<std::size_t>(window.x);
+      pixels.insert(pixels.end(), row, row + bytes * static_cast<std::size_t>(window.size.width));
+    }
+    return pixels;
+  });
+}
+
+double StillClip::displacement_px(const StillPose& from, const StillPose& to) const {
+  const ImageSize image = state_->image;
+  double most = farthest_apart(image_in_clip(image, from), image_in_clip(image, to),
+                               {-0.5, -0.5, image.width - 0.5, image.height - 0.5});
+  for (const StillObject& object : state_->objects) {
+    most =
+        std::max(most, farthest_apart(state_->object_map(from, object.box),
+                                      state_->object_map(to, object.box), bounds(object.outline)));
+  }
+  return most;
+}
+
+std::array<std::vector<float>, 2> StillClip::shifts_px(const StillPose& from,
+                                                       const StillPose& to) const {
+  const ClipWindow& window = state_->window;
+  std::array<std::vector<float>, 2> shifts;
+  for (auto& values : shifts) values.resize(window.size.pixel_count());
+  const auto fill = [&](const AffineMap& at_first, const AffineMap& later, const GreyImage* mask) {
+    const AffineMap map = compose(later, inverse(at_first));
+    std::size_t pixel = 0;
+    for (int y = window.y; y < window.y + window.size.height; ++y) {
+      for (int x = window.x; x < window.x + window.size.width; ++x, ++pixel) {
+        if (mask && mask->pixels[pixel] == 0) continue;
+        const Point at = mapped(map, {double(x), double(y)});
+        shifts[0][pixel] = static_cast<float>(at.x - x);
+        shifts[1][pixel] = static_cast<float>(at.y - y);
+      }
+    }
+  };
+  fill(image_in_clip(state_->image, from), image_in_clip(state_->image, to), nullptr);
+  for (const StillObject& object : state_->objects) {
+    const AffineMap map = state_->object_map(from, object.box);
+    Outline outline = object.outline;
+    for (auto& ring : outline.rings) {
+      for (Point& corner : ring) {
+        corner = mapped_edge(map, corner);
+        corner = {corner.x - window.x, corner.y - window.y};
+      }
+    }
+    const GreyImage mask = mask_of(outline, window.size);
+    fill(map, state_->object_map(to, object.box), &mask);
+  }
+  return shifts;
+}
+
+}  // namespace eventgan
