@@ -80,6 +80,10 @@ void check_same_settings(const std::filesystem::path& file, const std::string& f
 
 namespace {
 
+std::string file_name(const std::string& name, const SimulationManifest& manifest) {
+  return fmt::format("{}.{}", name, to_string(manifest.file));
+}
+
 std::string numbered(const std::string& name, std::int64_t number) {
   constexpr std::size_t kDigits = 3;
   const std::string digits = std::to_string(number);
@@ -98,7 +102,7 @@ std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest
                        std::int64_t frame_count) {
     std::optional<std::int64_t> number;
     if (position) number = clip.number(*position);
-    recordings.push_back({name, folder / fmt::format("{}.{}", name, to_string(manifest.file)),
+    recordings.push_back({name, folder / file_name(name, manifest),
                           recording_settings(manifest, source, name, clip.files_hash(), number),
                           position, frame_count});
   };
@@ -120,7 +124,7 @@ std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest
   for (std::int64_t i = 0; i < scenes.count(); ++i) {
     const std::string name = numbered(source.name, i);
     recordings.push_back(
-        {name, folder / (name + ".hdf5"),
+        {name, folder / file_name(name, manifest),
          recording_settings(manifest, source, name, scenes.hash(i), std::nullopt, scenes.still(i)),
          i, scenes.frame_count(i)});
   }

@@ -360,7 +360,7 @@ class Recordings(Export):
         for path in recordings:
             _, (t, *_), frames = aedat4.read(path)
             self.assertGreater(len(t), 0)
-            self.assertEqual([pixels.ndim for _, pixels in frames], [3] * 4)
+            self.assertEqual([pixels.ndim for _, pixels in frames], [3] * 5)  # four, and the one before
             for (_, before), (_, after) in zip(frames, frames[1:]):
                 self.assertFalse(np.array_equal(before, after))
 
