@@ -87,6 +87,9 @@ class TellingDataset final : public Dataset {
   const std::vector<LabelledFrame>& labelled_frames() const override { return frames_; }
   PairedFrame paired_frame(const LabelledFrame&, int) const override { return {}; }
   Outcome<Annotation> annotation(const std::string&) const override { return Annotation(); }
+  Outcome<Annotation> still_annotation(const std::string&) const override {
+    return Annotation{.original = "still", .boxes = {Box()}};
+  }
   Outcome<MadePair> made_pair(const std::string&) const override { return SampleFault{"made"}; }
   std::optional<ImageSize> made_size(const std::string&) const override { return ImageSize{3, 4}; }
   ImageSize sensor_size(const std::string&) const override { return {3, 4}; }
@@ -111,6 +114,11 @@ TEST_F(ClassNumbers, ChangeNothingElseThatADatasetSays) {
     datasets_.push_back(std::make_unique<TellingDataset>(name));
   }
   number_classes(sources_, datasets_);
+  for (int i : {0, 1}) {
+    const Annotation still = *datasets_[static_cast<std::size_t>(i)]->still_annotation("");
+    EXPECT_EQ(still.original, "still");
+    EXPECT_EQ(still.boxes.at(0).class_id, i);
+  }
   for (const auto& dataset : datasets_) {
     EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("car", "person"));
     EXPECT_TRUE(is_fault(dataset->made_pair("")));

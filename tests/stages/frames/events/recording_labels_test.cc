@@ -114,7 +114,7 @@ TEST_F(RecordingLabelsTest, JsonHasBoxesAndPersons) {
     "samples": [
       { "time_s": 1.5, "boxes": [
           { "left": 1, "top": 2, "right": 3, "bottom": 4.5, "class": "car", "category": "hard" },
-          { "left": 1, "top": 2, "right": 3, "bottom": 4, "class": "bus" }] },
+          { "left": 1, "top": 2, "right": 3, "bottom": 4, "class": "bus", "track": 7 }] },
       { "time_s": 0.5, "persons": [
           { "joints": [[10, 20, 1], []], "center": [5, 6], "scale": 0.5, "head_box": [1, 2, 3, 4] },
           { "joints": [[10, 20], [30.5, 40, 0]] }] },
@@ -123,7 +123,7 @@ TEST_F(RecordingLabelsTest, JsonHasBoxesAndPersons) {
   EXPECT_THAT(labels.joint_names, ElementsAre("head", "foot"));
   EXPECT_THAT(labels.annotations.at(1.5).boxes,
               ElementsAre(Box{.class_id = 0, .xyxy = {1, 2, 3, 4.5}, .difficulty = 2},
-                          Box{.class_id = 1, .xyxy = {1, 2, 3, 4}}));
+                          Box{.class_id = 1, .xyxy = {1, 2, 3, 4}, .track_id = 7}));
   const std::vector<Person>& persons = labels.annotations.at(0.5).persons;
   ASSERT_EQ(persons.size(), 2u);
   EXPECT_THAT(persons[0].joints, ElementsAre(Joint{{10, 20}, 1}, Joint{kMissingPoint, 0}));
