@@ -18,8 +18,8 @@ from camera_files import BBOX, random_events, write_columns, write_dhp19, write_
 from program import SHARED, text
 from small_job import LENIENT, save_image, small_job
 
+DOCUMENTS = {"manifest.json", "camera.json"}  # whose values are fields of the fingerprint
 # Of frames and recordings a fingerprint has the path and the size: to read them all for it would be to read them twice.
-DOCUMENTS = {"manifest.json", "camera.json"}
 IMAGES = {".png", ".jpg"}
 RECORDINGS = {"drive.hdf5", "drive_td.h5", "events.h5", "mov1.h5", "events.txt"}
 STILL = {"from": "stills", "motion": {"translation_px": [1, 2], "objects": {"translation_px": [1, 2]}}}
@@ -93,7 +93,7 @@ class OpenedFiles(program.InFolder):
         return frames
 
     def check(self, manifest, *expected):
-        """All but the manifest and its sensor, whose values are fields. `expected`: parts of the names of files that must be among those opened."""
+        """`expected`: parts of the names of files that must be among those opened."""
         inputs = self.folder / "in"
         done = failing_files.run(inputs, "", "convert", manifest, "--output", self.out, "--threads", 1)
         self.assertEqual(done.code, 0, done.err)
