@@ -12,7 +12,22 @@
 #include <unordered_map>
 #include <utility>
 
+#include "manifests/values/text.h"
+
 namespace eventgan {
+
+OutlineCounts& OutlineCounts::operator+=(const OutlineCounts& other) {
+  given += other.given;
+  cut += other.cut;
+  ellipses += other.ellipses;
+  return *this;
+}
+
+std::string to_text(const OutlineCounts& counts) {
+  return std::to_string(counts.given) + " of labels, " + std::to_string(counts.cut) +
+         " cut out of their boxes, " + count_text(counts.ellipses, "ellipse");
+}
+
 namespace {
 
 using Ring = std::vector<Point>;

@@ -195,8 +195,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
   add_made(job, sink.committed(), by_others, report);
   std::ranges::copy(sink.notes(), std::back_inserter(report.notes));
   if (report.outlines != OutlineCounts()) {
-    report.notes.push_back("outlines of objects that move on their own: " +
-                           to_text(report.outlines));
+    report.notes.push_back(note_of(report.outlines));
   }
   report.too_many_faults =
       beyond_limits(manifest.errors, report.quarantined_in_plan(), report.plan_pairs);

@@ -235,6 +235,7 @@ class RetrySink final : public SampleSink {
     rewrite_->redo(slot, message);
     if (!message.failed()) {
       left_out_.add(message.sample.annotation.left_out);
+      outlines_ += message.outlines;
       return;
     }
     failed_.push_back({record_->shard, slot, message.sample.sample_id, message.sample.fault});
@@ -253,6 +254,7 @@ class RetrySink final : public SampleSink {
     report_.failed.insert(report_.failed.end(), failed_.begin(), failed_.end());
     failed_.clear();
     report_.notes = left_out_.notes();
+    if (outlines_ != OutlineCounts()) report_.notes.push_back(note_of(outlines_));
     return true;
   }
 
@@ -272,6 +274,7 @@ class RetrySink final : public SampleSink {
   std::unique_ptr<ShardRewrite> rewrite_;                  // of the shard under way
   std::vector<QuarantinedSlot> failed_;                    // of the shard under way
   BoxesLeftOut left_out_;
+  OutlineCounts outlines_;
   RetryReport& report_;
   TraceRecorder* trace_;
 };

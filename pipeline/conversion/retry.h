@@ -48,7 +48,7 @@ struct RetryReport {
   /// Fields of the fingerprint in which the inputs have changed since the plan was frozen, or since
   /// the last retry: recorded, so that `convert` goes on.
   std::vector<std::string> changed_inputs;
-  std::vector<std::string> notes;  ///< boxes that the labels of mended samples lost
+  std::vector<std::string> notes;  ///< of mended samples: boxes that labels lost, outlines
   bool stopped = false;            ///< a request to stop came before all were tried, or renamed
   bool too_many_faults = false;    ///< the manifest's limits are passed still
   bool dataset_outdated = false;   ///< dataset.json and dataset.h5 were removed (outdate_dataset)

@@ -119,15 +119,18 @@ void SampleStages::read_frames(SampleMessage& message, const std::vector<Box>& b
        i <= slot + in_flight_ && i < samples.size(); ++i) {
     reader_.expect(samples[i].pair, orientation);
   }
+  const auto settle = [&](FramePair pair, ImageSize size) {
+    settle_motion(source.pairs, key_of(message), boxes, size, pair);
+    return pair;
+  };
   Outcome<PreparedPair> prepared =
-      reader_.read(message.sample.pair, orientation, source.every, boxes, [&](ImageSize size) {
-        settle_motion(source.pairs, key_of(message), boxes, size, message.sample.pair);
-      });
+      reader_.read(message.sample.pair, orientation, source.every, boxes, settle);
   if (is_fault(prepared)) {
     message.fail(prepared.fault().reason);
   } else {
     message.prepared = std::move(*prepared);
     message.outlines = message.prepared.outlines;
+    if (message.prepared.settled) message.sample.pair = std::move(*message.prepared.settled);
     take_placement(message);
   }
 }

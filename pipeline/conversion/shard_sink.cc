@@ -105,6 +105,10 @@ std::vector<std::string> BoxesLeftOut::notes() const {
           joined(listed_, "; ", std::identity()) + more};
 }
 
+std::string note_of(const OutlineCounts& outlines) {
+  return "outlines of objects that move on their own: " + to_text(outlines);
+}
+
 ShardSink::ShardSink(const ConversionJob& job, SharedFolder& shared,
                      std::int64_t quarantined_before)
     : job_(job),

@@ -3,9 +3,11 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "manifests/documents/plan.h"
+#include "manifests/values/outlines.h"
 #include "manifests/values/shard.h"
 #include "pipeline/conversion/conversion_run.h"
 #include "pipeline/conversion/earlier_shards.h"
@@ -25,6 +27,9 @@ class BoxesLeftOut {
   std::int64_t count_ = 0;
   std::vector<std::string> listed_;
 };
+
+/// For people.
+std::string note_of(const OutlineCounts& outlines);
 
 /// Writes the shards of `convert` and commits each with its commit record. Enforces the manifest's
 /// error policy: with "fail" the first fault throws TooManyFaults; with "quarantine" the shard in

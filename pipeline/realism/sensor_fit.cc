@@ -17,6 +17,12 @@ namespace eventgan {
 namespace {
 
 constexpr std::size_t kMostPairs = 64;
+
+/// Of so many frames before a pair the model looks at, too: a level that is drawn in place of them
+/// (uniform in the band between the thresholds, or triangular) is far off in scenes that are slow
+/// or of little contrast.
+constexpr std::int64_t kFramesBefore = 8;
+
 constexpr std::uint64_t kSeed = 0;
 
 struct ChosenPairs {
@@ -33,6 +39,12 @@ std::vector<FrameInterval> some_of(std::span<const FrameInterval> all, std::size
 ChosenPairs choose_pairs_of(const FitPart& part, const std::vector<int>& gaps, std::size_t most) {
   std::vector<FrameInterval> all =
       choose_intervals(*part.recording, part.first_frame, part.last_frame, gaps);
+  // The first frames are only looked at before pairs, unless there are few.
+  const std::int64_t skipped = std::min(kFramesBefore, std::ssize(all) / 4);
+  const auto is_early = [&](const FrameInterval& interval) {
+    return interval.first < part.first_frame + skipped;
+  };
+  if (!std::ranges::all_of(all, is_early)) std::erase_if(all, is_early);
   std::ranges::sort(all, {}, [](const FrameInterval& interval) {
     return std::pair(interval.last, interval.first);
   });
@@ -63,8 +75,9 @@ std::vector<StillPixels> still_pixels_of(const Recording& recording,
 
 /// The pairs (again: which pixels are hot takes all of them) without the events of hot pixels;
 /// `hot`: [y, x], or empty for none.
-void read_pairs(const Recording& recording, std::span<const FrameInterval> pairs,
+void read_pairs(const FitPart& part, std::span<const FrameInterval> pairs,
                 std::span<const std::uint8_t> hot, std::vector<IntervalFrames>& frames) {
+  const Recording& recording = *part.recording;
   for (const FrameInterval& pair : pairs) {
     std::vector<Event> events = recording.events_between(pair.first, pair.last);
     if (!hot.empty()) {
@@ -74,6 +87,10 @@ void read_pairs(const Recording& recording, std::span<const FrameInterval> pairs
       });
     }
     frames.push_back(frames_of(recording, pair, events));
+    for (std::int64_t i = std::max(part.first_frame, pair.first - kFramesBefore); i < pair.first;
+         ++i) {
+      frames.back().before.push_back(recording.frame(i));
+    }
   }
 }
 
@@ -143,14 +160,14 @@ class Fitter {
 
   std::optional<FittedThreshold> difference() const {
     const double threshold =
-        fitted_threshold(difference_scene(), frames_, kFrameLogEpsilon, kSeed, threads_);
+        fitted_threshold(running_difference_scene(), frames_, kFrameLogEpsilon, kSeed, threads_);
     if (is_at_end(threshold, {kLeastFittedThreshold, kMostFittedThreshold})) {
       warn(fmt::format("no threshold of difference in {}..{} makes as many events as the camera",
                        kLeastFittedThreshold, kMostFittedThreshold));
       return std::nullopt;
     }
     const Sensitivity sensitivity([&](double factor) {
-      return made_events(difference_scene(), frames_,
+      return made_events(running_difference_scene(), frames_,
                          realism_sensor({factor * threshold}, kFrameLogEpsilon), kSeed, threads_);
     });
     FittedThreshold fitted{{threshold}, {}, {}};
@@ -159,6 +176,14 @@ class Fitter {
       return threshold * sensitivity.factor(draw, positive + negative, {0, 1});
     });
     return fitted;
+  }
+
+  /// None: no threshold makes as many.
+  std::optional<double> difference_anew() const {
+    const double threshold =
+        fitted_threshold(difference_scene(), frames_, kFrameLogEpsilon, kSeed, threads_);
+    if (is_at_end(threshold, {kLeastFittedThreshold, kMostFittedThreshold})) return std::nullopt;
+    return threshold;
   }
 
   std::optional<FittedThreshold> network(const Generator& generator) const {
@@ -235,7 +260,7 @@ std::vector<EventRow> compare(const std::vector<IntervalFrames>& kept, const Gen
   }
   std::vector<EventRow> rows{{"camera", camera / pixels}};
   const auto difference = [&](double threshold) {
-    return event_sum(made_events(difference_scene(), kept,
+    return event_sum(made_events(running_difference_scene(), kept,
                                  realism_sensor({threshold}, kFrameLogEpsilon), kSeed, threads));
   };
   const auto through_network = [&](const ContrastThreshold& threshold) {
@@ -301,8 +326,8 @@ SensorFit fit_sensor(std::span<const FitPart> parts, const Generator* network,
     const std::span<const std::uint8_t> hot = fit.noise
                                                   ? std::span<const std::uint8_t>(fit.noise->hot[i])
                                                   : std::span<const std::uint8_t>();
-    read_pairs(*parts[i].recording, pairs[i].fitted, hot, fitted);
-    read_pairs(*parts[i].recording, pairs[i].kept, hot, kept);
+    read_pairs(parts[i], pairs[i].fitted, hot, fitted);
+    read_pairs(parts[i], pairs[i].kept, hot, kept);
   }
   fit.fitted_pairs = fitted.size();
   fit.kept_pairs = kept.size();
@@ -315,6 +340,7 @@ SensorFit fit_sensor(std::span<const FitPart> parts, const Generator* network,
   if (has_events) {
     const Fitter fitter(fitted, threads, fit);
     fit.difference = fitter.difference();
+    if (fit.difference) fit.difference_anew = fitter.difference_anew();
     if (network) fit.network = fitter.network(*network);
     if (fitted.size() < 3) {
       fit.warnings.emplace_back("fewer than 3 pairs of frames do not tell how sure a threshold is");

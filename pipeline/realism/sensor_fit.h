@@ -45,6 +45,7 @@ struct SensorFit {
   std::array<double, 2> grey_levels{};        ///< the middle 80 % of the frames' means
   std::optional<NoiseFit> noise;              ///< none: no pixel is still
   std::optional<FittedThreshold> difference;  ///< of the model `difference`; none: cannot be told
+  std::optional<double> difference_anew;      ///< the same of pairs that each begin at level 0
   std::optional<FittedThreshold> network;     ///< through the network that was given
   std::vector<EventRow> rows;                 ///< the camera's first; empty without kept pairs
   std::vector<std::string> warnings;          ///< what could not be told, and why
@@ -55,7 +56,15 @@ struct SensorFit {
 };
 
 /// Fits one camera's noise (fit_noise) and thresholds (fitted_threshold; of the frames' log
-/// intensity, kFrameLogEpsilon) to the first three quarters of each part's pairs (i, i + gap), and
+/// intensity, kFrameLogEpsilon). A pixel has an event where d = L(t) - L(its last event) reaches
+/// C₊ or -C₋. A camera's pixels keep d from pair to pair; from d = 0 at each pair's start small
+/// changes would never add up to an event, and too low a threshold be found (by 0 to 60 %). So the
+/// model `difference` looks at the 8 frames before a pair, too (running_difference_scene), as far
+/// as the part has them, and the first 8 frames (at most a quarter) begin no pair. Which threshold
+/// makes as many events from d = 0 is told beside it: of a camera that begins anew with each frame,
+/// and of convert's `difference`, which sees pairs alone.
+///
+/// Fits to the first three quarters of each part's pairs (i, i + gap), and
 /// compares on those of the rest that share no time with them. At most 64 pairs of either, spread
 /// evenly, but one of each part at least. Noise is of pairs that share no time; the events of hot
 /// pixels are left out of all that follows. `network`: one that knows its sensor, or null. The

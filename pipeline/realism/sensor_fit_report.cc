@@ -47,7 +47,14 @@ std::string to_text(const SensorFit& fit) {
         "as the camera's, less its noise:\n",
         kFrameLogEpsilon);
   }
-  if (fit.difference) text += "  difference: " + threshold_text(*fit.difference) + "\n";
+  if (fit.difference) {
+    text += "  difference: " + threshold_text(*fit.difference);
+    if (fit.difference_anew) {
+      text +=
+          fmt::format("; {:.3g} if each pair begins anew, as with convert", *fit.difference_anew);
+    }
+    text += "\n";
+  }
   if (fit.network) {
     text += fmt::format("  network: {}, negative ÷ positive {}\n", threshold_text(*fit.network),
                         number_text(fit.network->threshold.ratio, fit.network->ratio));

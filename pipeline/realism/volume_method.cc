@@ -156,6 +156,23 @@ SimulatedScene difference_scene() {
           1};
 }
 
+SimulatedScene running_difference_scene() {
+  return {"difference",
+          [](const IntervalFrames& frames, const SensorSpec& sensor, CounterRandom random) {
+            std::vector<GreyImage> images = frames.before;
+            images.push_back(frames.previous);
+            images.push_back(frames.next);
+            const auto steps = static_cast<double>(images.size() - 1);
+            std::vector<Event> events =
+                simulate_images(images, sensor, steps, random, EventOrder::kPixel);
+            const double begin = steps * ((steps - 1) / steps);  // as simulate_images has it
+            std::erase_if(events, [&](const Event& event) { return event.t_s <= begin; });
+            for (Event& event : events) event.t_s = (event.t_s - begin) * frames.duration_s;
+            return events;
+          },
+          1};
+}
+
 SimulatedScene esim_scene(double displacement_px, int draws) {
   return {"esim",
           [=](const IntervalFrames& frames, const SensorSpec& sensor, CounterRandom random) {

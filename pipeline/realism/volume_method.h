@@ -53,6 +53,12 @@ struct SimulatedScene {
 /// Log intensity on a line from frame to frame: "difference".
 SimulatedScene difference_scene();
 
+/// The same, of a camera that was on before: a pixel is at level 0 at the first of
+/// IntervalFrames::before, and at `previous` where the frames in between have led it,
+///   d(previous) = L(previous) - L(its last event),
+/// since a camera that records on does not begin each pair anew. Events of the pair alone.
+SimulatedScene running_difference_scene();
+
 /// A random affine motion of the previous frame, by at most `displacement_px` a frame: "esim".
 SimulatedScene esim_scene(double displacement_px, int draws);
 

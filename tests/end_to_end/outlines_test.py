@@ -1,6 +1,7 @@
 """Outlines from COCO's polygons and masks to shard, masks and exports, against rasterisations of this file's own."""
 
 import json
+import re
 import sys
 import tarfile
 
@@ -286,6 +287,26 @@ class Outlines(program.InFolder):
         self.assertEqual(len(again), len(whole))
         for one, other in zip(again, whole):
             self.assertEqual(list(one["boxes"]["outline"]), list(other["boxes"]["outline"]))
+
+    def test_retry_counts_the_outlines_of_mended_stills(self):
+        source = {"dataset": "frames", "root": "images", "labels": {"format": "coco", "path": "labels.json"},
+                  "pairs": {"from": "stills",
+                            "motion": {"translation_px": [1, 2], "objects": {"translation_px": [1, 2]}}}}
+        job = self.write_manifest(manifest([source], image={"preset": "mpii"}, generator={"kind": "difference"},
+                                           errors={"policy": "quarantine", "max_count": 3, "max_fraction": 1}))
+
+        def counted(*command):
+            told, = re.findall(r"outlines of objects that move on their own: (\d+) of labels", run(*command)[0])
+            return int(told)
+
+        whole = counted("convert", job, "--output", self.folder / "whole")
+        image = self.folder / "images" / "000003.png"
+        good = image.read_bytes()
+        image.write_bytes(good[:len(good) // 2])
+        without = counted("convert", job)
+        image.write_bytes(good)
+        self.assertEqual(counted("retry", self.folder / "out"), whole - without)
+        self.assertGreater(whole, without)
 
     def test_stills_and_preview(self):
         shards = self.convert("letterbox", pairs={"from": "stills", "motion": {

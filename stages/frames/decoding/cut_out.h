@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "manifests/values/labels.h"
-#include "manifests/values/outline_counts.h"
+#include "manifests/values/outlines.h"
 #include "stages/base/images/image_file.h"
 
 namespace eventgan {

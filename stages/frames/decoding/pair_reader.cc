@@ -116,17 +116,18 @@ Outcome<std::array<SharedFrame, 2>> PairReader::frames(const FramePair& pair,
   return both;
 }
 
-Outcome<PreparedPair> PairReader::still(const FramePair& pair, ImageOrientation orientation,
+Outcome<PreparedPair> PairReader::still(const FramePair& planned, ImageOrientation orientation,
                                         std::int64_t stride, const std::vector<Box>& boxes,
-                                        const std::function<void(ImageSize)>& sized) const {
+                                        const Settle& settle) const {
   try {
-    const bool is_image = pair.next.video_frame < 0;
+    const FrameRef& next = planned.next;
+    const bool is_image = next.video_frame < 0;
     Outcome<ColourFrame> decoded =
-        is_image ? decode_image(files_->take(base_ / pair.next.path), orientation, spec_.range)
-                 : stills_.decode(pair.next, stride);
+        is_image ? decode_image(files_->take(base_ / next.path), orientation, spec_.range)
+                 : stills_.decode(next, stride);
     if (is_fault(decoded)) return decoded.fault();
     ColourFrame& image = *decoded;
-    if (sized) sized(image.size);
+    FramePair pair = settle ? settle(planned, image.size) : planned;
     const ColourView view{image.size, image.bgr.data()};
     std::vector<Box> outlined = boxes;
     OutlineCounts outlines;
@@ -146,9 +147,10 @@ Outcome<PreparedPair> PairReader::still(const FramePair& pair, ImageOrientation 
     PreparedPair prepared = prepare_pair(frames[0], frames[1]);
     prepared.outlines = outlines;
     prepared.between = std::move(between);
+    if (settle) prepared.settled = std::move(pair);
     return prepared;
   } catch (const std::runtime_error& error) {
-    return fault_in(pair.next, error.what());
+    return fault_in(planned.next, error.what());
   }
 }
 
@@ -162,9 +164,9 @@ void PairReader::expect(const FramePair& pair, ImageOrientation orientation) con
 
 Outcome<PreparedPair> PairReader::read(const FramePair& pair, ImageOrientation orientation,
                                        std::int64_t still_stride, const std::vector<Box>& boxes,
-                                       const std::function<void(ImageSize)>& sized) const {
+                                       const Settle& settle) const {
   if (pair.motion || !pair.poses.empty()) {
-    return still(pair, orientation, still_stride, boxes, sized);
+    return still(pair, orientation, still_stride, boxes, settle);
   }
   const auto outcome = frames(pair, orientation);
   if (is_fault(outcome)) return outcome.fault();

@@ -58,6 +58,8 @@ class FilesAhead {
 /// images are decoded in parallel, videos one frame after another under a lock.
 class PairReader {
  public:
+  using Settle = std::function<FramePair(const FramePair& pair, ImageSize image)>;
+
   /// Relative frame paths start at `base`. `pairs_under_way`: how many pairs, of those in the
   /// plan's order, may be read out of order at once. A pair reaches 6 frames back, so
   /// pairs_under_way + 6 prepared frames and a margin are kept of each video (of two videos at
@@ -72,11 +74,11 @@ class PairReader {
   /// differ, or if too little can be seen of a still after its motion. `still_stride`: of the video
   /// that a still is in, each so many of whose frames are taken (SourceSpec::every). `boxes`: those
   /// that FramePair::objects is of; those without an outline are cut out of the image (cut_out.h).
-  /// `sized`: is told a still's size before its motion is looked at, which it may change.
+  /// `settle`: what a still's pair is once its image's size is known; PreparedPair::settled then.
   Outcome<PreparedPair> read(const FramePair& pair,
                              ImageOrientation orientation = ImageOrientation::kStored,
                              std::int64_t still_stride = 1, const std::vector<Box>& boxes = {},
-                             const std::function<void(ImageSize)>& sized = {}) const;
+                             const Settle& settle = {}) const;
 
   /// Has the system load the images of a pair that will be read soon, so that reading it does not
   /// wait for the disk. (Videos are read in order; the system looks ahead in these by itself.)
@@ -87,9 +89,9 @@ class PairReader {
   Outcome<std::array<SharedFrame, 2>> frames(const FramePair& pair,
                                              ImageOrientation orientation) const;
   SharedFrame frame(const FrameRef& ref, ImageOrientation orientation) const;
-  Outcome<PreparedPair> still(const FramePair& pair, ImageOrientation orientation,
+  Outcome<PreparedPair> still(const FramePair& planned, ImageOrientation orientation,
                               std::int64_t stride, const std::vector<Box>& boxes,
-                              const std::function<void(ImageSize)>& sized) const;
+                              const Settle& settle) const;
 
   std::filesystem::path base_;
   ImageSpec spec_;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -49,8 +50,9 @@ struct PreparedPair {
   int content_x = 0;  ///< where `input`'s top left pixel lies in the volume
   int content_y = 0;
   Placement placement;
-  FramesBetween between = {};   ///< of a still, where a reader was asked to keep it
-  OutlineCounts outlines = {};  ///< of a still whose objects move on their own
+  FramesBetween between = {};             ///< of a still, where a reader was asked to keep it
+  OutlineCounts outlines = {};            ///< of a still whose objects move on their own
+  std::optional<FramePair> settled = {};  ///< of a still: the pair it is with its image's size
 };
 
 /// An image [y, x] or [y, x, channel] uint8, C order, 0..255, owned by somebody else.

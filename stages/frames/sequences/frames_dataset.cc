@@ -4,6 +4,7 @@
 #include <array>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "manifests/values/faults.h"
 #include "stages/frames/dataset_kinds.h"
@@ -19,10 +20,10 @@ std::unique_ptr<Dataset> open_frames_dataset(const SourceSpec& spec,
   std::error_code error;
   const auto status = std::filesystem::status(root, error);
   if (std::filesystem::is_directory(status)) {
-    const ImageFolder top = list_image_folder(root);
+    ImageFolder top = list_image_folder(root);
     const bool has_videos = std::ranges::any_of(top.left_out, is_video_name);
     return top.frames.empty() && has_videos ? open_videos_dataset(spec, base)
-                                            : open_images_dataset(spec, base);
+                                            : open_images_dataset(spec, base, std::move(top));
   }
   if (std::filesystem::is_regular_file(status) && is_video_name(root)) {
     return open_videos_dataset(spec, base);

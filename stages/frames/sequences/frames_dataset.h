@@ -48,10 +48,12 @@ std::unique_ptr<Dataset> open_frames_dataset(const SourceSpec& spec,
 /// Whether there are images or videos that such a dataset may have, as far as names tell.
 bool is_frames_root(const std::filesystem::path& root);
 
-/// open_frames_dataset for folders of images. Without SourceSpec::labels the label_key is the
-/// sidecar's path below ROOT; the image's if there is none.
+struct ImageFolder;
+
+/// open_frames_dataset for folders of images; `top`: ROOT's listing. Without SourceSpec::labels the
+/// label_key is the sidecar's path below ROOT; the image's if there is none.
 std::unique_ptr<Dataset> open_images_dataset(const SourceSpec& spec,
-                                             const std::filesystem::path& base);
+                                             const std::filesystem::path& base, ImageFolder top);
 
 /// Labels by frame number.
 using VideoLabels = std::map<std::int64_t, std::string>;

@@ -104,8 +104,10 @@ ImageFolder list_image_folder(const fs::path& folder) {
       if (!counts) listed.left_out.push_back(name.string());
       continue;
     }
-    const auto [image, is_new] = images.try_emplace(name.stem().string(), name.string());
-    if (is_new) continue;
+    // Files come sorted: most stems are the last ones so far, and the hint spares a search.
+    const std::size_t before = images.size();
+    const auto image = images.try_emplace(images.end(), name.stem().string(), name.string());
+    if (images.size() > before) continue;
     const std::size_t other_rank = extension_rank(image->second);
     std::string other = name.string();
     // "a.png" and "a.PNG" are of one rank: the one whose name comes first counts.

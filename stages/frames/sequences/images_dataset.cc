@@ -49,14 +49,14 @@ std::string name_of_root(const fs::path& root) {
 
 class ImagesDataset final : public Dataset {
  public:
-  ImagesDataset(const SourceSpec& spec, const fs::path& base)
+  ImagesDataset(const SourceSpec& spec, const fs::path& base, ImageFolder top)
       : root_(spec.root, base), frames_per_second_(spec.frames_per_second) {
     const auto note = [this](std::int64_t count, const char* noun, const std::string& rest) {
       if (count == 0) return;
       notes_.push_back(count_text(count, noun, rest + " in " + root_.written("")));
     };
     std::vector<ListedFolder> listed(1);
-    listed[0].images = list_image_folder(root_.on_disk(""));
+    listed[0].images = std::move(top);
     const bool is_flat = !listed[0].images.frames.empty();
     const std::vector<std::string> folders = listed[0].images.folders;
     std::int64_t without_images = 0;
@@ -327,8 +327,9 @@ class ImagesDataset final : public Dataset {
 
 }  // namespace
 
-std::unique_ptr<Dataset> open_images_dataset(const SourceSpec& spec, const fs::path& base) {
-  return std::make_unique<ImagesDataset>(spec, base);
+std::unique_ptr<Dataset> open_images_dataset(const SourceSpec& spec, const fs::path& base,
+                                             ImageFolder top) {
+  return std::make_unique<ImagesDataset>(spec, base, std::move(top));
 }
 
 }  // namespace eventgan

@@ -9,7 +9,6 @@
 #include "manifests/values/counter_random.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/poisson_random.h"
-#include "stages/events/simulation/simulate_pair.h"
 #include "tests/testing/fake_recording.h"
 
 namespace eventgan {
@@ -26,8 +25,9 @@ struct Scene {
   double positive_threshold = 0.3;
   double negative_threshold = 0.3;
   NoiseSpec noise = {};
+  double spread = 0;       ///< of the pixels' thresholds, as a share of them
   int still_columns = 32;  ///< at the left; a texture moves in the others
-  int frames = 17;         ///< 16 pairs, of which 12 are fitted
+  int frames = 21;         ///< 20 pairs: 5 are left out, 12 are fitted, 3 are kept
   int hot_events = 0;      ///< of a still pixel, negative, between two frames
 };
 
@@ -62,34 +62,87 @@ void add_noise_events(double mean, bool positive, int interval, std::vector<Even
   }
 }
 
+double log_level(const GreyImage& frame, std::size_t pixel) {
+  return std::log(frame.pixels[pixel] / 255.0 + kFrameLogEpsilon);
+}
+
+/// 1 on average, of about a Gaussian: the sum of twelve uniform numbers.
+double own_share(const Scene& scene, std::size_t pixel) {
+  double sum = -6;
+  for (std::uint64_t i = 0; i < 12; ++i) sum += CounterRandom(11).uniform(12 * pixel + i);
+  return 1 + scene.spread * sum;
+}
+
+/// Of a camera without noise whose log intensity moves on lines from frame to frame; by pixel.
+/// `anew`: each frame sets the pixels' levels.
+std::vector<Event> camera_events(const std::vector<GreyImage>& frames, const Scene& scene,
+                                 bool anew) {
+  std::vector<Event> events;
+  for (std::size_t pixel = 0; pixel < kSceneSize.pixel_count(); ++pixel) {
+    double level = log_level(frames[0], pixel);
+    const double share = own_share(scene, pixel);
+    for (std::size_t i = 0; i + 1 < frames.size(); ++i) {
+      const double from = log_level(frames[i], pixel), to = log_level(frames[i + 1], pixel);
+      if (anew) level = from;
+      for (;;) {
+        const bool rises = to > from;
+        const double next =
+            level + share * (rises ? scene.positive_threshold : -scene.negative_threshold);
+        if (rises ? next > to : next < to) break;
+        if (to == from) break;
+        level = next;
+        const double part = (next - from) / (to - from);
+        events.push_back({static_cast<int>(pixel) % kSceneSize.width,
+                          static_cast<int>(pixel) / kSceneSize.width,
+                          (static_cast<double>(i) + std::max(part, 1e-9)) * kInterval_s, rises});
+      }
+    }
+  }
+  return events;
+}
+
+FakeRecording recording_of(const std::vector<GreyImage>& frames, std::vector<Event> events) {
+  std::vector<double> times_s;
+  for (std::size_t i = 0; i < frames.size(); ++i) times_s.push_back(double(i) * kInterval_s);
+  std::ranges::stable_sort(events, {}, &Event::t_s);
+  return {frames, times_s, events};
+}
+
 /// What a camera of known thresholds and noise would see of the frames.
 FakeRecording scene_recording(const Scene& scene) {
   const std::vector<GreyImage> frames = scene_frames(scene);
-  SensorSpec sensor;
-  sensor.positive_threshold = scene.positive_threshold;
-  sensor.negative_threshold = scene.negative_threshold;
-  sensor.threshold_spread = 0;
-  sensor.log_epsilon = kFrameLogEpsilon;
-  std::vector<double> times_s{0};
-  std::vector<Event> all;
+  std::vector<Event> events = camera_events(frames, scene, /*anew=*/false);
+  const double shot = scene.noise.shot_hz[0] / 2 * kInterval_s;
   for (int i = 0; i + 1 < scene.frames; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    std::vector<Event> events =
-        simulate_difference(frames[at], frames[at + 1], sensor, kInterval_s, CounterRandom(1));
-    const double shot = scene.noise.shot_hz[0] / 2 * kInterval_s;
+    const auto first = static_cast<std::ptrdiff_t>(events.size());
     add_noise_events(shot + scene.noise.leak_hz[0] * kInterval_s, true, i, events);
     add_noise_events(shot, false, i, events);
     for (int event = 0; event < scene.hot_events; ++event) {
       events.push_back({5, 40, 0.25 * kInterval_s, false});
     }
-    std::ranges::stable_sort(events, {}, &Event::t_s);
-    for (Event& event : events) {
-      event.t_s += i * kInterval_s;
-      all.push_back(event);
-    }
-    times_s.push_back((i + 1) * kInterval_s);
+    std::for_each(events.begin() + first, events.end(),
+                  [&](Event& event) { event.t_s += i * kInterval_s; });
   }
-  return {frames, times_s, all};
+  return recording_of(frames, std::move(events));
+}
+
+/// Soft waves before a camera that pans slowly; the first `earlier` frames are before frame 0.
+std::vector<GreyImage> panned_frames(int count, int earlier) {
+  std::vector<GreyImage> frames;
+  for (int i = -earlier; i < count; ++i) {
+    GreyImage& frame =
+        frames.emplace_back(kSceneSize, std::vector<std::uint8_t>(kSceneSize.pixel_count()));
+    for (int y = 0; y < kSceneSize.height; ++y) {
+      for (int x = 0; x < kSceneSize.width; ++x) {
+        const double u = x + 14 * std::sin(0.13 * i), v = y + 9 * std::sin(0.21 * i + 1) + 0.3 * i;
+        const double waves = std::sin(0.21 * u + 0.05 * v) + std::sin(0.17 * v - 0.11 * u) +
+                             std::sin(0.31 * u + 0.29 * v);
+        frame.pixels[static_cast<std::size_t>(y * kSceneSize.width + x)] =
+            static_cast<std::uint8_t>(std::lround(115 + 33 * waves));
+      }
+    }
+  }
+  return frames;
 }
 
 SensorFit fit_camera(const Recording& recording, const Generator* network = nullptr) {
@@ -125,7 +178,7 @@ TEST(FitSensor, FindsTheThresholdAndTheNoiseOfACamera) {
   const Scene scene{.noise = {{4, 4}, {1, 1}, {}}};
   const SensorFit fit = fit_camera(scene_recording(scene));
   EXPECT_EQ(fit.fitted_pairs, 12u);
-  EXPECT_EQ(fit.kept_pairs, 4u);
+  EXPECT_EQ(fit.kept_pairs, 3u);
   ASSERT_TRUE(fit.noise);
   EXPECT_NEAR(fit.noise->positive_hz, 3, 0.2);
   EXPECT_NEAR(fit.noise->negative_hz, 2, 0.16);
@@ -141,6 +194,37 @@ TEST(FitSensor, FindsTheThresholdAndTheNoiseOfACamera) {
   EXPECT_LT(fit.difference->mean.high - fit.difference->mean.low, 0.06);
   EXPECT_FALSE(fit.network);
   EXPECT_THAT(fit.warnings, IsEmpty());
+}
+
+TEST(FitSensor, FindsTheThresholdOfACameraThatKeepsItsLevels) {
+  constexpr int kEarlier = 20;  // the camera was on before
+  for (const double threshold : {0.15, 0.2, 0.4}) {
+    const Scene scene{
+        .positive_threshold = threshold, .negative_threshold = threshold, .spread = 0.15};
+    std::vector<GreyImage> frames = panned_frames(25, kEarlier);
+    std::vector<Event> events = camera_events(frames, scene, /*anew=*/false);
+    std::erase_if(events, [](const Event& event) { return event.t_s <= kEarlier * kInterval_s; });
+    for (Event& event : events) event.t_s -= kEarlier * kInterval_s;
+    frames.erase(frames.begin(), frames.begin() + kEarlier);
+    const SensorFit fit = fit_camera(recording_of(frames, events));
+    ASSERT_TRUE(fit.difference && fit.difference_anew);
+    EXPECT_NEAR(fit.difference->threshold.mean, threshold, 0.1 * threshold);
+    EXPECT_LT(*fit.difference_anew, 0.85 * threshold);  // pairs alone lack what came before
+    EXPECT_EQ(fit.sensor("n", "").threshold->range[0],
+              std::round(fit.difference->threshold.mean * 1e3) / 1e3);
+  }
+}
+
+TEST(FitSensor, TellsTheThresholdOfACameraThatBeginsAnew) {
+  for (const double threshold : {0.15, 0.2, 0.4}) {
+    const Scene scene{
+        .positive_threshold = threshold, .negative_threshold = threshold, .frames = 7};
+    const std::vector<GreyImage> frames = scene_frames(scene);
+    const SensorFit fit =
+        fit_camera(recording_of(frames, camera_events(frames, scene, /*anew=*/true)));
+    ASSERT_TRUE(fit.difference_anew);
+    EXPECT_NEAR(*fit.difference_anew, threshold, 0.1 * threshold);
+  }
 }
 
 TEST(FitSensor, ComparesOnThePairsKeptAside) {
@@ -181,22 +265,25 @@ TEST(FitSensor, TellsNoRatioThatNoDocumentHolds) {
 TEST(FitSensor, CountsNoTimeTwiceForNoise) {
   const FakeRecording recording = scene_recording({.still_columns = kSceneSize.width});
   const FitPart part{&recording, 0, std::nullopt};
-  // Of 16 frame intervals 12 are fitted at a gap of 1; longer pairs end with frame 12 or 13, too.
-  for (const std::vector<int>& gaps : {std::vector{1}, {1, 2, 3}, {2}}) {
+  // Fitted are at a gap of 1 the intervals 5-6 .. 16-17, and at 2 the pairs 4-6 .. 15-17; of all
+  // three 25 of the 33 pairs from frame 8 on, which end with frame 9 (1), 10 (2), 11 .. 17 (3) and
+  // 18 (1).
+  const std::pair<std::vector<int>, int> cases[] = {{{1}, 12}, {{1, 2, 3}, 9}, {{2}, 12}};
+  for (const auto& [gaps, intervals] : cases) {
     const SensorFit fit = fit_sensor({&part, 1}, nullptr, gaps, 1);
     const double seconds = fit.noise->pixel_seconds / static_cast<double>(kSceneSize.pixel_count());
-    EXPECT_GE(seconds, 12 * kInterval_s - 1e-9);
-    EXPECT_LE(seconds, 13 * kInterval_s + 1e-9);
+    EXPECT_GE(seconds, intervals * kInterval_s - 1e-9);
+    EXPECT_LE(seconds, (intervals + 1) * kInterval_s + 1e-9);
   }
 }
 
 TEST(FitSensor, FindsThresholdsByPolarityThroughANetwork) {
-  const Scene scene{.positive_threshold = 0.25, .negative_threshold = 0.4, .frames = 5};
+  const Scene scene{.positive_threshold = 0.25, .negative_threshold = 0.4, .frames = 6};
   const FakeRecording recording = scene_recording(scene);
   // The network's rates are Σ|change| / C: they add up to the camera's events with C = Σ|change| /
   // N.
   double rise = 0, fall = 0;
-  for (std::int64_t i = 0; i < 3; ++i) {
+  for (std::int64_t i = 1; i < 4; ++i) {  // the fitted pairs
     const GreyImage previous = recording.frame(i), next = recording.frame(i + 1);
     for (std::size_t p = 0; p < kSceneSize.pixel_count(); ++p) {
       const double change = std::log(next.pixels[p] / 255.0 + kFrameLogEpsilon) -
@@ -204,7 +291,7 @@ TEST(FitSensor, FindsThresholdsByPolarityThroughANetwork) {
       (change > 0 ? rise : fall) += std::abs(change);
     }
   }
-  const std::vector<Event> events = recording.events_between(0, 3);
+  const std::vector<Event> events = recording.events_between(1, 4);
   const double positive = static_cast<double>(std::ranges::count(events, true, &Event::positive));
   const double expected_positive = rise / positive;
   const double expected_negative = fall / (static_cast<double>(events.size()) - positive);
@@ -272,18 +359,18 @@ TEST(FitSensor, OfOnePairSaysThatItIsNotSure) {
 }
 
 TEST(FitSensor, PoolsRecordingsAndDependsOnNoThreads) {
-  const FakeRecording first = scene_recording({.frames = 5});
+  const FakeRecording first = scene_recording({.frames = 7});
   const FakeRecording second = scene_recording({.positive_threshold = 0.6, .frames = 9});
-  const FitPart parts[] = {{&first, 0, std::nullopt}, {&second, 1, 6}};
+  const FitPart parts[] = {{&first, 0, std::nullopt}, {&second, 1, 8}};
   const SensorFit fit = fit_sensor(parts, nullptr, {1}, 1);
-  EXPECT_EQ(fit.fitted_pairs, 3u + 4u);
+  EXPECT_EQ(fit.fitted_pairs, 4u + 5u);
   EXPECT_EQ(fit.kept_pairs, 1u + 1u);
   EXPECT_EQ(fit_sensor(parts, nullptr, {1}, 3).difference->threshold, fit.difference->threshold);
   EXPECT_GT(fit.difference->threshold.mean, 0.31);
 }
 
 TEST(FitSensor, KeepsNoPairAsideThatSharesTimeWithAFittedOne) {
-  // Of gap 2 the pairs (0,2), .. (14,16): the first 12 end with frame 13; (12,14) begins before it.
+  // Of gap 2 the pairs (4,6), .. (18,20): the first 12 end with frame 17; (16,18) begins before it.
   const FakeRecording recording = scene_recording({});
   const FitPart part{&recording, 0, std::nullopt};
   const SensorFit fit = fit_sensor({&part, 1}, nullptr, {2}, 1);
@@ -305,6 +392,7 @@ SensorFit made_fit() {
   fit.grey_level = 64.04;
   fit.grey_levels = {60, 70};
   fit.difference = FittedThreshold{{0.31234}, {0.3, 0.33}, {}};
+  fit.difference_anew = 0.25;
   fit.noise = NoiseFit{{{0.51234, 1}, {0, 0}, {1e-4, 1e-4}}, 0.5, 0.25, 2000, 1000, 1, 21, {}};
   fit.rows = {{"camera", 0.5}, {"difference, fitted", 0.45}};
   return fit;
@@ -319,7 +407,9 @@ TEST(SensorFit, GivesThreeDigits) {
 TEST(SensorFitText, SaysHowSureItIs) {
   const std::string text = to_text(made_fit());
   EXPECT_THAT(text, HasSubstr("21 fitted, 7 kept aside; mean grey level 64, 60..70"));
-  EXPECT_THAT(text, HasSubstr("difference: 0.312 ± 0.015\n"));
+  EXPECT_THAT(
+      text,
+      HasSubstr("difference: 0.312 ± 0.015; 0.25 if each pair begins anew, as with convert\n"));
   EXPECT_THAT(text, HasSubstr("shot_hz 0.512..1, leak_hz 0, hot_pixels 0.0001 (1 of them)"));
   EXPECT_THAT(text, HasSubstr("from 1000 pixels, 2 s each, of 21 pairs"));
   EXPECT_THAT(text, ::testing::ContainsRegex("difference, fitted +0.4500 +0.90\n"));

@@ -242,7 +242,10 @@ class ImagesDatasetTest : public ::testing::Test {
   void touch(const std::vector<std::string>& names) const {
     for (const std::string& name : names) testing::write_file(folder_ / ("clip/" + name), "");
   }
-  std::unique_ptr<Dataset> open() const { return open_images_dataset(spec_, folder_.path()); }
+  std::unique_ptr<Dataset> open() const { return open(folder_.path()); }
+  std::unique_ptr<Dataset> open(const std::filesystem::path& base) const {
+    return open_images_dataset(spec_, base, list_image_folder(base / spec_.root));
+  }
   std::vector<std::string> ids() const {
     std::vector<std::string> found;
     const auto dataset = open();
@@ -336,9 +339,7 @@ TEST_F(ImagesDatasetTest, TheOnlySequenceIsCalledAsItsFolder) {
   EXPECT_EQ(sequence("clip/highway/images/."), "highway");
   // Wherever the manifest lies, it says the same.
   spec_.root = ".";
-  EXPECT_EQ(
-      open_images_dataset(spec_, folder_ / "clip/highway/images")->labelled_frames()[0].sequence,
-      "frames");
+  EXPECT_EQ(open(folder_ / "clip/highway/images")->labelled_frames()[0].sequence, "frames");
 }
 
 TEST_F(ImagesDatasetTest, ImagesMayHaveLessUsualExtensions) {
