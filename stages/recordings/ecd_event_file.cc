@@ -147,13 +147,9 @@ std::int64_t EcdEventFile::first_byte_after(double time_s) const {
 }
 
 void EcdEventFile::require_order(double after_s, double until_s) const {
-  const EventOrder::Fall* const fall = order().fall_in(after_s, until_s);
-  if (fall == nullptr) return;
-  try {
-    refuse_fall(*fall);
-  } catch (const EventFault& fault) {
-    refuse(fault, fall->place);
-  }
+  eventgan::require_order(
+      order(), after_s, until_s,
+      [&](const EventFault& fault, std::int64_t line_begin) { refuse(fault, line_begin); });
 }
 
 namespace {

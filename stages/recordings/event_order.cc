@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/recordings/detail/event_check.h"
 
 namespace eventgan {
 
@@ -68,10 +67,16 @@ std::optional<std::array<double, 2>> EventOrder::span() const {
   return std::array{earliest_s_, latest_s_};
 }
 
-void refuse_fall(const EventOrder::Fall& fall) {
-  if (fall.unread) std::rethrow_exception(fall.unread);
-  check_event_time(fall.before_s, fall.after_s);
-  throw EventFault("expected times that never decrease, got others");
+void require_order(const EventOrder& order, double after_s, double until_s,
+                   const std::function<void(const EventFault&, std::int64_t)>& refuse) {
+  const EventOrder::Fall* const fall = order.fall_in(after_s, until_s);
+  if (fall == nullptr) return;
+  if (fall->unread) std::rethrow_exception(fall->unread);
+  try {
+    check_event_time(fall->before_s, fall->after_s);
+  } catch (const EventFault& fault) {
+    refuse(fault, fall->place);
+  }
 }
 
 }  // namespace eventgan

@@ -142,15 +142,10 @@ class StoredRecording final : public Recording {
     return order_;
   }
 
-  /// Throws InputError if events of this time may lie elsewhere than among the others of it.
   void require_order(double after_s, double until_s) const {
-    const EventOrder::Fall* const fall = order().fall_in(after_s, until_s);
-    if (fall == nullptr) return;
-    try {
-      refuse_fall(*fall);
-    } catch (const EventFault& fault) {
-      refuse(fault, fall->place);
-    }
+    eventgan::require_order(
+        order(), after_s, until_s,
+        [&](const EventFault& fault, std::int64_t event) { refuse(fault, event); });
   }
 
   /// How many events are at or before a time, at which no time falls.

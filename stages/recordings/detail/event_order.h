@@ -3,10 +3,13 @@
 #include <array>
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <span>
 #include <vector>
+
+#include "stages/recordings/detail/event_check.h"
 
 namespace eventgan {
 
@@ -85,7 +88,10 @@ class EventOrder {
   std::vector<Block> blocks_;
 };
 
-/// Throws EventFault, or where nothing could be read what was thrown then.
-[[noreturn]] void refuse_fall(const EventOrder::Fall& fall);
+/// Nothing where the events of times in (after_s, until_s] lie among the others of theirs; else
+/// `refuse(fault, place)`, which throws, is called with what is wrong at which place, or where
+/// nothing could be read, what was thrown then is thrown again.
+void require_order(const EventOrder& order, double after_s, double until_s,
+                   const std::function<void(const EventFault&, std::int64_t)>& refuse);
 
 }  // namespace eventgan
