@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 #include "stages/recordings/detail/event_parts.h"
+#include "stages/recordings/detail/open_files.h"
 #include "stages/recordings/detail/recording_reader.h"
 
 namespace eventgan {
@@ -329,14 +329,14 @@ struct DecodingStart {
 
 class PropheseeEvents final : public EventParts {
  public:
-  PropheseeEvents(InputFile file, PropheseeEncoding encoding, std::int64_t first_byte,
-                  ImageSize size, bool shifts)
-      : EventParts(file.name()),
+  PropheseeEvents(std::unique_ptr<const RecordingFile> file, PropheseeEncoding encoding,
+                  std::int64_t first_byte, ImageSize size, bool shifts)
+      : EventParts(file->name()),
         file_(std::move(file)),
         encoding_(encoding),
         size_(size),
         shifts_(shifts),
-        end_byte_(file_.end_byte() - (file_.end_byte() - first_byte) % word_bytes()) {
+        end_byte_(file_->end_byte() - (file_->end_byte() - first_byte) % word_bytes()) {
     DecodingStart start{first_byte, {}};
     while (start.byte < end_byte_) {
       const DecodingStart begin = start;
@@ -361,7 +361,7 @@ class PropheseeEvents final : public EventParts {
     }
     note(counts_.left_out, "events before the first time and place are left out");
     note(counts_.reserved, "words of reserved types are passed over");
-    note(file_.end_byte() - end_byte_, "bytes behind the last word are passed over");
+    note(file_->end_byte() - end_byte_, "bytes behind the last word are passed over");
     note(counts_.steps_back, "events are before an earlier one, and their windows at fault");
     constexpr double kMuch = 0.01;
     const auto outside = static_cast<double>(counts_.outside);
@@ -413,7 +413,7 @@ class PropheseeEvents final : public EventParts {
   template <class Word, class TakeWord>
   CompactEvents decode_words(DecodingStart& start, TakeWord take_word) const {
     const std::string bytes =
-        file_.read_between(start.byte, std::min(start.byte + kBytesPerPart, end_byte_));
+        file_->read_between(start.byte, std::min(start.byte + kBytesPerPart, end_byte_));
     CompactEvents result;
     WordEvents events;
     for (std::size_t i = 0; i < bytes.size(); i += sizeof(Word)) {
@@ -423,7 +423,7 @@ class PropheseeEvents final : public EventParts {
       try {
         count = take_word(word, start.state, shifts_, events);
       } catch (const EventFault& fault) {
-        refuse_at(fault.what(), file_.name(), start.byte);
+        refuse_at(fault.what(), file_->name(), start.byte);
       }
       start.byte += sizeof(Word);
       for (std::size_t k = 0; k < count; ++k) {
@@ -437,7 +437,7 @@ class PropheseeEvents final : public EventParts {
     return result;
   }
 
-  InputFile file_;
+  std::unique_ptr<const RecordingFile> file_;
   PropheseeEncoding encoding_;
   ImageSize size_;
   bool shifts_;
@@ -466,36 +466,36 @@ std::optional<RecordingFault> prophesee_fault(const RecordingInput& input,
 }  // namespace
 
 StoredParts open_prophesee(const std::filesystem::path& path, const RecordingOptions& options) {
-  InputFile file(path);
+  auto file = std::make_unique<const RecordingFile>(path);
   PropheseeHeader header = read_prophesee_header(
-      file.read_between(0, std::min(kMostHeaderBytes, file.end_byte())), file.name());
+      file->read_between(0, std::min(kMostHeaderBytes, file->end_byte())), file->name());
   if (!header.encoding) {
     throw InputError(
         "expected a header \"% Data file containing ...\", \"% evt 2.0\", 2.1 or 3.0, got none, "
         "in " +
-        file.name());
+        file->name());
   }
   if (header.encoding == PropheseeEncoding::kDat) {
     const std::int64_t end = header.end_byte + 2;
-    const std::string kind = file.read_between(header.end_byte, std::min(end, file.end_byte()));
+    const std::string kind = file->read_between(header.end_byte, std::min(end, file->end_byte()));
     constexpr char kEvent2d = 0x00;
     constexpr char kEventCd = 0x0c;
     if (kind.size() < 2 || (kind[0] != kEvent2d && kind[0] != kEventCd) || kind[1] != 8) {
-      refuse_at("expected events of type 0 or 12 of 8 bytes, got others", file.name(),
+      refuse_at("expected events of type 0 or 12 of 8 bytes, got others", file->name(),
                 header.end_byte);
     }
     if (header.version != "2") {
-      refuse_at("expected a header \"% Version 2\", got another version or none", file.name(), 0);
+      refuse_at("expected a header \"% Version 2\", got another version or none", file->name(), 0);
     }
     header.end_byte = end;
   }
   if (header.is_legacy) {
     if (header.encoding != PropheseeEncoding::kEvt21) {
-      refuse_at("expected little-endian words, got others", file.name(), 0);
+      refuse_at("expected little-endian words, got others", file->name(), 0);
     }
     header.encoding = PropheseeEncoding::kEvt21Legacy;
   }
-  StoredParts parts{file.name(), {}, nullptr};
+  StoredParts parts{file->name(), {}, nullptr};
   const bool is_told = header.width && header.height;
   parts.size =
       sensor_size(is_told ? std::optional(ImageSize{*header.height, *header.width}) : std::nullopt,
