@@ -28,6 +28,7 @@ struct PlanArguments {
   bool json = false;
   bool freeze = false;
   std::optional<std::string> output;
+  std::optional<std::string> sensor;
   ProgressStyle progress = ProgressStyle::kAuto;
 };
 
@@ -61,7 +62,7 @@ int run(const PlanArguments& arguments) {
   if (arguments.output && arguments.output->empty()) {  // a script's unset variable
     throw UsageError("--output: expected a folder, got nothing");
   }
-  const GivenJob given = read_given_job(arguments.manifest, arguments.output);
+  const GivenJob given = read_given_job(arguments.manifest, arguments.output, arguments.sensor);
   const JobManifest& manifest = given.manifest;
   const LoadedGenerator loaded = load_generator(manifest);
   PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description(),
@@ -86,6 +87,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
                          "and time. Writes nothing, except with --freeze.");
   const auto arguments = std::make_shared<PlanArguments>();
   command->add_option(kGivenJob, arguments->manifest, kGivenJobText)->required();
+  command->add_option(kSensorOption, arguments->sensor, kSensorText)->option_text("WIDTHxHEIGHT");
   add_threads_option(*command, arguments->threads);
   add_json_option(*command, arguments->json);
   auto* freeze_flag =
