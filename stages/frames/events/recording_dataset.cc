@@ -30,6 +30,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kSameTime_s = 1e-6;  // what labels written with six decimals can lose
+/// An event at a window's begin is not in it, and none at whole microseconds lies on the border of
+/// two windows that begin so long before one.
+constexpr double kJustBefore_s = kSameTime_s / 4;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// Consecutive windows from `begin_s` on.
@@ -46,6 +49,9 @@ struct Recorded : FoundFile {
   std::optional<std::array<double, 2>> event_span;  ///< of an event; none: there are none
   Windows windows;                                  ///< if it has neither frames nor labels
   RecordingLabels labels;                           ///< class_id is the source's
+
+  /// Whether it is one window, whose labels have no time.
+  bool is_window() const { return is_window_label_file(label_file); }
 
   /// The last frame at or before the time; -1 if there is none.
   std::int64_t frame_at(double time_s) const {
@@ -89,6 +95,15 @@ Span frame_window(const std::vector<double>& frames, double time_s, LabelPlace p
     return {later(time_s, -half_s), later(time_s, half_s)};
   }
   return {later(later(time_s, -last_s), before_s), time_s};
+}
+
+/// What lies beside a file, or near it, written as that one is.
+std::string written_beside(const fs::path& beside, const fs::path& file,
+                           const std::string& written_file) {
+  const fs::path from_file = beside.lexically_relative(file.parent_path());
+  fs::path written = fs::path(written_file).parent_path() / from_file;
+  if (from_file.has_parent_path()) written = written.lexically_normal();  // left/../../images
+  return written.generic_string();
 }
 
 class RecordingDataset final : public Dataset {
@@ -229,6 +244,9 @@ class RecordingDataset final : public Dataset {
   /// None where so many events make the window, whatever their times.
   std::optional<Span> span_of(const Recorded& recorded, double time_s) const {
     if (window_.events) return std::nullopt;
+    if (!window_.duration_s && recorded.is_window()) {
+      return Span{recorded.span[0] - kJustBefore_s, recorded.span[1]};
+    }
     if (!window_.duration_s) return frame_window(recorded.frame_times_s, time_s, window_.label);
     if (recorded.windows.count > 0) {
       // From the window's number, so that one's end is the next one's begin to the last bit: no
@@ -246,12 +264,12 @@ class RecordingDataset final : public Dataset {
     for (auto& [name, recorded] : recordings_) {
       if (recorded.label_file.empty()) continue;
       const fs::path& file = recorded.label_file_on_disk;
-      recorded.labels = read_recording_labels(file);
       annotation_files_.push_back(recorded.label_file);
-      for (const fs::path& beside : recording_label_companions(file)) {
-        annotation_files_.push_back(
-            (fs::path(recorded.label_file).parent_path() / beside.filename()).generic_string());
+      for (const fs::path& beside : recorded.is_window() ? window_label_companions(file)
+                                                         : recording_label_companions(file)) {
+        annotation_files_.push_back(written_beside(beside, file, recorded.label_file));
       }
+      if (!recorded.is_window()) recorded.labels = read_recording_labels(file);
     }
   }
 
@@ -262,6 +280,7 @@ class RecordingDataset final : public Dataset {
     for (auto entry = recordings_.begin(); entry != recordings_.end();) {
       try {
         open(entry->second, base);
+        if (entry->second.is_window()) read_window(entry->second);
         ++entry;
       } catch (const InputError& error) {
         if (is_one) throw;
@@ -278,10 +297,7 @@ class RecordingDataset final : public Dataset {
     const fs::path path = base / recorded.path;
     const fs::path own = fs::absolute(path).lexically_normal();
     for (const fs::path& file : event_companions(own, recorded.format, options_)) {
-      const fs::path beside = file.lexically_relative(own.parent_path());
-      fs::path written = fs::path(recorded.path).parent_path() / beside;
-      if (beside.has_parent_path()) written = written.lexically_normal();  // left/../../images
-      annotation_files_.push_back(written.generic_string());
+      annotation_files_.push_back(written_beside(file, own, recorded.path));
     }
     recorded.recording = open_recording(path, recorded.format, options_);
     const Recording& recording = *recorded.recording;
@@ -306,12 +322,21 @@ class RecordingDataset final : public Dataset {
     }
   }
 
+  /// The labels' time is where the window has it.
+  void read_window(Recorded& recorded) const {
+    const auto [first_s, last_s] = recorded.span;
+    const double time_s =
+        window_.label == LabelPlace::kMiddle ? first_s + (last_s - first_s) / 2 : last_s;
+    recorded.labels =
+        read_window_labels(recorded.label_file_on_disk, recorded.recording->size(), time_s);
+  }
+
   void open_without_frames(Recorded& recorded) const {
     if (!recorded.event_span) {
       throw InputError("expected events or frames, got neither, in " + recorded.path);
     }
     const bool is_labelled = !recorded.label_file.empty();
-    if (!window_.duration_s && !(is_labelled && window_.events)) {
+    if (!window_.duration_s && !(is_labelled && window_.events) && !recorded.is_window()) {
       throw InputError(
           fmt::format("expected window_s{}, since the recording has no frames, got {}, in {}",
                       is_labelled ? " or window_events" : ", or labels",
@@ -319,10 +344,8 @@ class RecordingDataset final : public Dataset {
     }
     recorded.span = *recorded.event_span;
     if (is_labelled) return;
-    // A quarter of a microsecond before the first event: an event at a window's begin is not in it,
-    // and none at whole microseconds lies on the border of two.
     const double length_s = *window_.duration_s;
-    const double begin_s = recorded.span[0] - kSameTime_s / 4;
+    const double begin_s = recorded.span[0] - kJustBefore_s;
     const double count = std::ceil((recorded.span[1] - begin_s) / length_s);
     constexpr double kMostWindows = 1e7;
     if (count > kMostWindows) {

@@ -121,6 +121,11 @@ class FolderSearch {
           "expected a recording of an event camera ({}), or a folder of them, got none, in {}{}",
           fmt::join(titles, ", "), root.string(), reason.empty() ? "" : " (" + reason + ")"));
     }
+    std::erase_if(left_out, [&](const fs::path& name) {  // labels, or told of as no such
+      const auto recorded = found_.recordings.find(name.stem().string());
+      return is_window_label_file(name) && recorded != found_.recordings.end() &&
+             recorded->second.format == RecordingFormat::kTable;
+    });
     if (!left_out.empty()) {
       found_.notes.push_back(counted(left_out, "entry", " left out in " + folder.written("")));
     }
@@ -132,7 +137,7 @@ class FolderSearch {
     if (spec.annotations && !fs::is_directory(named)) {
       if (found_.recordings.size() > 1) {
         throw UsageError(
-            "annotations: expected a folder of NAME.csv, NAME.json or NAME_bbox.npy "
+            "annotations: expected a folder of NAME.csv, NAME.json, NAME_bbox.npy or NAME.txt "
             "for " +
             std::to_string(found_.recordings.size()) + " recordings, got a file, in " + spec.root);
       }
@@ -143,17 +148,22 @@ class FolderSearch {
     for (auto& [name, recorded] : found_.recordings) {
       std::vector<fs::path> files = {folder / (name + ".csv"), folder / (name + ".json"),
                                      folder / bbox_name(name)};
+      if (recorded.format == RecordingFormat::kTable) files.push_back(folder / (name + ".txt"));
       // A table of events is a .csv, too.
       const fs::path own = fs::absolute(base / recorded.path).lexically_normal();
       std::erase_if(files, [&](const fs::path& file) {
         return !fs::exists(file) || is_manifest(file) ||
                fs::absolute(file).lexically_normal() == own;
       });
-      if (!files.empty() && files[0].extension() == ".csv" && !is_label_table(files[0])) {
-        found_.notes.push_back("no labels, since its first line has none of their columns: " +
-                               files[0].string());
-        files.erase(files.begin());
-      }
+      std::erase_if(files, [&](const fs::path& file) {
+        const bool is_other = (file.extension() == ".csv" && !is_label_table(file)) ||
+                              (is_window_label_file(file) && !is_window_label_text(file));
+        if (is_other) {
+          found_.notes.push_back("no labels, since its first line has none of their columns: " +
+                                 file.string());
+        }
+        return is_other;
+      });
       if (files.size() > 1) {
         throw InputError("expected labels in one file, got two, in " + files[0].string() + " and " +
                          files[1].string());
@@ -164,7 +174,7 @@ class FolderSearch {
     if (std::ranges::none_of(found_.recordings, is_labelled)) {
       if (!spec.annotations) return;
       throw InputError(
-          "expected NAME.csv, NAME.json or NAME_bbox.npy of a recording, got none, in " +
+          "expected NAME.csv, NAME.json, NAME_bbox.npy or NAME.txt of a recording, got none, in " +
           folder.string());
     }
     std::vector<std::string> without;
