@@ -65,11 +65,16 @@ int run(const PlanArguments& arguments) {
   const GivenJob given = read_given_job(arguments.manifest, arguments.output, arguments.sensor);
   const JobManifest& manifest = given.manifest;
   const LoadedGenerator loaded = load_generator(manifest);
+  EventIndexes indexes(given.output / kEventIndexFile);
   PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description(),
                              {.show_phase = show_phases(arguments.progress)});
   for (const std::string& line : given.findings) tell(line);
   for (const std::string& warning : job.warnings) tell_warning(warning);
-  if (arguments.freeze) return freeze(arguments, given, std::move(job.plan));
+  if (arguments.freeze) {
+    const int exit_code = freeze(arguments, given, std::move(job.plan));
+    indexes.save();
+    return exit_code;
+  }
   const int threads = thread_count(arguments.threads);
   const bool as_json = arguments.json || arguments.progress == ProgressStyle::kJson;
   const TrialEstimate estimate = measure_trial(manifest, job, *loaded.generator, threads);

@@ -18,6 +18,7 @@
 #include "stages/recordings/detail/open_files.h"
 #include "stages/recordings/detail/recording_reader.h"
 #include "stages/recordings/detail/stored_recording.h"
+#include "stages/recordings/event_index.h"
 
 namespace eventgan {
 namespace {
@@ -317,6 +318,7 @@ StoredParts open_event_columns(const fs::path& path, const ColumnLayout& layout,
   const Hdf5Lock lock;
   StoredParts parts;
   parts.name = path.string();
+  parts.index_key = event_index_key(path, layout.column("t"));
   std::optional<ImageSize> told = read_hdf5(parts.name, [&] {
     const Hdf5Handle file = open_recording_file(path);
     const auto size = read_size(file, layout, parts.name);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "stages/recordings/detail/packed_bytes.h"
 
 namespace eventgan {
 namespace {
@@ -71,6 +72,27 @@ void EventParts::add_part(CompactEvents events) {
   order_.add_all(events.times_s(), count_);
   count_ += events.size();
   kept_part(firsts_.size() - 1, [&] { return std::move(events); });
+}
+
+void EventParts::pack_parts(std::string& bytes) const {
+  pack(bytes, firsts_);
+  pack(bytes, count_);
+  bytes += order_.to_bytes().value();  // of parts nothing is unreadable
+}
+
+bool EventParts::unpack_parts(std::string_view bytes, std::size_t parts) {
+  std::vector<std::int64_t> firsts;
+  std::int64_t count = 0;
+  if (!unpack(bytes, firsts) || firsts.size() != parts || !unpack(bytes, count)) return false;
+  auto order = EventOrder::take_bytes(bytes);
+  const auto before = [](std::int64_t a, std::int64_t b) { return a >= b; };
+  const bool ascend = std::ranges::adjacent_find(firsts, before) == firsts.end();
+  const bool within = firsts.empty() ? count == 0 : firsts[0] == 0 && firsts.back() < count;
+  if (!order || order->end() != count || !ascend || !within) return false;
+  firsts_ = std::move(firsts);
+  count_ = count;
+  order_ = *std::move(order);
+  return true;
 }
 
 EventParts::Events EventParts::kept_part(std::size_t number,

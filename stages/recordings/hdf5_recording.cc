@@ -16,6 +16,7 @@
 #include "stages/recordings/detail/open_files.h"
 #include "stages/recordings/detail/recording_reader.h"
 #include "stages/recordings/detail/stored_recording.h"
+#include "stages/recordings/event_index.h"
 
 namespace eventgan {
 namespace {
@@ -252,10 +253,12 @@ Hdf5Layout v2e_layout() {
 std::unique_ptr<Recording> open_hdf5_recording(const std::filesystem::path& path,
                                                const Hdf5Layout& layout,
                                                const std::optional<ImageSize>& sensor) {
+  std::string index_key = event_index_key(path, layout.events);
   const auto file = std::make_shared<const Hdf5RecordingFile>(path, layout);
   StoredParts parts{
       .name = path.string(), .size = {}, .events = std::make_unique<Hdf5Events>(file)};
   parts.size = sensor_size(file->size(), sensor, parts);
+  parts.index_key = std::move(index_key);
   if (file->size() == parts.size) parts.frames = std::make_unique<Frames>(file);
   return make_stored_recording(std::move(parts));
 }

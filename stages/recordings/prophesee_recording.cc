@@ -13,7 +13,9 @@
 #include "manifests/values/faults.h"
 #include "stages/recordings/detail/event_parts.h"
 #include "stages/recordings/detail/open_files.h"
+#include "stages/recordings/detail/packed_bytes.h"
 #include "stages/recordings/detail/recording_reader.h"
+#include "stages/recordings/event_index.h"
 
 namespace eventgan {
 namespace {
@@ -337,6 +339,10 @@ class PropheseeEvents final : public EventParts {
         size_(size),
         shifts_(shifts),
         end_byte_(file_->end_byte() - (file_->end_byte() - first_byte) % word_bytes()) {
+    EventIndexes* const indexes = EventIndexes::current();
+    const std::string key = event_index_key(
+        file_->name(), fmt::format("{} {} {}", to_string(size), first_byte, shifts));
+    if (indexes != nullptr && !key.empty() && restore(indexes->find(key).value_or(""))) return;
     DecodingStart start{first_byte, {}};
     while (start.byte < end_byte_) {
       const DecodingStart begin = start;
@@ -346,6 +352,7 @@ class PropheseeEvents final : public EventParts {
     }
     counts_ = start.state.counts;
     shift_us_ = start.state.shift_us;
+    if (indexes != nullptr && !key.empty()) indexes->keep(key, to_bytes());
   }
 
   /// What a user should know goes into `parts`, which has its name.
@@ -376,6 +383,30 @@ class PropheseeEvents final : public EventParts {
 
  private:
   static constexpr std::int64_t kBytesPerPart = 1 << 17;
+
+  /// What is known of the file once it was read.
+  std::string to_bytes() const {
+    std::string bytes;
+    pack(bytes, starts_);
+    pack(bytes, counts_);
+    pack(bytes, shift_us_);
+    pack_parts(bytes);
+    return bytes;
+  }
+
+  /// False if these are no such bytes; then nothing is known.
+  bool restore(std::string_view bytes) {
+    std::vector<DecodingStart> starts;
+    if (!unpack(bytes, starts) || !unpack(bytes, counts_) || !unpack(bytes, shift_us_))
+      return false;
+    const auto is_within = [&](const DecodingStart& start) {
+      return start.byte >= 0 && start.byte < end_byte_;
+    };
+    if (!std::ranges::all_of(starts, is_within) || !unpack_parts(bytes, starts.size()))
+      return false;
+    starts_ = std::move(starts);
+    return true;
+  }
 
   CompactEvents read_part(std::size_t part) const override {
     DecodingStart start = starts_[part];

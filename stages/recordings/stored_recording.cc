@@ -138,7 +138,9 @@ class StoredRecording final : public Recording {
 
  private:
   const EventOrder& order() const {
-    std::call_once(order_once_, [&] { order_ = parts_.events->order(); });
+    std::call_once(order_once_, [&] {
+      order_ = known_order(parts_.index_key, event_count_, [&] { return parts_.events->order(); });
+    });
     return order_;
   }
 

@@ -52,6 +52,7 @@ class EcdEventFile {
 
  private:
   const EventOrder& order() const;
+  EventOrder look_at_times() const;
   [[noreturn]] void refuse(const EventFault& fault, std::int64_t line_begin) const;
 
   RecordingFile file_;

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "stages/recordings/detail/event_check.h"
@@ -59,6 +60,11 @@ class EventParts : public EventStore {
   void add_part(std::int64_t count, double begin_s, double end_s);
   /// The same, of what has been read already; nothing if it is empty.
   void add_part(CompactEvents events);
+
+  /// What the parts added so far tell; the second takes it from `bytes` instead of adding them,
+  /// false if it is not of so many parts.
+  void pack_parts(std::string& bytes) const;
+  bool unpack_parts(std::string_view bytes, std::size_t parts);
 
   /// The events of a part. If they are not as many as it was added with, the file has changed,
   /// which is told the caller as InputError. Thread safe.
