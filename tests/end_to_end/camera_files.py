@@ -41,7 +41,7 @@ def write_columns(path, events, group="events", index="ms_to_idx", offset=None, 
         for name, values in {"x": events[:, 0].astype(np.uint16), "y": events[:, 1].astype(np.uint16),
                              "t": ticks.astype(np.int64 if size or group != "events" else np.uint32),
                              "p": (events[:, 3] > 0).astype(np.uint8)}.items():
-            file.create_dataset(f"{group}/{name}", data=values, chunks=(1000,), **filters)
+            file.create_dataset(f"{group}/{name}", data=values, chunks=(min(1000, len(values)),), **filters)
         if size:
             file["events/height"], file["events/width"] = size
             return
