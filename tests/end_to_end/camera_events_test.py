@@ -584,6 +584,20 @@ class WithoutFrames(program.InFolder):
         (self.folder / "yolo/train/b.txt").write_text("7 0.5 0.5 1 1\n")
         self.assertIn("expected a class 0..1", run("plan", manifest, expect=66)[1])
 
+    def test_an_index_of_times_changes_no_byte(self):
+        write_dat(self.folder / "a.dat", self.events)
+        manifest = self.write_manifest(events_manifest({"dataset": "recording", "root": "a.dat", "window_s": 0.05}))
+        run("plan", manifest, "--freeze")
+        index = self.out / "plan.index"
+        index.write_bytes(index.read_bytes()[:-9] + b"123456789")  # damaged: as none
+        run("convert", manifest)
+        self.check_windows(self.events)
+        other = self.folder / "other"
+        for part in ("0/2", "1/2"):  # the second takes the first one's
+            run("convert", manifest, "--output", other, "--shards", part)
+        self.assertEqual(index.read_bytes(), (other / "plan.index").read_bytes())
+        self.assertEqual(shard_bytes(self.out), shard_bytes(other))
+
     def test_more_recordings_than_files_may_be_open(self):
         many = self.folder / "many"
         many.mkdir()
