@@ -2,7 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <atomic>
 #include <cstdint>
 #include <stdexcept>
 #include <system_error>
@@ -22,7 +21,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view kFirstLine = "eventgan-event-index 1\n";
 constexpr std::size_t kHashDigits = 64;
 
-std::atomic<EventIndexes*> current_indexes = nullptr;
+thread_local EventIndexes* current_indexes = nullptr;
 
 /// Nothing of what is no whole file of them.
 std::map<std::string, std::string> read_entries(const fs::path& file) {
@@ -49,7 +48,6 @@ EventIndexes::~EventIndexes() { current_indexes = nullptr; }
 EventIndexes* EventIndexes::current() { return current_indexes; }
 
 std::optional<std::string> EventIndexes::find(const std::string& key) {
-  const std::lock_guard lock(mutex_);
   const auto entry = entries_.find(key);
   if (entry == entries_.end()) return std::nullopt;
   used_.insert(key);
@@ -57,14 +55,12 @@ std::optional<std::string> EventIndexes::find(const std::string& key) {
 }
 
 void EventIndexes::keep(const std::string& key, std::string bytes) {
-  const std::lock_guard lock(mutex_);
   entries_[key] = std::move(bytes);
   used_.insert(key);
   is_new_ = true;
 }
 
 void EventIndexes::save() const try {
-  const std::lock_guard lock(mutex_);
   if (!is_new_) return;
   std::string bytes;
   for (const std::string& key : used_) {

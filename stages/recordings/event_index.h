@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -19,7 +18,7 @@ inline constexpr char kEventIndexFile[] = "plan.index";
 /// has another all is read again. It decides nothing: without it everything is the same but slower,
 /// and a damaged file is as none.
 ///
-/// One at a time, made and destroyed while no other thread reads recordings; else thread safe.
+/// It serves the recordings that its thread opens; one at a time in a thread.
 class EventIndexes {
  public:
   /// Takes what `file` has; there need be none.
@@ -28,7 +27,7 @@ class EventIndexes {
   EventIndexes(const EventIndexes&) = delete;
   EventIndexes& operator=(const EventIndexes&) = delete;
 
-  /// The one that lives; null: none.
+  /// This thread's; null: none.
   static EventIndexes* current();
 
   /// What is known under a key.
@@ -41,14 +40,14 @@ class EventIndexes {
 
  private:
   std::filesystem::path file_;
-  mutable std::mutex mutex_;
   std::map<std::string, std::string> entries_;
   std::set<std::string> used_;
   bool is_new_ = false;
 };
 
 /// The key of a file whose events are read so (`how`: where they lie in it, and what else decides
-/// the entry); empty if no EventIndexes lives or there is no such file.
+/// the entry); empty if this thread has no EventIndexes or there is no such
+/// file.
 std::string event_index_key(const std::filesystem::path& file, std::string_view how);
 
 }  // namespace eventgan
