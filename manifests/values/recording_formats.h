@@ -10,7 +10,18 @@
 namespace eventgan {
 
 /// How a recording of an event camera lies on disk (manifests/guides/real_events.md).
-enum class RecordingFormat { kMvsec, kEventgan, kEcd, kAedat4, kDsec, kM3ed, kProphesee, kTable };
+enum class RecordingFormat {
+  kMvsec,
+  kEventgan,
+  kEcd,
+  kAedat4,
+  kDsec,
+  kM3ed,
+  kEventUtils,
+  kV2e,
+  kProphesee,
+  kTable
+};
 
 /// What manifests, commands and pages may say of a format. What recognises and opens it is in its
 /// own file (stages/recordings/detail/recording_reader.h).
@@ -69,6 +80,20 @@ inline constexpr std::array kRecordingFormats{
                        .summary = "HDF5 of M3ED",
                        .has_frames = false,  // ovc is another camera
                        .keys = {"camera", "sensor"},
+                       .extensions = {".h5", ".hdf5"}},
+    RecordingFormatRow{.word = "event_utils",
+                       .value = RecordingFormat::kEventUtils,
+                       .title = "event_utils",
+                       .summary = "HDF5 of event_utils, as HQF: events/{xs, ys, ts, ps}, images",
+                       .has_frames = true,
+                       .keys = {"sensor"},
+                       .extensions = {".h5", ".hdf5"}},
+    RecordingFormatRow{.word = "v2e",
+                       .value = RecordingFormat::kV2e,
+                       .title = "v2e",
+                       .summary = "HDF5 of v2e (--dvs_h5): events [N, 4] of t in us, x, y, p",
+                       .has_frames = true,
+                       .keys = {"sensor"},
                        .extensions = {".h5", ".hdf5"}},
     RecordingFormatRow{.word = "prophesee",
                        .value = RecordingFormat::kProphesee,

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -54,25 +55,61 @@ void require_labels_read(const std::vector<FoundSource>& sources) {
   }
 }
 
+/// WIDTHxHEIGHT
+ImageSize parse_sensor(const std::string& text) {
+  constexpr int kMostSide = 8192;  // as the manifest's `sensor`
+  ImageSize size;
+  const char* const end = text.data() + text.size();
+  const auto width = std::from_chars(text.data(), end, size.width);
+  const bool goes_on = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
+  const auto height = std::from_chars(goes_on ? width.ptr + 1 : end, end, size.height);
+  const auto is_side = [](int side) { return side >= 1 && side <= kMostSide; };
+  if (height.ec == std::errc() && height.ptr == end && is_side(size.width) &&
+      is_side(size.height)) {
+    return size;
+  }
+  throw UsageError(
+      fmt::format("--sensor: expected WIDTHxHEIGHT of 1 to {} pixels, got {}", kMostSide, text));
+}
+
 }  // namespace
 
-GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& output) {
+GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& output,
+                        const std::optional<std::string>& sensor) {
   GivenJob job;
   if (!may_be_source(given)) {
+    if (sensor) {
+      throw UsageError(
+          "--sensor: expected a recording, got a manifest, whose \"sensor\" counts, in " +
+          given.string());
+    }
     job.manifest = read_job_manifest(given);
     job.output =
         output.value_or(resolve(job.manifest, job.manifest.output.directory).lexically_normal());
     if (!job.output.has_filename()) job.output = job.output.parent_path();  // "out/"
     return job;
   }
-  const std::vector<FoundSource> sources = find_sources(given);
-  const FoundSource& found = sources.front();
+  std::vector<FoundSource> sources = find_sources(given);
+  FoundSource& found = sources.front();
+  if (sensor) {
+    found.sensor = parse_sensor(*sensor);
+    if (found.dataset != DatasetKind::kRecording) {
+      throw UsageError(fmt::format("--sensor: expected a recording, got {}, in {}",
+                                   to_string(found.dataset), found.root.string()));
+    }
+  }
   job.output = output.value_or(fs::path("out") / draft_name(sources));
   const fs::path file = job.output / "manifest.json";
   // In this order: another worker may keep the manifest and freeze the plan meanwhile.
   const bool has_plan = fs::exists(fs::symlink_status(job.output / "plan.json"));
   if (fs::exists(fs::symlink_status(file))) {
     job.manifest = read_kept(file, found, given);
+    const auto& kept = job.manifest.sources.front().recording.sensor;
+    if (found.sensor && kept != found.sensor) {
+      throw UsageError(fmt::format("--sensor: expected {}, as when the job began, got {}, in {}",
+                                   kept ? to_string(*kept) : "none", to_string(*found.sensor),
+                                   file.string()));
+    }
     job.findings = {"manifest: " + file.string() + ", kept as it was when the job began"};
     if (found.labels && !job.manifest.sources.front().labels) {
       job.findings.push_back("warning: that manifest does not name the labels in " +
@@ -91,10 +128,11 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
   ManifestDraft draft = draft_manifest(sources, {folder, /*is_relative=*/false, "."});
   if (!draft.has_samples) {
     throw InputError(fmt::format(
-        "expected {}, got none, in {} ({}; eventgan init writes a manifest to complete)",
+        "expected {}, got none, in {} ({}; {}eventgan init writes a manifest to complete)",
         has_events(found.dataset) ? "a recording that makes samples as it is"
                                   : "labelled frames that make pairs",
-        found.root.string(), fmt::join(draft.findings, "; ")));
+        found.root.string(), fmt::join(draft.findings, "; "),
+        has_events(found.dataset) ? "--sensor WIDTHxHEIGHT gives its size, and " : ""));
   }
   job.manifest = parse_job_manifest(draft.text, folder, file.string());
   job.findings = std::move(draft.findings);

@@ -17,6 +17,12 @@ inline constexpr char kGivenJobText[] =
     "kept "
     "as manifest.json in the output folder";
 
+/// The option that goes with it, of one that is a recording.
+inline constexpr char kSensorOption[] = "--sensor";
+inline constexpr char kSensorText[] =
+    "The size of the sensor in pixels, such as 1280x720, of a recording that is given without a "
+    "manifest and whose file does not tell it";
+
 /// A job as a command line gives it.
 struct GivenJob {
   JobManifest manifest;
@@ -32,14 +38,16 @@ struct GivenJob {
 /// draft_manifest writes for it, with absolute paths, or that an earlier run has kept as
 /// manifest.json in the output folder: it stays as it is, whatever becomes of the source. `output`:
 /// --output; without it a folder's job goes to out/NAME, which starts at the program's own folder
-/// as that of a manifest in it would. Writes nothing.
+/// as that of a manifest in it would. `sensor`: --sensor, WIDTHxHEIGHT. Writes nothing.
 ///
 /// Throws UsageError or InputError as read_job_manifest, find_source and draft_manifest do;
 /// InputError if nothing found makes a pair, or labels lie there that are not read
 /// (FoundSource::unread); UsageError if the output folder has the manifest of
-/// another source, or a job that was given by a manifest elsewhere.
+/// another source or sensor, or a job that was given by a manifest elsewhere; for a sensor of what
+/// is no recording.
 GivenJob read_given_job(const std::filesystem::path& given,
-                        const std::optional<std::filesystem::path>& output);
+                        const std::optional<std::filesystem::path>& output,
+                        const std::optional<std::string>& sensor = std::nullopt);
 
 /// Keeps the manifest before the job's plan is frozen, if that is left to do, and tells where. Of
 /// several workers that begin at once one writes it. Throws UsageError if that one wrote another,

@@ -26,6 +26,7 @@ namespace {
 struct ConvertArguments {
   JobOptions job;
   std::optional<std::string> shards;
+  std::optional<std::string> sensor;
   std::optional<std::int64_t> limit;
   double grace_s = ConversionOptions().grace_s;
   std::optional<std::string> profile;
@@ -79,7 +80,7 @@ fs::path trial_folder(fs::path output, std::int64_t limit) {
 int run(const ConvertArguments& arguments) {
   const JobOptions& job = arguments.job;
   const StopSignal signal(shard_stopping_line(arguments.grace_s));
-  const GivenJob given = read_given_job(job.manifest, job.output_folder());
+  const GivenJob given = read_given_job(job.manifest, job.output_folder(), arguments.sensor);
   ConversionOptions options;
   options.part = choose_part(arguments.shards, [](const char* name) { return std::getenv(name); });
   options.grace_s = arguments.grace_s;
@@ -123,6 +124,7 @@ void add_convert_command(CLI::App& app, int& exit_code) {
                    "OUTPUT-trial-N beside the manifest's output folder, or into --output")
       ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()))
       ->option_text("N");
+  command->add_option(kSensorOption, arguments->sensor, kSensorText)->option_text("WIDTHxHEIGHT");
   add_grace_option(*command, arguments->grace_s);
   add_profile_option(*command, arguments->profile);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });

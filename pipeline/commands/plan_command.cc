@@ -18,6 +18,7 @@
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/threads.h"
+#include "stages/recordings/event_index.h"
 
 namespace eventgan {
 namespace {
@@ -28,6 +29,7 @@ struct PlanArguments {
   bool json = false;
   bool freeze = false;
   std::optional<std::string> output;
+  std::optional<std::string> sensor;
   ProgressStyle progress = ProgressStyle::kAuto;
 };
 
@@ -61,14 +63,19 @@ int run(const PlanArguments& arguments) {
   if (arguments.output && arguments.output->empty()) {  // a script's unset variable
     throw UsageError("--output: expected a folder, got nothing");
   }
-  const GivenJob given = read_given_job(arguments.manifest, arguments.output);
+  const GivenJob given = read_given_job(arguments.manifest, arguments.output, arguments.sensor);
   const JobManifest& manifest = given.manifest;
   const LoadedGenerator loaded = load_generator(manifest);
+  EventIndexes indexes(given.output / kEventIndexFile);
   PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description(),
                              {.show_phase = show_phases(arguments.progress)});
   for (const std::string& line : given.findings) tell(line);
   for (const std::string& warning : job.warnings) tell_warning(warning);
-  if (arguments.freeze) return freeze(arguments, given, std::move(job.plan));
+  if (arguments.freeze) {
+    const int exit_code = freeze(arguments, given, std::move(job.plan));
+    indexes.save();
+    return exit_code;
+  }
   const int threads = thread_count(arguments.threads);
   const bool as_json = arguments.json || arguments.progress == ProgressStyle::kJson;
   const TrialEstimate estimate = measure_trial(manifest, job, *loaded.generator, threads);
@@ -86,6 +93,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
                          "and time. Writes nothing, except with --freeze.");
   const auto arguments = std::make_shared<PlanArguments>();
   command->add_option(kGivenJob, arguments->manifest, kGivenJobText)->required();
+  command->add_option(kSensorOption, arguments->sensor, kSensorText)->option_text("WIDTHxHEIGHT");
   add_threads_option(*command, arguments->threads);
   add_json_option(*command, arguments->json);
   auto* freeze_flag =

@@ -22,6 +22,7 @@
 #include "pipeline/runtime/threads.h"
 #include "pipeline/runtime/trace.h"
 #include "stages/frames/class_numbers.h"
+#include "stages/recordings/event_index.h"
 
 namespace eventgan {
 namespace {
@@ -157,6 +158,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
                          const std::string& weights_hash, const ConversionOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const fs::path folder = options.output.value_or(resolve(manifest, manifest.output.directory));
+  EventIndexes indexes(folder / kEventIndexFile);
   PlannedJob planned = make_plan(manifest, weights_hash, generator.description(),
                                  {.stop = [&] { return options.stop_requested(); },
                                   .trace = options.trace,
@@ -167,6 +169,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
   std::vector<std::string> notes = notes_of(planned.plan.sources);  // as the inputs are today
   const auto fingerprint = planned.plan.fingerprint;
   FrozenPlan frozen = prepare_folder(folder, manifest, std::move(planned.plan), options);
+  indexes.save();
   if (frozen.plan.fingerprint != fingerprint) {  // inputs were mended since
     complete_plan(manifest, planned.datasets, frozen.plan);
   }

@@ -35,6 +35,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// A sensor that the events of a recording fit on.
+struct SensorGuess {
+  ImageSize size;
+  int x = 0, y = 0;  ///< the largest of an event
+};
+
 /// What is known of a source when its part of the manifest is written.
 struct SourceDraft {
   explicit SourceDraft(const FoundSource& source)
@@ -50,9 +56,10 @@ struct SourceDraft {
   std::string preset = {};  ///< of its dataset; empty of events
   std::vector<std::string> findings = {};
   bool is_stills = false;
-  bool has_sizes = false;     ///< the images that were looked at have several sizes
-  bool has_frames = false;    ///< recording
-  bool needs_sensor = false;  ///< recording whose files do not tell the sensor's size
+  bool has_sizes = false;   ///< the images that were looked at have several sizes
+  bool has_frames = false;  ///< recording
+  /// Recording whose files do not tell the sensor's size: what the events show.
+  std::optional<SensorGuess> guess = {};
   bool has_samples = false;
   std::optional<ValueRange> range = {};  ///< of images of 16 bits that use little of them
 };
@@ -302,19 +309,46 @@ void note_unknown_times(const Dataset& dataset, SourceDraft& draft) {
   draft.findings.emplace_back("no times, since images have none (set \"frames_per_second\")");
 }
 
+/// The smallest sensor of a camera on which the events lie, as far as some windows tell.
+SensorGuess guess_sensor(const Dataset& recordings) {
+  constexpr std::array kSensors{ImageSize{128, 128},  ImageSize{180, 240}, ImageSize{240, 304},
+                                ImageSize{240, 320},  ImageSize{260, 346}, ImageSize{320, 320},
+                                ImageSize{320, 480},  ImageSize{480, 640}, ImageSize{640, 768},
+                                ImageSize{720, 1280}, ImageSize{800, 1280}};
+  constexpr std::size_t kMostWindows = 64;
+  const auto& windows = recordings.labelled_frames();
+  SensorGuess guess;
+  for (const std::size_t i : spread(kMostWindows, windows.size())) {
+    if (!windows[i].fault.empty()) continue;
+    const Outcome<EventWindow> window = recordings.events(windows[i].label_key);
+    if (is_fault(window)) continue;
+    for (const Event& event : window->events) {
+      guess.x = std::max(guess.x, event.x);
+      guess.y = std::max(guess.y, event.y);
+    }
+  }
+  const auto known = std::ranges::find_if(
+      kSensors, [&](ImageSize size) { return guess.x < size.width && guess.y < size.height; });
+  guess.size = known == kSensors.end() ? ImageSize{guess.y + 1, guess.x + 1} : *known;
+  return guess;
+}
+
 /// Opens the source; one that only lacks the size of its sensor with the largest one, so that it
 /// can be looked at.
 std::unique_ptr<Dataset> open_source(SourceSpec spec, const fs::path& folder,
                                      SourceDraft& draft) try {
   return open_dataset(spec, folder);
 } catch (const InputError&) {
-  if (!has_events(spec.dataset)) throw;
+  if (!has_events(spec.dataset) || spec.recording.sensor) throw;
   constexpr int kLargest = 8192;
   spec.recording.sensor = ImageSize{kLargest, kLargest};
   try {
     auto dataset = open_dataset(spec, folder);
-    draft.needs_sensor = true;
-    draft.findings.emplace_back("no size of the sensor in the files: set \"sensor\"");
+    draft.guess = guess_sensor(*dataset);
+    draft.findings.push_back(
+        fmt::format("no size of the sensor in the files: set \"sensor\" (the events reach x = {}, "
+                    "y = {}, as those of a camera of {})",
+                    draft.guess->x, draft.guess->y, to_string(draft.guess->size)));
     return dataset;
   } catch (const InputError&) {  // it lacks something else
   }
@@ -454,6 +488,10 @@ class Draft {
                           to_string(found.labels->format), written(found.labels->path));
       if (found.labels->outlines) keys += key("outlines", *found.labels->outlines);
     }
+    if (found.sensor) {
+      keys += fmt::format("      \"sensor\": {{ \"width\": {}, \"height\": {} }},\n",
+                          found.sensor->width, found.sensor->height);
+    }
     if (found.columns != EventFields()) {
       keys += fmt::format("      \"columns\": {{ \"t\": {} }},\n", quoted(found.columns.t));
     }
@@ -501,8 +539,10 @@ class Draft {
 
   static std::string window_text(const SourceDraft& source) {
     std::string text;
-    if (source.needs_sensor) {
-      text += "      // \"sensor\": { \"width\": 346, \"height\": 260 },\n";
+    if (source.guess) {
+      const ImageSize size = source.guess->size;
+      text += fmt::format("      // \"sensor\": {{ \"width\": {}, \"height\": {} }},\n", size.width,
+                          size.height);
     }
     text +=
         source.has_frames
@@ -623,7 +663,7 @@ ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const Draf
     const Survey counted = survey(*dataset, spec);
     if (has_events(found.dataset)) {
       source.has_frames = all_have_frames(*dataset);
-      source.has_samples = counted.labelled_frames > 0 && !source.needs_sensor;
+      source.has_samples = counted.labelled_frames > 0 && !source.guess;
     } else {
       source.gaps = gaps_to_take(counted, source.gaps);
       source.range = narrow_value_range(dataset->labelled_frames(), place.folder);

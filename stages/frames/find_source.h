@@ -26,9 +26,10 @@ struct FoundSource {
   std::filesystem::path root;
   std::string_view split = {};  ///< frames: "val" or "test" where its folder says so; empty: train
   std::optional<std::filesystem::path> raw_root, devkit, annotations, sequences;
-  std::optional<FoundLabels> labels;  ///< frames
-  std::string_view more_keys = {};    ///< lines of a manifest's source
-  EventFields columns;                ///< recording: a table's, by what its columns are called
+  std::optional<FoundLabels> labels;     ///< frames
+  std::string_view more_keys = {};       ///< lines of a manifest's source
+  EventFields columns;                   ///< recording: a table's, by what its columns are called
+  std::optional<ImageSize> sensor = {};  ///< recording: of its sensor, where somebody tells it
   /// What is not there and what that costs, or is left out; a line each.
   std::vector<std::string> remarks;
   /// Of frames without labels: files that look like their labels and are not read, why, and what to

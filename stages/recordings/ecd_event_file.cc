@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "manifests/values/faults.h"
+#include "stages/recordings/event_index.h"
 
 namespace eventgan {
 namespace {
@@ -108,28 +109,35 @@ EcdEventFile::EcdEventFile(const std::filesystem::path& path) : file_(path) {
 
 const EventOrder& EcdEventFile::order() const {
   std::call_once(order_once_, [&] {
-    std::int64_t block = begin_;
-    for (std::int64_t begin = begin_; begin < file_.end_byte();) {
-      const std::int64_t end = std::min(begin + kBytesPerRead, file_.end_byte());
-      try {
-        std::string bytes = file_.read_between(begin, end);
-        if (end < file_.end_byte()) bytes.resize(bytes.rfind('\n') + 1);  // none: nothing
-        if (bytes.empty()) refuse(EventFault(long_line_text()), begin);
-        for_each_line(bytes, [&](std::string_view line, std::size_t offset) {
-          const std::int64_t byte = begin + static_cast<std::int64_t>(offset);
-          if (byte - block > kBytesPerBlock) order_.end_block(block = byte);
-          if (const auto time_s = time_of(line)) order_.add(*time_s, byte);
-          return true;
-        });
-        begin += static_cast<std::int64_t>(bytes.size());
-      } catch (const InputError&) {
-        order_.add_unreadable(std::current_exception());
-        begin = end;
-      }
-      order_.end_block(begin);
-    }
+    order_ = known_order(event_index_key(file_.name(), "t x y p"), file_.end_byte(),
+                         [&] { return look_at_times(); });
   });
   return order_;
+}
+
+EventOrder EcdEventFile::look_at_times() const {
+  EventOrder order;
+  std::int64_t block = begin_;
+  for (std::int64_t begin = begin_; begin < file_.end_byte();) {
+    const std::int64_t end = std::min(begin + kBytesPerRead, file_.end_byte());
+    try {
+      std::string bytes = file_.read_between(begin, end);
+      if (end < file_.end_byte()) bytes.resize(bytes.rfind('\n') + 1);  // none: nothing
+      if (bytes.empty()) refuse(EventFault(long_line_text()), begin);
+      for_each_line(bytes, [&](std::string_view line, std::size_t offset) {
+        const std::int64_t byte = begin + static_cast<std::int64_t>(offset);
+        if (byte - block > kBytesPerBlock) order.end_block(block = byte);
+        if (const auto time_s = time_of(line)) order.add(*time_s, byte);
+        return true;
+      });
+      begin += static_cast<std::int64_t>(bytes.size());
+    } catch (const InputError&) {
+      order.add_unreadable(std::current_exception());
+      begin = end;
+    }
+    order.end_block(begin);
+  }
+  return order;
 }
 
 std::int64_t EcdEventFile::first_byte_after(double time_s) const {
@@ -147,13 +155,9 @@ std::int64_t EcdEventFile::first_byte_after(double time_s) const {
 }
 
 void EcdEventFile::require_order(double after_s, double until_s) const {
-  const EventOrder::Fall* const fall = order().fall_in(after_s, until_s);
-  if (fall == nullptr) return;
-  try {
-    refuse_fall(*fall);
-  } catch (const EventFault& fault) {
-    refuse(fault, fall->place);
-  }
+  eventgan::require_order(
+      order(), after_s, until_s,
+      [&](const EventFault& fault, std::int64_t line_begin) { refuse(fault, line_begin); });
 }
 
 namespace {

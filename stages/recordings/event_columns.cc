@@ -15,8 +15,10 @@
 #include "stages/recordings/detail/frame_intervals.h"
 #include "stages/recordings/detail/hdf5_table.h"
 #include "stages/recordings/detail/image_frames.h"
+#include "stages/recordings/detail/open_files.h"
 #include "stages/recordings/detail/recording_reader.h"
 #include "stages/recordings/detail/stored_recording.h"
+#include "stages/recordings/event_index.h"
 
 namespace eventgan {
 namespace {
@@ -27,9 +29,12 @@ constexpr double kTicksPerSecond = 1e6;
 constexpr std::int64_t kTicksPerMs = 1000;
 constexpr std::int64_t kLatest_us = std::int64_t{1} << 53;  // a double has each of them exactly
 
-Hdf5Table open_whole_numbers(hid_t file, const std::string& path, const std::string& name) {
+Hdf5Table open_numbers(hid_t file, const std::string& path, const std::string& name,
+                       bool is_float = false) {
   Hdf5Table table(file, path, name);
-  if (table.is_float() || table.dims().size() != 1) table.refuse("whole numbers [N]");
+  if (table.is_float() != is_float || table.dims().size() != 1) {
+    table.refuse(is_float ? "float numbers [N]" : "whole numbers [N]");
+  }
   return table;
 }
 
@@ -43,38 +48,60 @@ std::vector<std::int64_t> read_few(hid_t file, const std::string& path, const st
   return read_elements<std::int64_t>(open_object(file, path), path, element_type<std::int64_t>());
 }
 
-class ColumnStore final : public EventStore {
- public:
-  ColumnStore(Hdf5Handle file, const ColumnLayout& layout, const std::string& name)
-      : name_(name),
-        file_(std::move(file)),
-        x_(open_whole_numbers(file_, layout.column("x"), name)),
-        y_(open_whole_numbers(file_, layout.column("y"), name)),
-        t_(open_whole_numbers(file_, layout.column("t"), name)),
-        p_(open_whole_numbers(file_, layout.column("p"), name)) {
-    for (const Hdf5Table* column : {&x_, &y_, &p_}) {
-      if (column->dims() == t_.dims()) continue;
-      column->refuse("as many numbers as " + layout.events + "/t, " + std::to_string(count()));
-    }
-    if (!layout.t_offset.empty() && has_object(file_, layout.t_offset)) {
-      const std::vector<std::int64_t> offset = read_few(file_, layout.t_offset, name, 1);
-      if (offset.size() != 1 || offset[0] <= -kLatest_us || offset[0] >= kLatest_us) {
-        throw InputError(fmt::format("expected an offset of fewer than 2^53 us, got {}, in {} ({})",
-                                     fmt::join(offset, ", "), name, layout.t_offset));
-      }
-      offset_us_ = offset[0];
-    }
-    if (!layout.ms_index.empty() && has_object(file_, layout.ms_index)) {
-      ms_index_ = open_whole_numbers(file_, layout.ms_index, name);
-      check_index();
+/// The columns in an open file, of which it is known that they are as long as each other.
+struct Columns {
+  Columns(const fs::path& path, const ColumnLayout& layout)
+      : file(open_recording_file(path)),
+        x(open_numbers(file, layout.column("x"), path.string())),
+        y(open_numbers(file, layout.column("y"), path.string())),
+        t(open_numbers(file, layout.column("t"), path.string(), layout.counts_seconds)),
+        p(open_numbers(file, layout.column("p"), path.string())) {
+    for (const Hdf5Table* column : {&x, &y, &p}) {
+      if (column->dims() == t.dims()) continue;
+      column->refuse("as many numbers as " + layout.column("t") + ", " +
+                     std::to_string(t.dims()[0]));
     }
   }
 
-  std::int64_t count() const override { return static_cast<std::int64_t>(t_.dims()[0]); }
+  Hdf5Handle file;  ///< before what is in it, so that it closes last
+  Hdf5Table x, y, t, p;
+};
+
+class ColumnStore final : public EventStore {
+ public:
+  ColumnStore(const fs::path& path, const ColumnLayout& layout)
+      : name_(path.string()),
+        counts_seconds_(layout.counts_seconds),
+        columns_([this, path, layout] {
+          Columns columns(path, layout);
+          const auto events = static_cast<std::int64_t>(columns.t.dims()[0]);
+          if (count_ < 0) count_ = events;
+          if (events == count_) return columns;
+          throw InputError(
+              fmt::format("expected {} events as before, got {}, in {}", count_, events, name_));
+        }) {
+    const auto columns = columns_.get();
+    const hid_t file = columns->file;
+    if (!layout.t_offset.empty() && has_object(file, layout.t_offset)) {
+      const std::vector<std::int64_t> offset = read_few(file, layout.t_offset, name_, 1);
+      if (offset.size() != 1 || offset[0] <= -kLatest_us || offset[0] >= kLatest_us) {
+        throw InputError(fmt::format("expected an offset of fewer than 2^53 us, got {}, in {} ({})",
+                                     fmt::join(offset, ", "), name_, layout.t_offset));
+      }
+      offset_us_ = offset[0];
+    }
+    if (!layout.ms_index.empty() && has_object(file, layout.ms_index)) {
+      check_index(columns->t, open_numbers(file, layout.ms_index, name_));
+    }
+  }
+
+  std::int64_t count() const override { return count_; }
 
   std::vector<StoredEvent> read(std::int64_t first, std::int64_t count) const override {
-    const std::vector<std::int64_t> x = column(x_, first, count), y = column(y_, first, count),
-                                    p = column(p_, first, count);
+    const Hdf5Lock lock;
+    const auto columns = columns_.get();
+    const auto x = numbers(columns->x, first, count), y = numbers(columns->y, first, count),
+               p = numbers(columns->p, first, count);
     const std::vector<double> t = times_s(first, count);
     std::vector<StoredEvent> events(t.size());
     for (std::size_t i = 0; i < t.size(); ++i) {
@@ -85,7 +112,14 @@ class ColumnStore final : public EventStore {
   }
 
   std::vector<double> times_s(std::int64_t first, std::int64_t count) const override {
-    const std::vector<std::int64_t> ticks = column(t_, first, count);
+    if (counts_seconds_) {
+      const Hdf5Lock lock;
+      return numbers<double>(columns_.get()->t, first, count);
+    }
+    const std::vector<std::int64_t> ticks = [&] {
+      const Hdf5Lock lock;
+      return numbers(columns_.get()->t, first, count);
+    }();
     std::vector<double> times(ticks.size());
     for (std::size_t i = 0; i < ticks.size(); ++i) {
       if (ticks[i] <= -kLatest_us || ticks[i] >= kLatest_us) {
@@ -99,9 +133,10 @@ class ColumnStore final : public EventStore {
   }
 
  private:
-  std::vector<std::int64_t> column(const Hdf5Table& table, std::int64_t first,
-                                   std::int64_t count) const {
-    std::vector<std::int64_t> values(static_cast<std::size_t>(count));
+  template <class Number = std::int64_t>
+  static std::vector<Number> numbers(const Hdf5Table& table, std::int64_t first,
+                                     std::int64_t count) {
+    std::vector<Number> values(static_cast<std::size_t>(count));
     if (count == 0) return values;
     read_hdf5(fmt::format("{} (entries {}..{})", table.place(), first, first + count - 1),
               [&] { table.read({static_cast<hsize_t>(first)}, {values.size()}, values.data()); });
@@ -109,28 +144,28 @@ class ColumnStore final : public EventStore {
   }
 
   /// Some entries are looked up: an index of other events would say that the times are others.
-  void check_index() const {
-    const auto entries = static_cast<std::int64_t>(ms_index_->dims()[0]);
+  void check_index(const Hdf5Table& t, const Hdf5Table& index) const {
+    const auto entries = static_cast<std::int64_t>(index.dims()[0]);
     const std::int64_t checks = std::min<std::int64_t>(entries, 16);
     for (std::int64_t check = 0; check < checks; ++check) {
       const std::int64_t ms = check * (entries - 1) / std::max<std::int64_t>(checks - 1, 1);
-      const std::int64_t event = column(*ms_index_, ms, 1)[0];
+      const std::int64_t event = numbers(index, ms, 1)[0];
       const bool is_event = event >= 0 && event <= count();
       const bool is_after =
-          is_event && (event == count() || column(t_, event, 1)[0] >= ms * kTicksPerMs);
+          is_event && (event == count() || numbers(t, event, 1)[0] >= ms * kTicksPerMs);
       const bool is_first =
-          is_event && (event == 0 || column(t_, event - 1, 1)[0] < ms * kTicksPerMs);
+          is_event && (event == 0 || numbers(t, event - 1, 1)[0] < ms * kTicksPerMs);
       if (is_after && is_first) continue;
       throw InputError(fmt::format(
           "expected the first of {} events at or after {} ms, got event {}, in {} (entry {})",
-          count(), ms, event, ms_index_->place(), ms));
+          count(), ms, event, index.place(), ms));
     }
   }
 
   std::string name_;
-  Hdf5Handle file_;  ///< before what is in it, so that it closes last
-  Hdf5Table x_, y_, t_, p_;
-  std::optional<Hdf5Table> ms_index_;
+  bool counts_seconds_;
+  std::int64_t count_ = -1;  ///< -1: not opened yet
+  OpenedAtUse<Columns> columns_;
   std::int64_t offset_us_ = 0;
 };
 
@@ -160,23 +195,6 @@ std::optional<ImageSize> dsec_size(hid_t file, const ColumnLayout& layout) {
   const bool is_dsec = !layout.t_offset.empty() && has_object(file, layout.t_offset) &&
                        has_object(file, layout.ms_index);
   return is_dsec ? std::optional(kDsecSize) : std::nullopt;
-}
-
-/// The events and the size.
-StoredParts open_columns(const fs::path& path, const ColumnLayout& layout,
-                         const RecordingOptions& options) {
-  const Hdf5Lock lock;
-  StoredParts parts;
-  parts.name = path.string();
-  Hdf5Handle file = open_recording_file(path);
-  std::optional<ImageSize> told =
-      read_hdf5(parts.name, [&] { return read_size(file, layout, parts.name); });
-  if (!told && !options.sensor) told = dsec_size(file, layout);
-  parts.size = sensor_size(told, options.sensor, parts);
-  parts.events = read_hdf5(parts.name, [&] {
-    return std::make_unique<ColumnStore>(std::move(file), layout, parts.name);
-  });
-  return parts;
 }
 
 /// timestamps.txt: a line with µs for each frame.
@@ -295,19 +313,39 @@ std::vector<std::int32_t> read_rectify_map(const fs::path& path, ImageSize size)
 
 }  // namespace
 
+StoredParts open_event_columns(const fs::path& path, const ColumnLayout& layout,
+                               const RecordingOptions& options) {
+  const Hdf5Lock lock;
+  StoredParts parts;
+  parts.name = path.string();
+  parts.index_key = event_index_key(path, layout.column("t"));
+  std::optional<ImageSize> told = read_hdf5(parts.name, [&] {
+    const Hdf5Handle file = open_recording_file(path);
+    const auto size = read_size(file, layout, parts.name);
+    return size || options.sensor ? size : dsec_size(file, layout);
+  });
+  parts.size = sensor_size(told, options.sensor, parts);
+  parts.events = read_hdf5(parts.name, [&] { return std::make_unique<ColumnStore>(path, layout); });
+  return parts;
+}
+
 ColumnLayout dsec_layout() {
-  return {"events", "ms_to_idx", "t_offset", {"events/height", "events/width"}};
+  return {.events = "events",
+          .ms_index = "ms_to_idx",
+          .t_offset = "t_offset",
+          .size = {"events/height", "events/width"}};
 }
 
 ColumnLayout m3ed_layout(const std::string& camera) {
   const std::string group = "prophesee/" + camera;
-  return {group, group + "/ms_map_idx", "", {group + "/calib/resolution"}};
+  return {
+      .events = group, .ms_index = group + "/ms_map_idx", .size = {group + "/calib/resolution"}};
 }
 
 std::unique_ptr<Recording> open_dsec_recording(const fs::path& path,
                                                const RecordingOptions& options) {
   const fs::path file = dsec_event_file(path, options);
-  StoredParts parts = open_columns(file, dsec_layout(), options);
+  StoredParts parts = open_event_columns(file, dsec_layout(), options);
   const fs::path sequence = sequence_of(fs::absolute(file).lexically_normal());
   std::vector<fs::path> frames = find_frames(sequence, parts.size, options, parts.notes);
   if (!frames.empty()) {
@@ -341,7 +379,7 @@ std::unique_ptr<Recording> open_dsec_recording(const fs::path& path,
 
 std::unique_ptr<Recording> open_m3ed_recording(const fs::path& path,
                                                const RecordingOptions& options) {
-  StoredParts parts = open_columns(path, m3ed_layout(options.camera), options);
+  StoredParts parts = open_event_columns(path, m3ed_layout(options.camera), options);
   const Hdf5Lock lock;
   if (has_object(open_recording_file(path), "ovc")) {
     parts.notes.push_back("opened without frames, which are another camera's (ovc), in " +

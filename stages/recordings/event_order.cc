@@ -5,7 +5,8 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/recordings/detail/event_check.h"
+#include "stages/recordings/detail/packed_bytes.h"
+#include "stages/recordings/event_index.h"
 
 namespace eventgan {
 
@@ -47,7 +48,7 @@ void EventOrder::add_fall(Fall fall) {
 }
 
 void EventOrder::end_block(std::int64_t end) {
-  if (end == (blocks_.empty() ? 0 : blocks_.back().end)) return;
+  if (end == this->end()) return;
   blocks_.push_back({end, latest_s_});
 }
 
@@ -68,10 +69,73 @@ std::optional<std::array<double, 2>> EventOrder::span() const {
   return std::array{earliest_s_, latest_s_};
 }
 
-void refuse_fall(const EventOrder::Fall& fall) {
-  if (fall.unread) std::rethrow_exception(fall.unread);
-  check_event_time(fall.before_s, fall.after_s);
-  throw EventFault("expected times that never decrease, got others");
+namespace {
+
+/// EventOrder::Fall as bytes.
+struct PackedFall {
+  double from_s = 0, until_s = 0;
+  std::int64_t place = 0;
+  double before_s = 0, after_s = 0;
+};
+
+}  // namespace
+
+std::optional<std::string> EventOrder::to_bytes() const {
+  std::vector<PackedFall> falls;
+  for (const Fall& fall : falls_) {
+    if (fall.unread) return std::nullopt;
+    falls.push_back({fall.from_s, fall.until_s, fall.place, fall.before_s, fall.after_s});
+  }
+  std::string bytes;
+  pack(bytes, any_);
+  pack(bytes, earliest_s_);
+  pack(bytes, latest_s_);
+  pack(bytes, falls);
+  pack(bytes, blocks_);
+  return bytes;
+}
+
+std::optional<EventOrder> EventOrder::take_bytes(std::string_view& bytes) {
+  EventOrder order;
+  std::vector<PackedFall> falls;
+  if (!unpack(bytes, order.any_) || !unpack(bytes, order.earliest_s_) ||
+      !unpack(bytes, order.latest_s_) || !unpack(bytes, falls) || !unpack(bytes, order.blocks_)) {
+    return std::nullopt;
+  }
+  std::int64_t before = 0;
+  for (const Block& block : order.blocks_) {
+    if (block.end <= std::exchange(before, block.end)) return std::nullopt;
+  }
+  for (const PackedFall& fall : falls) {
+    order.falls_.push_back({fall.from_s, fall.until_s, fall.place, fall.before_s, fall.after_s});
+  }
+  return order;
+}
+
+EventOrder known_order(const std::string& index_key, std::int64_t end,
+                       const std::function<EventOrder()>& look) {
+  EventIndexes* const indexes = index_key.empty() ? nullptr : EventIndexes::current();
+  if (indexes == nullptr) return look();
+  if (const auto bytes = indexes->find(index_key)) {
+    std::string_view rest = *bytes;
+    auto order = EventOrder::take_bytes(rest);
+    if (order && rest.empty() && order->end() == end) return *std::move(order);
+  }
+  EventOrder order = look();
+  if (auto bytes = order.to_bytes()) indexes->keep(index_key, *std::move(bytes));
+  return order;
+}
+
+void require_order(const EventOrder& order, double after_s, double until_s,
+                   const std::function<void(const EventFault&, std::int64_t)>& refuse) {
+  const EventOrder::Fall* const fall = order.fall_in(after_s, until_s);
+  if (fall == nullptr) return;
+  if (fall->unread) std::rethrow_exception(fall->unread);
+  try {
+    check_event_time(fall->before_s, fall->after_s);
+  } catch (const EventFault& fault) {
+    refuse(fault, fall->place);
+  }
 }
 
 }  // namespace eventgan

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "stages/recordings/detail/packed_bytes.h"
 
 namespace eventgan {
 namespace {
@@ -52,57 +53,9 @@ StoredEvent CompactEvents::operator[](std::int64_t place) const {
           static_cast<double>(polarity_[i])};
 }
 
-RecentEvents& RecentEvents::of_process() {
-  static RecentEvents recent(std::int64_t{1} << 24);
+RecentlyUsed& recent_events() {
+  static RecentlyUsed recent(std::int64_t{1} << 24);
   return recent;
-}
-
-RecentEvents::Events RecentEvents::get(const void* reader, std::size_t part,
-                                       const std::function<CompactEvents()>& read) {
-  const Key key(reader, part);
-  std::shared_ptr<Entry> entry;
-  {
-    const std::lock_guard lock(mutex_);
-    std::shared_ptr<Entry>& kept = entries_[key];
-    if (!kept) {
-      kept = std::make_shared<Entry>();
-      kept->age = ages_.insert(ages_.begin(), key);
-    }
-    ages_.splice(ages_.begin(), ages_, kept->age);
-    entry = kept;
-  }
-  const std::lock_guard reading(entry->reading);
-  if (entry->events) return entry->events;
-  entry->events = std::make_shared<const CompactEvents>(read());
-
-  const std::lock_guard lock(mutex_);
-  const auto kept = entries_.find(key);
-  if (kept == entries_.end() || kept->second != entry) return entry->events;  // dropped meanwhile
-  entry->counted = entry->events->size();
-  kept_ += entry->counted;
-  ages_.splice(ages_.begin(), ages_, entry->age);
-  // Not those that are being read, which have nothing to free: they would be read again.
-  for (auto age = std::prev(ages_.end()); kept_ > most_events_ && age != ages_.begin();) {
-    const Key oldest = *age--;
-    if (entries_.at(oldest)->counted > 0) drop(oldest);
-  }
-  return entry->events;
-}
-
-void RecentEvents::forget(const void* reader) {
-  const std::lock_guard lock(mutex_);
-  for (;;) {
-    const auto next = entries_.lower_bound(Key(reader, 0));
-    if (next == entries_.end() || next->first.first != reader) return;
-    drop(Key(next->first));
-  }
-}
-
-void RecentEvents::drop(const Key& key) {
-  const auto entry = entries_.find(key);
-  kept_ -= entry->second->counted;
-  ages_.erase(entry->second->age);
-  entries_.erase(entry);
 }
 
 void EventParts::add_part(std::int64_t count, double begin_s, double end_s) {
@@ -118,11 +71,41 @@ void EventParts::add_part(CompactEvents events) {
   firsts_.push_back(count_);
   order_.add_all(events.times_s(), count_);
   count_ += events.size();
-  recent_.get(this, firsts_.size() - 1, [&] { return std::move(events); });
+  kept_part(firsts_.size() - 1, [&] { return std::move(events); });
 }
 
-RecentEvents::Events EventParts::part(std::size_t number) const {
-  return recent_.get(this, number, [&] {
+void EventParts::pack_parts(std::string& bytes) const {
+  pack(bytes, firsts_);
+  pack(bytes, count_);
+  bytes += order_.to_bytes().value();  // of parts nothing is unreadable
+}
+
+bool EventParts::unpack_parts(std::string_view bytes, std::size_t parts) {
+  std::vector<std::int64_t> firsts;
+  std::int64_t count = 0;
+  if (!unpack(bytes, firsts) || firsts.size() != parts || !unpack(bytes, count)) return false;
+  auto order = EventOrder::take_bytes(bytes);
+  const auto before = [](std::int64_t a, std::int64_t b) { return a >= b; };
+  const bool ascend = std::ranges::adjacent_find(firsts, before) == firsts.end();
+  const bool within = firsts.empty() ? count == 0 : firsts[0] == 0 && firsts.back() < count;
+  if (!order || order->end() != count || !ascend || !within) return false;
+  firsts_ = std::move(firsts);
+  count_ = count;
+  order_ = *std::move(order);
+  return true;
+}
+
+EventParts::Events EventParts::kept_part(std::size_t number,
+                                         const std::function<CompactEvents()>& read) const {
+  return std::static_pointer_cast<const CompactEvents>(recent_.get(this, number, [&] {
+    auto events = std::make_shared<const CompactEvents>(read());
+    const std::int64_t weight = events->size();
+    return RecentlyUsed::Made{std::move(events), weight};
+  }));
+}
+
+EventParts::Events EventParts::part(std::size_t number) const {
+  return kept_part(number, [&] {
     const std::int64_t end = number + 1 < firsts_.size() ? firsts_[number + 1] : count_;
     CompactEvents events = read_part(number);
     if (events.size() == end - firsts_[number]) return events;
@@ -135,7 +118,7 @@ template <class Take>
 void EventParts::for_each_part(std::int64_t first, std::int64_t count, Take take) const {
   const auto behind = std::ranges::upper_bound(firsts_, first);
   for (auto at = static_cast<std::size_t>(behind - firsts_.begin()); count > 0; ++at) {
-    const RecentEvents::Events events = part(at - 1);
+    const Events events = part(at - 1);
     const std::int64_t begin = first - firsts_[at - 1];
     const std::int64_t end = std::min(begin + count, events->size());
     take(*events, begin, end);

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -12,28 +13,30 @@
 #include "stages/base/images/image_file.h"
 #include "stages/recordings/detail/frame_intervals.h"
 #include "stages/recordings/detail/hdf5_table.h"
+#include "stages/recordings/detail/open_files.h"
 #include "stages/recordings/detail/recording_reader.h"
 #include "stages/recordings/detail/stored_recording.h"
+#include "stages/recordings/event_index.h"
 
 namespace eventgan {
 namespace {
-
-constexpr hsize_t kTimeColumn = 2;
 
 /// The datasets of a recording, of which it is known that they fit together.
 struct Hdf5RecordingTables {
   Hdf5Handle file;  ///< first, so that it closes last
   Hdf5Table events;
-  Hdf5Table frames;
+  std::optional<Hdf5Table> frames;
   std::optional<Hdf5Table> flow;
-  ImageSize size;
-  std::vector<double> frame_times_s;
 };
+
+bool counts_seconds(const Hdf5Layout& layout) { return layout.ticks_per_s == 1; }
 
 Hdf5Table open_events(hid_t file, const Hdf5Layout& layout, const std::string& name) {
   Hdf5Table events(file, layout.events, name);
-  if (!events.is_float() || events.dims().size() != 2 || events.dims()[1] != 4) {
-    events.refuse("float32 or float64 [events, 4] of x, y, t, p");
+  if (events.is_float() != counts_seconds(layout) || events.dims().size() != 2 ||
+      events.dims()[1] != layout.columns.size()) {
+    events.refuse(counts_seconds(layout) ? "float32 or float64 [events, 4] of x, y, t, p"
+                                         : "whole numbers [events, 4] of t, x, y, p");
   }
   return events;
 }
@@ -54,28 +57,18 @@ Hdf5Table open_frames(hid_t file, const Hdf5Layout& layout, const std::string& n
   return frames;
 }
 
-/// A whole column of `count` numbers.
-template <class Number>
-std::vector<Number> read_column(const Hdf5Table& column, hsize_t count, const char* what) {
-  const bool right_type = column.is_float() == std::is_floating_point_v<Number>;
-  if (!right_type || column.dims() != Dims{count}) {
-    column.refuse(std::string(what) + " [" + std::to_string(count) + "]");
-  }
-  std::vector<Number> values(count);
-  try {
-    if (count > 0) column.read({0}, {count}, values.data());
-  } catch (const Hdf5Error&) {
-    std::throw_with_nested(
-        InputError("expected readable values, got damage, in " + column.place()));
-  }
-  return values;
-}
-
 std::vector<double> read_frame_times(hid_t file, const Hdf5Layout& layout, const std::string& name,
                                      hsize_t frame_count) {
   const Hdf5Table table(file, layout.frame_times, name);
-  std::vector<double> times_s =
-      read_column<double>(table, frame_count, "a time for each frame, float");
+  if (table.is_float() != counts_seconds(layout) || table.dims() != Dims{frame_count}) {
+    table.refuse(fmt::format("a time for each frame, {} [{}]",
+                             counts_seconds(layout) ? "float" : "whole numbers", frame_count));
+  }
+  std::vector<double> times_s(frame_count);
+  read_hdf5(table.place(), [&] {
+    if (frame_count > 0) table.read({0}, {frame_count}, times_s.data());
+  });
+  for (double& time_s : times_s) time_s /= layout.ticks_per_s;
   check_frame_times(times_s, table.place());
   return times_s;
 }
@@ -92,90 +85,132 @@ std::optional<Hdf5Table> open_flow(hid_t file, const Hdf5Layout& layout, const s
   return flow;
 }
 
-/// Throws InputError, the cause nested.
 Hdf5RecordingTables open_tables(const std::filesystem::path& path, const Hdf5Layout& layout) {
-  const Hdf5Lock lock;
   const std::string name = path.string();
   Hdf5Handle file = open_recording_file(path);
   Hdf5Table events = open_events(file, layout, name);
-  Hdf5Table frames = open_frames(file, layout, name);
-  const Dims dims = frames.dims();
-  std::vector<double> times_s = read_frame_times(file, layout, name, dims[0]);
-  std::optional<Hdf5Table> flow = open_flow(file, layout, name, dims);
-  return {std::move(file),
-          std::move(events),
-          std::move(frames),
-          std::move(flow),
-          {static_cast<int>(dims[1]), static_cast<int>(dims[2])},
-          std::move(times_s)};
+  Hdf5RecordingTables tables{std::move(file), std::move(events), {}, {}};
+  if (!layout.may_lack_frames || has_object(tables.file, layout.frames)) {
+    tables.frames = open_frames(tables.file, layout, name);
+    const bool has_intervals = tables.frames->dims()[0] > 0;
+    if (has_intervals) tables.flow = open_flow(tables.file, layout, name, tables.frames->dims());
+  }
+  return tables;
 }
+
+/// A file's tables, whose shapes stay as they were.
+class Hdf5RecordingFile {
+ public:
+  /// Throws InputError, the cause nested.
+  Hdf5RecordingFile(const std::filesystem::path& path, const Hdf5Layout& layout)
+      : layout_(layout), name_(path.string()), tables_([this, path] {
+          Hdf5RecordingTables tables = open_tables(path, layout_);
+          const Dims frames = tables.frames ? tables.frames->dims() : Dims();
+          if (!events_.empty() && (tables.events.dims() != events_ || frames != frames_)) {
+            throw InputError("expected as many events and frames as before, got others, in " +
+                             name_);
+          }
+          return tables;
+        }) {
+    const Hdf5Lock lock;
+    const auto tables = tables_.get();
+    events_ = tables->events.dims();
+    if (!tables->frames) return;
+    frames_ = tables->frames->dims();
+    frame_times_s_ = read_frame_times(tables->file, layout, name_, frames_[0]);
+  }
+
+  const std::string& name() const { return name_; }
+  const Hdf5Layout& layout() const { return layout_; }
+  std::int64_t event_count() const { return static_cast<std::int64_t>(events_[0]); }
+  /// None if there are no frames.
+  std::optional<ImageSize> size() const {
+    if (frames_.empty()) return std::nullopt;
+    return ImageSize{static_cast<int>(frames_[1]), static_cast<int>(frames_[2])};
+  }
+  const std::vector<double>& frame_times_s() const { return frame_times_s_; }
+
+  /// Under HDF5's lock.
+  std::shared_ptr<const Hdf5RecordingTables> tables() const { return tables_.get(); }
+
+ private:
+  Hdf5Layout layout_;
+  std::string name_;
+  Dims events_;  ///< empty until it was opened
+  Dims frames_;  ///< empty: there are none
+  std::vector<double> frame_times_s_;
+  OpenedAtUse<Hdf5RecordingTables> tables_;
+};
 
 class Hdf5Events final : public EventStore {
  public:
-  Hdf5Events(std::shared_ptr<const Hdf5RecordingTables> tables, std::string name)
-      : tables_(std::move(tables)), name_(std::move(name)) {}
+  explicit Hdf5Events(std::shared_ptr<const Hdf5RecordingFile> file) : file_(std::move(file)) {}
 
-  std::int64_t count() const override {
-    return static_cast<std::int64_t>(tables_->events.dims()[0]);
-  }
+  std::int64_t count() const override { return file_->event_count(); }
 
   std::vector<StoredEvent> read(std::int64_t first, std::int64_t count) const override {
-    static_assert(sizeof(StoredEvent) == 4 * sizeof(double), "a row of the dataset");
-    std::vector<StoredEvent> rows(static_cast<std::size_t>(count));
-    read_block(first, rows.size(), 0, 4, rows.empty() ? nullptr : &rows.data()->x);
-    return rows;
+    using Row = std::array<double, 4>;
+    std::vector<Row> rows(static_cast<std::size_t>(count));
+    read_block(first, rows.size(), 0, 4, rows.empty() ? nullptr : rows.data()->data());
+    const auto [x, y, t, p] = file_->layout().columns;
+    const double ticks_per_s = file_->layout().ticks_per_s;
+    std::vector<StoredEvent> events(rows.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      events[i] = {rows[i][x], rows[i][y], rows[i][t] / ticks_per_s, rows[i][p]};
+    }
+    return events;
   }
 
   std::vector<double> times_s(std::int64_t first, std::int64_t count) const override {
     std::vector<double> times(static_cast<std::size_t>(count));
-    read_block(first, times.size(), kTimeColumn, 1, times.data());
+    read_block(first, times.size(), file_->layout().columns[2], 1, times.data());
+    for (double& time_s : times) time_s /= file_->layout().ticks_per_s;
     return times;
   }
 
  private:
   void read_block(std::int64_t first, hsize_t rows, hsize_t column, hsize_t columns,
                   double* values) const {
-    read_hdf5(
-        fmt::format("{} (events {}..{})", name_, first,
-                    first + static_cast<std::int64_t>(rows) - 1),
-        [&] {
-          tables_->events.read({static_cast<hsize_t>(first), column}, {rows, columns}, values);
-        });
+    read_hdf5(fmt::format("{} (events {}..{})", file_->name(), first,
+                          first + static_cast<std::int64_t>(rows) - 1),
+              [&] {
+                file_->tables()->events.read({static_cast<hsize_t>(first), column}, {rows, columns},
+                                             values);
+              });
   }
 
-  std::shared_ptr<const Hdf5RecordingTables> tables_;
-  std::string name_;
+  std::shared_ptr<const Hdf5RecordingFile> file_;
 };
 
 class Frames final : public FrameStore {
  public:
-  Frames(std::shared_ptr<const Hdf5RecordingTables> tables, std::string name)
-      : tables_(std::move(tables)), name_(std::move(name)) {}
+  explicit Frames(std::shared_ptr<const Hdf5RecordingFile> file)
+      : file_(std::move(file)), size_(*file_->size()) {}
 
-  const std::vector<double>& times_s() const override { return tables_->frame_times_s; }
+  const std::vector<double>& times_s() const override { return file_->frame_times_s(); }
 
   GreyImage read(std::int64_t index) const override {
-    const ImageSize size = tables_->size;
-    GreyImage image{size, std::vector<std::uint8_t>(size.pixel_count())};
-    const Dims& dims = tables_->frames.dims();
-    read_hdf5(fmt::format("{} (frame {})", name_, index), [&] {
-      tables_->frames.read({static_cast<hsize_t>(index), 0, 0}, {1, dims[1], dims[2]},
-                           image.pixels.data());
+    GreyImage image{size_, std::vector<std::uint8_t>(size_.pixel_count())};
+    read_hdf5(fmt::format("{} (frame {})", file_->name(), index), [&] {
+      file_->tables()->frames->read({static_cast<hsize_t>(index), 0, 0}, {1, height(), width()},
+                                    image.pixels.data());
     });
     return image;
   }
 
   std::optional<FlowField> flow(std::int64_t index) const override {
-    if (!tables_->flow) return std::nullopt;
-    const std::size_t count = tables_->size.pixel_count();
-    FlowField field{tables_->size, std::vector<float>(count), std::vector<float>(count)};
-    const Dims& dims = tables_->flow->dims();
+    const std::size_t count = size_.pixel_count();
+    FlowField field{size_, std::vector<float>(count), std::vector<float>(count)};
     const auto row = static_cast<hsize_t>(index);
-    const std::string place = fmt::format("{} (flow of frame {})", name_, index);
-    read_hdf5(place, [&] {
-      tables_->flow->read({row, 0, 0, 0}, {1, 1, dims[2], dims[3]}, field.x_px.data());
-      tables_->flow->read({row, 1, 0, 0}, {1, 1, dims[2], dims[3]}, field.y_px.data());
+    const std::string place = fmt::format("{} (flow of frame {})", file_->name(), index);
+    const bool has_flow = read_hdf5(place, [&] {
+      const auto tables = file_->tables();
+      if (!tables->flow) return false;
+      tables->flow->read({row, 0, 0, 0}, {1, 1, height(), width()}, field.x_px.data());
+      tables->flow->read({row, 1, 0, 0}, {1, 1, height(), width()}, field.y_px.data());
+      return true;
     });
+    if (!has_flow) return std::nullopt;
     const auto finite = [](float value) { return std::isfinite(value); };
     if (!std::ranges::all_of(field.x_px, finite) || !std::ranges::all_of(field.y_px, finite)) {
       throw InputError("expected finite values, got others, in " + place);
@@ -184,8 +219,11 @@ class Frames final : public FrameStore {
   }
 
  private:
-  std::shared_ptr<const Hdf5RecordingTables> tables_;
-  std::string name_;
+  hsize_t height() const { return static_cast<hsize_t>(size_.height); }
+  hsize_t width() const { return static_cast<hsize_t>(size_.width); }
+
+  std::shared_ptr<const Hdf5RecordingFile> file_;
+  ImageSize size_;
 };
 
 }  // namespace
@@ -201,13 +239,28 @@ Hdf5Layout eventgan_layout() {
           "davis/image_raw/event_index", ""};
 }
 
+Hdf5Layout v2e_layout() {
+  return {.events = "events",
+          .frames = "frame",
+          .frame_times = "frame_ts",
+          .event_index = "frame_idx",
+          .flow = "",
+          .columns = {1, 2, 0, 3},
+          .ticks_per_s = 1e6,
+          .may_lack_frames = true};
+}
+
 std::unique_ptr<Recording> open_hdf5_recording(const std::filesystem::path& path,
-                                               const Hdf5Layout& layout) {
-  const auto tables = std::make_shared<const Hdf5RecordingTables>(open_tables(path, layout));
-  return make_stored_recording({.name = path.string(),
-                                .size = tables->size,
-                                .events = std::make_unique<Hdf5Events>(tables, path.string()),
-                                .frames = std::make_unique<Frames>(tables, path.string())});
+                                               const Hdf5Layout& layout,
+                                               const std::optional<ImageSize>& sensor) {
+  std::string index_key = event_index_key(path, layout.events);
+  const auto file = std::make_shared<const Hdf5RecordingFile>(path, layout);
+  StoredParts parts{
+      .name = path.string(), .size = {}, .events = std::make_unique<Hdf5Events>(file)};
+  parts.size = sensor_size(file->size(), sensor, parts);
+  parts.index_key = std::move(index_key);
+  if (file->size() == parts.size) parts.frames = std::make_unique<Frames>(file);
+  return make_stored_recording(std::move(parts));
 }
 
 constinit const RecordingReader kMvsecReader{
@@ -227,5 +280,14 @@ constinit const RecordingReader kEventganReader{
                const RecordingOptions&) { return input.has_hdf5_object(eventgan_layout().events); },
     .open = [](const std::filesystem::path& path,
                const RecordingOptions&) { return open_hdf5_recording(path, eventgan_layout()); }};
+
+constinit const RecordingReader kV2eReader{
+    .format = RecordingFormat::kV2e,
+    .fits = [](const RecordingInput& input,
+               const RecordingOptions&) { return input.has_hdf5_dataset(v2e_layout().events); },
+    .open =
+        [](const std::filesystem::path& path, const RecordingOptions& options) {
+          return open_hdf5_recording(path, v2e_layout(), options.sensor);
+        }};
 
 }  // namespace eventgan

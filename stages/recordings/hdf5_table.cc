@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <system_error>
+#include <vector>
 
 namespace eventgan {
 namespace {
@@ -66,21 +67,26 @@ std::string describe_type(hid_t type) {
   }
 }
 
-/// Whether deflate is all that compresses the dataset.
-bool is_deflated(hid_t creation) {
+/// What a dataset's values go through, in order.
+std::vector<H5Z_filter_t> filters_of(hid_t creation) {
+  std::vector<H5Z_filter_t> filters;
   const int count = checked(H5Pget_nfilters(creation), "count", "the filters");
   for (int i = 0; i < count; ++i) {
     unsigned flags = 0;
     std::size_t values = 0;
-    const H5Z_filter_t filter = checked(H5Pget_filter2(creation, static_cast<unsigned>(i), &flags,
-                                                       &values, nullptr, 0, nullptr, nullptr),
-                                        "read", "a filter");
-    if (filter != H5Z_FILTER_DEFLATE && filter != H5Z_FILTER_SHUFFLE &&
-        filter != H5Z_FILTER_FLETCHER32) {
-      return false;
-    }
+    filters.push_back(checked(H5Pget_filter2(creation, static_cast<unsigned>(i), &flags, &values,
+                                             nullptr, 0, nullptr, nullptr),
+                              "read", "a filter"));
   }
-  return true;
+  return filters;
+}
+
+/// Whether deflate is all that compresses the dataset.
+bool is_deflated(hid_t creation) {
+  return std::ranges::all_of(filters_of(creation), [](H5Z_filter_t filter) {
+    return filter == H5Z_FILTER_DEFLATE || filter == H5Z_FILTER_SHUFFLE ||
+           filter == H5Z_FILTER_FLETCHER32;
+  });
 }
 
 /// How many values of `width` bytes the dataset's share of the file can give: of each stored byte
@@ -118,13 +124,7 @@ constexpr std::array kPlugins{Plugin{kLzfFilter, "LZF", "hdf5-plugin-lzf liblzf1
 /// HDF5 finds a filter that is installed as a plugin by itself.
 void require_filters(hid_t dataset, const std::string& place) {
   const Hdf5Handle creation(H5Dget_create_plist(dataset), H5Pclose, "read", "the filters");
-  const int count = checked(H5Pget_nfilters(creation), "count", "the filters");
-  for (int i = 0; i < count; ++i) {
-    unsigned flags = 0;
-    std::size_t values = 0;
-    const H5Z_filter_t filter = checked(H5Pget_filter2(creation, static_cast<unsigned>(i), &flags,
-                                                       &values, nullptr, 0, nullptr, nullptr),
-                                        "read", "a filter");
+  for (const H5Z_filter_t filter : filters_of(creation)) {
     // Debian's plugin does not name the library that it needs, so that HDF5 alone cannot load it.
     if (filter == kLzfFilter) dlopen("liblzf.so.1", RTLD_NOW | RTLD_GLOBAL);
     if (checked(H5Zfilter_avail(filter), "look for", "a filter") > 0) continue;

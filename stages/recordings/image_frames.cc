@@ -7,9 +7,6 @@
 #include "stages/base/images/image_file.h"
 
 namespace eventgan {
-namespace {
-
-/// Decoding gives colour; of a grey image all three channels are one, and stay what they are.
 GreyImage grey_of(const ColourFrame& colour, bool& has_colour) {
   GreyImage grey{colour.size, std::vector<std::uint8_t>(colour.size.pixel_count())};
   for (std::size_t i = 0; i < grey.pixels.size(); ++i) {
@@ -20,8 +17,6 @@ GreyImage grey_of(const ColourFrame& colour, bool& has_colour) {
   }
   return grey;
 }
-
-}  // namespace
 
 ImageFrames::ImageFrames(std::vector<std::filesystem::path> files, std::vector<double> times_s)
     : files_(std::move(files)), times_s_(std::move(times_s)), size_(read_any_size(0).size) {}

@@ -11,9 +11,11 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 #include "stages/recordings/detail/event_parts.h"
+#include "stages/recordings/detail/open_files.h"
+#include "stages/recordings/detail/packed_bytes.h"
 #include "stages/recordings/detail/recording_reader.h"
+#include "stages/recordings/event_index.h"
 
 namespace eventgan {
 namespace {
@@ -329,14 +331,18 @@ struct DecodingStart {
 
 class PropheseeEvents final : public EventParts {
  public:
-  PropheseeEvents(InputFile file, PropheseeEncoding encoding, std::int64_t first_byte,
-                  ImageSize size, bool shifts)
-      : EventParts(file.name()),
+  PropheseeEvents(std::unique_ptr<const RecordingFile> file, PropheseeEncoding encoding,
+                  std::int64_t first_byte, ImageSize size, bool shifts)
+      : EventParts(file->name()),
         file_(std::move(file)),
         encoding_(encoding),
         size_(size),
         shifts_(shifts),
-        end_byte_(file_.end_byte() - (file_.end_byte() - first_byte) % word_bytes()) {
+        end_byte_(file_->end_byte() - (file_->end_byte() - first_byte) % word_bytes()) {
+    EventIndexes* const indexes = EventIndexes::current();
+    const std::string key = event_index_key(
+        file_->name(), fmt::format("{} {} {}", to_string(size), first_byte, shifts));
+    if (indexes != nullptr && !key.empty() && restore(indexes->find(key).value_or(""))) return;
     DecodingStart start{first_byte, {}};
     while (start.byte < end_byte_) {
       const DecodingStart begin = start;
@@ -346,6 +352,7 @@ class PropheseeEvents final : public EventParts {
     }
     counts_ = start.state.counts;
     shift_us_ = start.state.shift_us;
+    if (indexes != nullptr && !key.empty()) indexes->keep(key, to_bytes());
   }
 
   /// What a user should know goes into `parts`, which has its name.
@@ -361,7 +368,7 @@ class PropheseeEvents final : public EventParts {
     }
     note(counts_.left_out, "events before the first time and place are left out");
     note(counts_.reserved, "words of reserved types are passed over");
-    note(file_.end_byte() - end_byte_, "bytes behind the last word are passed over");
+    note(file_->end_byte() - end_byte_, "bytes behind the last word are passed over");
     note(counts_.steps_back, "events are before an earlier one, and their windows at fault");
     constexpr double kMuch = 0.01;
     const auto outside = static_cast<double>(counts_.outside);
@@ -376,6 +383,30 @@ class PropheseeEvents final : public EventParts {
 
  private:
   static constexpr std::int64_t kBytesPerPart = 1 << 17;
+
+  /// What is known of the file once it was read.
+  std::string to_bytes() const {
+    std::string bytes;
+    pack(bytes, starts_);
+    pack(bytes, counts_);
+    pack(bytes, shift_us_);
+    pack_parts(bytes);
+    return bytes;
+  }
+
+  /// False if these are no such bytes; then nothing is known.
+  bool restore(std::string_view bytes) {
+    std::vector<DecodingStart> starts;
+    if (!unpack(bytes, starts) || !unpack(bytes, counts_) || !unpack(bytes, shift_us_))
+      return false;
+    const auto is_within = [&](const DecodingStart& start) {
+      return start.byte >= 0 && start.byte < end_byte_;
+    };
+    if (!std::ranges::all_of(starts, is_within) || !unpack_parts(bytes, starts.size()))
+      return false;
+    starts_ = std::move(starts);
+    return true;
+  }
 
   CompactEvents read_part(std::size_t part) const override {
     DecodingStart start = starts_[part];
@@ -413,7 +444,7 @@ class PropheseeEvents final : public EventParts {
   template <class Word, class TakeWord>
   CompactEvents decode_words(DecodingStart& start, TakeWord take_word) const {
     const std::string bytes =
-        file_.read_between(start.byte, std::min(start.byte + kBytesPerPart, end_byte_));
+        file_->read_between(start.byte, std::min(start.byte + kBytesPerPart, end_byte_));
     CompactEvents result;
     WordEvents events;
     for (std::size_t i = 0; i < bytes.size(); i += sizeof(Word)) {
@@ -423,7 +454,7 @@ class PropheseeEvents final : public EventParts {
       try {
         count = take_word(word, start.state, shifts_, events);
       } catch (const EventFault& fault) {
-        refuse_at(fault.what(), file_.name(), start.byte);
+        refuse_at(fault.what(), file_->name(), start.byte);
       }
       start.byte += sizeof(Word);
       for (std::size_t k = 0; k < count; ++k) {
@@ -437,7 +468,7 @@ class PropheseeEvents final : public EventParts {
     return result;
   }
 
-  InputFile file_;
+  std::unique_ptr<const RecordingFile> file_;
   PropheseeEncoding encoding_;
   ImageSize size_;
   bool shifts_;
@@ -466,36 +497,36 @@ std::optional<RecordingFault> prophesee_fault(const RecordingInput& input,
 }  // namespace
 
 StoredParts open_prophesee(const std::filesystem::path& path, const RecordingOptions& options) {
-  InputFile file(path);
+  auto file = std::make_unique<const RecordingFile>(path);
   PropheseeHeader header = read_prophesee_header(
-      file.read_between(0, std::min(kMostHeaderBytes, file.end_byte())), file.name());
+      file->read_between(0, std::min(kMostHeaderBytes, file->end_byte())), file->name());
   if (!header.encoding) {
     throw InputError(
         "expected a header \"% Data file containing ...\", \"% evt 2.0\", 2.1 or 3.0, got none, "
         "in " +
-        file.name());
+        file->name());
   }
   if (header.encoding == PropheseeEncoding::kDat) {
     const std::int64_t end = header.end_byte + 2;
-    const std::string kind = file.read_between(header.end_byte, std::min(end, file.end_byte()));
+    const std::string kind = file->read_between(header.end_byte, std::min(end, file->end_byte()));
     constexpr char kEvent2d = 0x00;
     constexpr char kEventCd = 0x0c;
     if (kind.size() < 2 || (kind[0] != kEvent2d && kind[0] != kEventCd) || kind[1] != 8) {
-      refuse_at("expected events of type 0 or 12 of 8 bytes, got others", file.name(),
+      refuse_at("expected events of type 0 or 12 of 8 bytes, got others", file->name(),
                 header.end_byte);
     }
     if (header.version != "2") {
-      refuse_at("expected a header \"% Version 2\", got another version or none", file.name(), 0);
+      refuse_at("expected a header \"% Version 2\", got another version or none", file->name(), 0);
     }
     header.end_byte = end;
   }
   if (header.is_legacy) {
     if (header.encoding != PropheseeEncoding::kEvt21) {
-      refuse_at("expected little-endian words, got others", file.name(), 0);
+      refuse_at("expected little-endian words, got others", file->name(), 0);
     }
     header.encoding = PropheseeEncoding::kEvt21Legacy;
   }
-  StoredParts parts{file.name(), {}, nullptr};
+  StoredParts parts{file->name(), {}, nullptr};
   const bool is_told = header.width && header.height;
   parts.size =
       sensor_size(is_told ? std::optional(ImageSize{*header.height, *header.width}) : std::nullopt,

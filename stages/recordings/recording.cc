@@ -64,6 +64,13 @@ bool RecordingInput::has_hdf5_object(const std::string& object) const {
   return hdf5_ && has_object(hdf5_->file, object);
 }
 
+bool RecordingInput::has_hdf5_dataset(const std::string& path) const {
+  const Hdf5Lock lock;
+  if (!has_hdf5_object(path)) return false;
+  const Hdf5Handle object(H5Oopen(hdf5_->file, path.c_str(), H5P_DEFAULT), H5Oclose);
+  return object >= 0 && H5Iget_type(object) == H5I_DATASET;
+}
+
 std::vector<std::string> RecordingInput::hdf5_names() const {
   std::vector<std::string> names;
   if (!hdf5_) return names;

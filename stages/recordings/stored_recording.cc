@@ -138,19 +138,16 @@ class StoredRecording final : public Recording {
 
  private:
   const EventOrder& order() const {
-    std::call_once(order_once_, [&] { order_ = parts_.events->order(); });
+    std::call_once(order_once_, [&] {
+      order_ = known_order(parts_.index_key, event_count_, [&] { return parts_.events->order(); });
+    });
     return order_;
   }
 
-  /// Throws InputError if events of this time may lie elsewhere than among the others of it.
   void require_order(double after_s, double until_s) const {
-    const EventOrder::Fall* const fall = order().fall_in(after_s, until_s);
-    if (fall == nullptr) return;
-    try {
-      refuse_fall(*fall);
-    } catch (const EventFault& fault) {
-      refuse(fault, fall->place);
-    }
+    eventgan::require_order(
+        order(), after_s, until_s,
+        [&](const EventFault& fault, std::int64_t event) { refuse(fault, event); });
   }
 
   /// How many events are at or before a time, at which no time falls.

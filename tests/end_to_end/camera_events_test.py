@@ -15,7 +15,8 @@ import numpy as np
 
 import program
 from camera_files import (BBOX, DHP19_JOINTS, DHP19_MATRICES, HEIGHT, WIDTH, random_events, volume_of,
-                          whole_microseconds, write_columns, write_dhp19, write_mvsec)
+                          whole_microseconds, write_columns, write_dat, write_dhp19, write_event_utils, write_mvsec,
+                          write_v2e)
 from program import PACKAGE, SHARED, run, shard_bytes, text
 
 sys.path.insert(0, str(PACKAGE))
@@ -397,6 +398,18 @@ class WithoutFrames(program.InFolder):
             self.assertIn("opened without frames, which are another camera's (ovc)", told)
             self.check_windows(whole_microseconds(events - [0, 0, 20, 0])[0])
 
+    def test_m3ed_packed_by_lzf_as_it_is_distributed(self):
+        # h5py has the filter itself; the program needs HDF5's plugin, and Debian's does not name its library.
+        if not list(pathlib.Path("/usr/lib").glob("*/hdf5/serial/plugins/liblzf_filter.so")):
+            self.skipTest("HDF5's plugin for LZF is not installed (hdf5-plugin-lzf liblzf1)")
+        events = self.events - [0, 0, 20, 0]
+        write_columns(self.folder / "m3ed.h5", events, "prophesee/left", "prophesee/left/ms_map_idx",
+                      compression="lzf")
+        with h5py.File(self.folder / "m3ed.h5", "a") as file:
+            file["prophesee/left/calib/resolution"] = [WIDTH, HEIGHT]
+        self.convert("m3ed.h5")
+        self.check_windows(whole_microseconds(events)[0])
+
     def test_tables(self):
         columns = {"t_us": self.ticks, "x": self.events[:, 0].astype(np.uint16),
                    "y": self.events[:, 1].astype(np.uint16), "p": (self.events[:, 3] > 0).astype(np.uint8)}
@@ -485,14 +498,150 @@ class WithoutFrames(program.InFolder):
         self.assertIn(expected, run("tradeoff", manifest, "--real", self.folder / "seq", expect=66)[1])
 
     def test_prophesees_events(self):
-        x, y, positive = (self.events[:, 0].astype(int), self.events[:, 1].astype(int),
-                          (self.events[:, 3] > 0).astype(int))
-        header = (f"% Data file containing CD events\n% Version 2\n% Height {HEIGHT}\n% Width {WIDTH}\n".encode()
-                  + b"\x0c\x08")
-        words = np.stack([self.ticks, x | y << 14 | positive << 28], 1).astype("<u4")
-        (self.folder / "gen1_td.dat").write_bytes(header + words.tobytes())
+        write_dat(self.folder / "gen1_td.dat", self.events)
         self.convert("gen1_td.dat")
         self.check_windows(self.events)
+
+    def test_v2es_events(self):
+        write_v2e(self.folder / "v2e.h5", self.events)
+        self.convert("v2e.h5", sensor=self.SENSOR)
+        self.check_windows(self.events)
+        self.assertIn("expected the sensor's size", self.refused({"root": "v2e.h5", "window_s": 0.05}))
+        times = [20.05, 20.1, 20.3]
+        frames = np.random.default_rng(3).integers(0, 256, (3, HEIGHT, WIDTH), dtype=np.uint8)
+        write_v2e(self.folder / "frames.h5", self.events, frames, times)
+        self.check_intervals("frames.h5", times)
+
+    def test_event_utils_events(self):
+        for polarity in (np.bool_, np.int8):
+            write_event_utils(self.folder / "e.h5", self.events, polarity=polarity)
+            self.convert("e.h5")
+            self.check_windows(self.events)
+        random = np.random.default_rng(3)
+        images = [random.integers(0, 256, (HEIGHT, WIDTH), dtype=np.uint8),
+                  random.integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8),
+                  random.integers(0, 256, (HEIGHT, WIDTH, 1), dtype=np.uint8)]
+        times = [20.05, 20.1, 20.3]
+        write_event_utils(self.folder / "hqf.h5", self.events, images, times, resolution=(HEIGHT, WIDTH, 3))
+        self.check_intervals("hqf.h5", times)
+        self.assertEqual(run("preview", self.out, "--out", self.folder / "images")[1], "")
+        # Without images the tool has the largest y and x for the size, one short.
+        write_event_utils(self.folder / "e.h5", self.events, resolution=(HEIGHT - 1, WIDTH - 1))
+        source = {"dataset": "recording", "root": "e.h5", "window_s": 0.05}
+        lenient = {"errors": {"policy": "quarantine", "max_count": 99, "max_fraction": 1}}
+        self.assertIn("7 quarantined", run("convert", self.write_manifest(events_manifest(source, **lenient)),
+                                           "--output", self.folder / "short")[0])
+        self.assertIn("the manifest's \"sensor\" is", self.convert("e.h5", sensor=self.SENSOR)[1])
+        self.check_windows(self.events)
+
+    def check_intervals(self, root, times):
+        """A sample of each interval between frames."""
+        shutil.rmtree(self.out, ignore_errors=True)
+        run("convert", self.write_manifest(events_manifest({"dataset": "recording", "root": root})))
+        samples = rows(self.out)
+        self.assertEqual(len(samples), len(times) - 1)
+        for sample, begin, end in zip(samples.values(), times, times[1:]):
+            np.testing.assert_allclose(sample["times"], [begin, end], rtol=0, atol=1e-9)
+            window = self.events[(self.events[:, 2] > begin) & (self.events[:, 2] <= end)]
+            np.testing.assert_allclose(sample["volume"], volume_of(window), rtol=0, atol=1e-4)
+
+    def test_windows_with_yolos_texts(self):
+        folder = self.folder / "pedro"
+        folder.mkdir()
+        parts = np.array_split(self.events, 3)
+        texts = ["0 0.5 0.25 0.25 0.5\n1 0.75 0.5 0.125 0.25\n", "", "1 0.5 0.5 1 1\n"]
+        for name, part, label in zip("abc", parts, texts):
+            table = np.stack([np.round(part[:, 2] * 1e6), part[:, 0], part[:, 1], part[:, 3] > 0], 1)
+            np.save(folder / f"{name}.npy", table.astype(np.int64))
+            (folder / f"{name}.txt").write_text(label)
+        for changes in ({}, {"window_s": 9}, {"label_at": "middle"}):
+            shutil.rmtree(self.out, ignore_errors=True)
+            source = {"dataset": "recording", "root": "pedro", "sensor": self.SENSOR, **changes}
+            told = run("convert", self.write_manifest(events_manifest(source)))[0]
+            self.assertIn("3 of 3 pairs written, 0 quarantined", told)
+            samples = rows(self.out)
+            for (name, sample), part in zip(samples.items(), parts):
+                end = part[[0, -1], 2].mean() if "label_at" in changes else part[-1, 2]
+                self.assertAlmostEqual(float(name.split("/")[1]), end, delta=1e-6)
+                np.testing.assert_allclose(sample["volume"], volume_of(part), rtol=0, atol=1e-4)
+            self.assertEqual([sample["xyxy"].tolist() for sample in samples.values()],
+                             [[[12, 0, 20, 12], [22, 9, 26, 15]], [], [[0, 0, 32, 24]]])
+        # PEDRo's labels lie in a folder of their own, and a file above it names the classes.
+        (self.folder / "yolo" / "train").mkdir(parents=True)
+        for name in "abc":
+            shutil.move(folder / f"{name}.txt", self.folder / "yolo" / "train")
+        (self.folder / "yolo" / "classes.txt").write_text("person\ndog\n")
+        source["annotations"] = "yolo/train"
+        manifest = self.write_manifest(events_manifest(source))
+        shutil.rmtree(self.out)
+        run("convert", manifest)
+        with h5py.File(next(self.out.glob("*.h5"))) as shard:
+            names = [text(name) for name in shard["labels/boxes/class_id"].attrs["class_names"]]
+            self.assertEqual([names[k] for k in shard["labels/boxes/class_id"][:]], ["person", "dog"])
+            self.assertEqual(bytes(shard["labels/original"][0]).decode(), texts[0])
+        (self.folder / "yolo" / "classes.txt").write_text("dog\nperson\n")
+        self.assertIn("annotations", run("convert", manifest, expect=64)[1])
+        (self.folder / "yolo/train/b.txt").write_text("7 0.5 0.5 1 1\n")
+        self.assertIn("expected a class 0..1", run("plan", manifest, expect=66)[1])
+
+    def test_an_index_of_times_changes_no_byte(self):
+        write_dat(self.folder / "a.dat", self.events)
+        manifest = self.write_manifest(events_manifest({"dataset": "recording", "root": "a.dat", "window_s": 0.05}))
+        run("plan", manifest, "--freeze")
+        index = self.out / "plan.index"
+        index.write_bytes(index.read_bytes()[:-9] + b"123456789")  # damaged: as none
+        run("convert", manifest)
+        self.check_windows(self.events)
+        other = self.folder / "other"
+        for part in ("0/2", "1/2"):  # the second takes the first one's
+            run("convert", manifest, "--output", other, "--shards", part)
+        self.assertEqual(index.read_bytes(), (other / "plan.index").read_bytes())
+        self.assertEqual(shard_bytes(self.out), shard_bytes(other))
+
+    def test_more_recordings_than_files_may_be_open(self):
+        many = self.folder / "many"
+        many.mkdir()
+        for k in range(150):
+            events = random_events(20, 1.0, 1.04, k)
+            write_dat(many / f"d{k}_td.dat", events)
+            if k % 2:
+                write_event_utils(many / f"e{k}.h5", events)
+            else:
+                write_columns(many / f"h{k}_td.h5", events, size=(HEIGHT, WIDTH))
+        manifest = self.write_manifest(events_manifest({"dataset": "recording", "root": "many", "window_s": 0.05},
+                                                       output={"directory": "out", "samples_per_shard": 100}))
+        done = subprocess.run(["sh", "-c", 'ulimit -n 64; exec "$0" "$@"', program.PROGRAM, "convert", str(manifest)],
+                              capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("300 of 300 pairs written, 0 quarantined", done.stdout)
+        self.assertEqual({float(round(sample["volume"].sum())) for sample in rows(self.out).values()}, {20.0})
+
+    def test_init_guesses_the_sensor_and_convert_is_told_it(self):
+        events = random_events(3000, 1.0, 1.2, 5, height=470, width=610)
+        write_dat(self.folder / "camera.dat", events)
+        header = (self.folder / "camera.dat").read_bytes()
+        (self.folder / "camera.dat").write_bytes(header.replace(b"% Height 24\n% Width 32\n", b""))
+        manifest = self.folder / "manifest.json"
+        told = run("init", self.folder / "camera.dat", "--out", manifest)[0]
+        self.assertIn("set \"sensor\" (the events reach x = ", told)
+        self.assertIn("as those of a camera of 640x480", told)
+        self.assertIn('// "sensor": { "width": 640, "height": 480 },', manifest.read_text())
+        out = self.folder / "out"
+        error = run("convert", self.folder / "camera.dat", "--output", out, expect=66)[1]
+        self.assertIn("--sensor WIDTHxHEIGHT gives its size", error)
+        for wrong in ("640", "0x480", "640x", "640x480x2", "x480"):
+            self.assertIn("--sensor: expected WIDTHxHEIGHT",
+                          run("convert", self.folder / "camera.dat", "--sensor", wrong, expect=64)[1])
+        run("convert", self.folder / "camera.dat", "--output", out, "--sensor", "640x480")
+        with h5py.File(next(out.glob("*.h5"))) as shard:
+            self.assertEqual(shard["events/volume"].shape[2:], (480, 640))
+            self.assertAlmostEqual(float(shard["events/volume"][:].astype(float).sum()), 3000, delta=2)
+        run("convert", self.folder / "camera.dat", "--output", out)
+        self.assertIn("expected 640x480, as when the job began",
+                      run("convert", self.folder / "camera.dat", "--output", out, "--sensor", "1280x720",
+                          expect=64)[1])
+        self.assertIn("expected a recording, got a manifest",
+                      run("convert", manifest, "--sensor", "640x480", expect=64)[1])
 
     def test_a_davis_recording_is_its_conversion(self):
         if not SHARED.is_dir():

@@ -41,7 +41,7 @@ def write_columns(path, events, group="events", index="ms_to_idx", offset=None, 
         for name, values in {"x": events[:, 0].astype(np.uint16), "y": events[:, 1].astype(np.uint16),
                              "t": ticks.astype(np.int64 if size or group != "events" else np.uint32),
                              "p": (events[:, 3] > 0).astype(np.uint8)}.items():
-            file.create_dataset(f"{group}/{name}", data=values, chunks=(1000,), **filters)
+            file.create_dataset(f"{group}/{name}", data=values, chunks=(min(1000, len(values)),), **filters)
         if size:
             file["events/height"], file["events/width"] = size
             return
@@ -49,6 +49,52 @@ def write_columns(path, events, group="events", index="ms_to_idx", offset=None, 
         file[index] = np.searchsorted(ticks, ms).astype(np.uint64)
         if offset is not None:
             file["t_offset"] = np.int64(offset)
+
+
+def write_v2e(path, events, frames=None, frame_times=()):
+    """v2e's --dvs_h5: rows grow a frame at a time, and frames are there if it was told to keep them."""
+    ticks = whole_microseconds(events)[1]
+    rows = np.stack([ticks, events[:, 0], events[:, 1], events[:, 3] > 0], 1).astype(np.uint32)
+    with h5py.File(path, "w") as file:
+        table = file.create_dataset(name="events", shape=(0, 4), maxshape=(None, 4), dtype="uint32",
+                                    compression="gzip")
+        for part in np.array_split(rows, 7):
+            table.resize(table.shape[0] + len(part), axis=0)
+            table[-len(part):] = part
+        if frames is not None:
+            file.create_dataset("frame", data=frames, dtype="uint8", compression="gzip")
+            file.create_dataset("frame_ts", data=np.round(np.asarray(frame_times) * 1e6).astype(np.uint32),
+                                dtype="uint32", compression="gzip")
+            file.create_dataset("frame_idx", data=np.searchsorted(events[:, 2], frame_times).astype(np.uint64),
+                                dtype="uint64", compression="gzip")
+
+
+def write_event_utils(path, events, images=(), image_times=(), resolution=(HEIGHT, WIDTH), polarity=np.bool_):
+    """event_utils' hdf5_packager: columns that grow, an image a dataset with its time as an attribute."""
+    with h5py.File(path, "w") as file:
+        columns = {"xs": (events[:, 0], np.int16), "ys": (events[:, 1], np.int16), "ts": (events[:, 2], np.float64),
+                   "ps": (events[:, 3] > 0, polarity)}
+        for name, (values, kind) in columns.items():
+            column = file.create_dataset(f"events/{name}", (0,), dtype=np.dtype(kind), maxshape=(None,), chunks=True)
+            column.resize(len(values), axis=0)
+            column[-len(values):] = values.astype(kind)
+        for k, (image, time) in enumerate(zip(images, image_times)):
+            dataset = file.create_dataset(f"images/image{k:09d}", data=image, dtype=np.uint8)
+            dataset.attrs["size"] = image.shape
+            dataset.attrs["timestamp"] = time
+            dataset.attrs["type"] = "greyscale" if image.ndim == 2 else "color_bgr"
+            dataset.attrs["event_idx"] = max(np.searchsorted(events[:, 2], time) - 1, 0)
+        file.attrs["num_events"] = len(events)
+        file.attrs["t0"], file.attrs["tk"] = events[0, 2], events[-1, 2]
+        file.attrs["sensor_resolution"] = resolution
+
+
+def write_dat(path, events, size=(HEIGHT, WIDTH)):
+    """Prophesee's DAT of version 2."""
+    x, y, positive = (events[:, column].astype(int) for column in (0, 1, 3))
+    header = f"% Data file containing CD events\n% Version 2\n% Height {size[0]}\n% Width {size[1]}\n".encode()
+    words = np.stack([whole_microseconds(events)[1], x | y << 14 | (positive > 0) << 28], 1).astype("<u4")
+    path.write_bytes(header + b"\x0c\x08" + words.tobytes())
 
 
 BBOX = [("t", "<u8"), ("x", "<f4"), ("y", "<f4"), ("w", "<f4"), ("h", "<f4"), ("class_id", "u1"), ("track_id", "<u4"),

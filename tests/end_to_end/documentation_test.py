@@ -183,7 +183,8 @@ class Documentation(unittest.TestCase):
         in_cc = {f"{suite}.{name}" for suite, name in re.findall(r"\bTEST(?:_F|_P)?\((\w+),\s*(\w+)\)", sources)}
         in_python = {f"{path.stem.removesuffix('_test')}.{name}" for path in (tests / "end_to_end").glob("*_test.py")
                      for name in re.findall(r"(?m)^    def test_(\w+)\(", path.read_text(encoding="utf-8"))}
-        files = {"manifest.json", "plan.json", "run.json", "amendments.json", "dataset.json", "dataset.h5"}
+        files = {"manifest.json", "plan.json", "run.json", "amendments.json", "dataset.json", "dataset.h5",
+                 "plan.index"}
         named = set(re.findall(r"`(\w+\.\w+)`", text)) - files
         self.assertGreater(len(named), 40)
         self.assertEqual(named - in_cc - in_python, set())

@@ -11,7 +11,6 @@
 #include <iterator>
 #include <limits>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -20,11 +19,9 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
+#include "stages/frames/events/recording_folder.h"
 #include "stages/frames/events/recording_labels.h"
-#include "stages/frames/source_folders.h"
 #include "stages/recordings/recording.h"
 
 namespace eventgan {
@@ -33,6 +30,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kSameTime_s = 1e-6;  // what labels written with six decimals can lose
+/// An event at a window's begin is not in it, and none at whole microseconds lies on the border of
+/// two windows that begin so long before one.
+constexpr double kJustBefore_s = kSameTime_s / 4;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// Consecutive windows from `begin_s` on.
@@ -42,16 +42,16 @@ struct Windows {
 };
 
 /// One recording of the source.
-struct Recorded {
-  std::string path;        ///< as FrameRef::path is written
-  RecordingFormat format;  ///< as it was recognised
+struct Recorded : FoundFile {
   std::unique_ptr<Recording> recording;
   std::vector<double> frame_times_s;
   std::array<double, 2> span{};                     ///< first and last time of a frame or an event
   std::optional<std::array<double, 2>> event_span;  ///< of an event; none: there are none
   Windows windows;                                  ///< if it has neither frames nor labels
-  std::string label_file;                           ///< written as `path`; empty: none
   RecordingLabels labels;                           ///< class_id is the source's
+
+  /// Whether it is one window, whose labels have no time.
+  bool is_window() const { return is_window_label_file(label_file); }
 
   /// The last frame at or before the time; -1 if there is none.
   std::int64_t frame_at(double time_s) const {
@@ -97,37 +97,27 @@ Span frame_window(const std::vector<double>& frames, double time_s, LabelPlace p
   return {later(later(time_s, -last_s), before_s), time_s};
 }
 
-/// A manifest of this program may lie beside a recording under its name.
-bool is_manifest(const fs::path& file) try {
-  if (file.extension() != ".json") return false;
-  const nlohmann::ordered_json document =
-      parse_json_data(read_text_file(file), file.filename().string(), JsonComments::kPassedOver);
-  return document.is_object() && document.value("format", "") == "eventgan-manifest";
-} catch (const std::exception&) {  // reported when it is read as labels
-  return false;
-}
-
-/// Prophesee's NAME_bbox.npy is that of NAME_td.dat, NAME_td.dat.h5 and NAME.raw.
-std::string bbox_name(std::string name) {
-  for (const std::string_view events : {std::string_view("_td.dat"), std::string_view("_td")}) {
-    if (!name.ends_with(events)) continue;
-    name.resize(name.size() - events.size());
-    break;
-  }
-  return name + "_bbox.npy";
-}
-
-bool is_label_file(const fs::path& file) {
-  return file.extension() == ".csv" || file.extension() == ".json" ||
-         file.filename().string().ends_with("_bbox.npy");
+/// What lies beside a file, or near it, written as that one is.
+std::string written_beside(const fs::path& beside, const fs::path& file,
+                           const std::string& written_file) {
+  const fs::path from_file = beside.lexically_relative(file.parent_path());
+  fs::path written = fs::path(written_file).parent_path() / from_file;
+  if (from_file.has_parent_path()) written = written.lexically_normal();  // left/../../images
+  return written.generic_string();
 }
 
 class RecordingDataset final : public Dataset {
  public:
   RecordingDataset(const SourceSpec& spec, const fs::path& base)
       : window_(spec.window), options_(spec.recording) {
-    find_recordings(spec, base);
-    find_labels(spec, base);
+    RecordingFolder found = look_into_recordings(spec, base);
+    notes_ = std::move(found.notes);
+    unreadable_ = std::move(found.unreadable);
+    unopened_ = std::move(found.unopened);
+    for (auto& [name, file] : found.recordings) {
+      static_cast<FoundFile&>(recordings_[name]) = std::move(file);
+    }
+    read_labels();
     open_all(base);
     number_classes();
     for (const auto& [name, recorded] : recordings_) {
@@ -254,6 +244,9 @@ class RecordingDataset final : public Dataset {
   /// None where so many events make the window, whatever their times.
   std::optional<Span> span_of(const Recorded& recorded, double time_s) const {
     if (window_.events) return std::nullopt;
+    if (!window_.duration_s && recorded.is_window()) {
+      return Span{recorded.span[0] - kJustBefore_s, recorded.span[1]};
+    }
     if (!window_.duration_s) return frame_window(recorded.frame_times_s, time_s, window_.label);
     if (recorded.windows.count > 0) {
       // From the window's number, so that one's end is the next one's begin to the last bit: no
@@ -267,142 +260,16 @@ class RecordingDataset final : public Dataset {
     return Span{later(time_s, after_s - *window_.duration_s), later(time_s, after_s)};
   }
 
-  void add(const std::string& name, const std::string& path, RecordingFormat format) {
-    const auto [recorded, is_new] = recordings_.try_emplace(name);
-    const auto is_csv = [](const fs::path& file) { return file.extension() == ".csv"; };
-    if (!is_new && is_csv(path) != is_csv(recorded->second.path)) {  // tools write one beside it
-      notes_.push_back("left out, since the recording is there in another file: " +
-                       (is_csv(path) ? path : recorded->second.path));
-      if (is_csv(path)) return;
-    } else if (!is_new) {
-      throw InputError("expected recordings of different names, got " + name + " twice, in " +
-                       path);
-    }
-    recorded->second.path = path;
-    recorded->second.format = format;
-  }
-
-  void find_recordings(const SourceSpec& spec, const fs::path& base) {
-    const fs::path root = base / spec.root;
-    /// `written`: as FrameRef::path is.
-    const auto spelled = [&](const fs::path& written) {
-      const fs::path file = event_file(base / written, options_);
-      return (written / file.lexically_relative(base / written)).generic_string();
-    };
-    if (const auto format = find_recording_format(root, options_)) {
-      fs::path named = fs::absolute(root).lexically_normal();
-      if (!named.has_filename()) named = named.parent_path();
-      const bool is_folder = fs::is_directory(root);
-      add((is_folder ? named.filename() : named.stem()).string(),
-          is_folder ? spelled(spec.root) : spec.root, *format);
-      default_labels_ = named.parent_path();
-      return;
-    }
-    if (fs::is_regular_file(root)) throw InputError(recording_fault(root, options_).reason);
-    const SourceRoot folder(spec.root, base);
-    folder.require_folder("");
-    std::vector<std::string> left_out;
-    std::string reason;  // of the last
-    for (const std::string& name : folder.folders_in("")) {
-      if (const auto format = find_recording_format(folder.on_disk(name), options_)) {
-        add(name, spelled(folder.written(name)), *format);
-      } else {
-        left_out.push_back(name);
-      }
-    }
-    for (const fs::path name : folder.files_in("")) {
-      if (const auto format = find_recording_format(folder.on_disk(name.string()), options_)) {
-        add(name.stem().string(), folder.written(name.string()), *format);
-        continue;
-      }
-      const RecordingFault fault = recording_fault(folder.on_disk(name.string()), options_);
-      if (fault.is_recording) {
-        unreadable_.push_back(fault.reason);
-        unopened_.emplace(name.stem().string(), fault.reason);
-      } else if (!is_label_file(name)) {
-        left_out.push_back(name.string());
-        reason = fault.reason;
-      }
-    }
-    if (recordings_.empty()) {
-      std::vector<std::string_view> titles;
-      for (const RecordingFormatRow& row : kRecordingFormats) titles.push_back(row.title);
-      if (!unreadable_.empty()) reason = unreadable_[0];
-      throw InputError(fmt::format(
-          "expected a recording of an event camera ({}), or a folder of them, got none, in {}{}",
-          fmt::join(titles, ", "), root.string(), reason.empty() ? "" : " (" + reason + ")"));
-    }
-    if (!left_out.empty()) {
-      notes_.push_back(counted(left_out, "entry", " left out in " + folder.written("")));
-    }
-    default_labels_ = root;
-  }
-
-  void find_labels(const SourceSpec& spec, const fs::path& base) {
-    const fs::path named = base / spec.annotations.value_or("");
-    if (spec.annotations && !fs::is_directory(named)) {
-      if (recordings_.size() > 1) {
-        throw UsageError(
-            "annotations: expected a folder of NAME.csv, NAME.json or NAME_bbox.npy for " +
-            std::to_string(recordings_.size()) + " recordings, got a file, in " + spec.root);
-      }
-      read_labels(recordings_.begin()->second, *spec.annotations, named);
-      return;
-    }
-    const fs::path folder = spec.annotations ? named : default_labels_;
+  void read_labels() {
     for (auto& [name, recorded] : recordings_) {
-      std::vector<fs::path> files = {folder / (name + ".csv"), folder / (name + ".json"),
-                                     folder / bbox_name(name)};
-      // A table of events is a .csv, too.
-      const fs::path own = fs::absolute(base / recorded.path).lexically_normal();
-      std::erase_if(files, [&](const fs::path& file) {
-        return !fs::exists(file) || is_manifest(file) ||
-               fs::absolute(file).lexically_normal() == own;
-      });
-      if (!files.empty() && files[0].extension() == ".csv" && !is_label_table(files[0])) {
-        notes_.push_back("no labels, since its first line has none of their columns: " +
-                         files[0].string());
-        files.erase(files.begin());
+      if (recorded.label_file.empty()) continue;
+      const fs::path& file = recorded.label_file_on_disk;
+      annotation_files_.push_back(recorded.label_file);
+      for (const fs::path& beside : recorded.is_window() ? window_label_companions(file)
+                                                         : recording_label_companions(file)) {
+        annotation_files_.push_back(written_beside(beside, file, recorded.label_file));
       }
-      if (files.size() > 1) {
-        throw InputError("expected labels in one file, got two, in " + files[0].string() + " and " +
-                         files[1].string());
-      }
-      if (!files.empty()) read_labels(recorded, written(files[0], spec, base), files[0]);
-    }
-    if (annotation_files_.empty()) {
-      if (!spec.annotations) return;
-      throw InputError(
-          "expected NAME.csv, NAME.json or NAME_bbox.npy of a recording, got none, in " +
-          folder.string());
-    }
-    std::vector<std::string> without;
-    std::erase_if(recordings_, [&](const auto& entry) {
-      if (!entry.second.label_file.empty()) return false;
-      without.push_back(entry.first);
-      return true;
-    });
-    if (!without.empty()) {
-      notes_.push_back(counted(without, "recording", " without labels left out in " + spec.root));
-    }
-  }
-
-  /// Relative to the manifest where the root is.
-  static std::string written(const fs::path& file, const SourceSpec& spec, const fs::path& base) {
-    if (spec.annotations) return (fs::path(*spec.annotations) / file.filename()).generic_string();
-    if (fs::path(spec.root).is_absolute()) return file.generic_string();
-    return file.lexically_normal()
-        .lexically_relative(fs::absolute(base).lexically_normal())
-        .generic_string();
-  }
-
-  void read_labels(Recorded& recorded, const std::string& path, const fs::path& file) {
-    recorded.labels = read_recording_labels(file);
-    recorded.label_file = path;
-    annotation_files_.push_back(path);
-    for (const fs::path& beside : recording_label_companions(file)) {
-      annotation_files_.push_back(
-          (fs::path(path).parent_path() / beside.filename()).generic_string());
+      if (!recorded.is_window()) recorded.labels = read_recording_labels(file);
     }
   }
 
@@ -413,6 +280,7 @@ class RecordingDataset final : public Dataset {
     for (auto entry = recordings_.begin(); entry != recordings_.end();) {
       try {
         open(entry->second, base);
+        if (entry->second.is_window()) read_window(entry->second);
         ++entry;
       } catch (const InputError& error) {
         if (is_one) throw;
@@ -429,10 +297,7 @@ class RecordingDataset final : public Dataset {
     const fs::path path = base / recorded.path;
     const fs::path own = fs::absolute(path).lexically_normal();
     for (const fs::path& file : event_companions(own, recorded.format, options_)) {
-      const fs::path beside = file.lexically_relative(own.parent_path());
-      fs::path written = fs::path(recorded.path).parent_path() / beside;
-      if (beside.has_parent_path()) written = written.lexically_normal();  // left/../../images
-      annotation_files_.push_back(written.generic_string());
+      annotation_files_.push_back(written_beside(file, own, recorded.path));
     }
     recorded.recording = open_recording(path, recorded.format, options_);
     const Recording& recording = *recorded.recording;
@@ -457,12 +322,21 @@ class RecordingDataset final : public Dataset {
     }
   }
 
+  /// The labels' time is where the window has it.
+  void read_window(Recorded& recorded) const {
+    const auto [first_s, last_s] = recorded.span;
+    const double time_s =
+        window_.label == LabelPlace::kMiddle ? first_s + (last_s - first_s) / 2 : last_s;
+    recorded.labels =
+        read_window_labels(recorded.label_file_on_disk, recorded.recording->size(), time_s);
+  }
+
   void open_without_frames(Recorded& recorded) const {
     if (!recorded.event_span) {
       throw InputError("expected events or frames, got neither, in " + recorded.path);
     }
     const bool is_labelled = !recorded.label_file.empty();
-    if (!window_.duration_s && !(is_labelled && window_.events)) {
+    if (!window_.duration_s && !(is_labelled && window_.events) && !recorded.is_window()) {
       throw InputError(
           fmt::format("expected window_s{}, since the recording has no frames, got {}, in {}",
                       is_labelled ? " or window_events" : ", or labels",
@@ -470,10 +344,8 @@ class RecordingDataset final : public Dataset {
     }
     recorded.span = *recorded.event_span;
     if (is_labelled) return;
-    // A quarter of a microsecond before the first event: an event at a window's begin is not in it,
-    // and none at whole microseconds lies on the border of two.
     const double length_s = *window_.duration_s;
-    const double begin_s = recorded.span[0] - kSameTime_s / 4;
+    const double begin_s = recorded.span[0] - kJustBefore_s;
     const double count = std::ceil((recorded.span[1] - begin_s) / length_s);
     constexpr double kMostWindows = 1e7;
     if (count > kMostWindows) {
@@ -594,7 +466,6 @@ class RecordingDataset final : public Dataset {
   WindowSpec window_;
   RecordingOptions options_;
   std::map<std::string, Recorded> recordings_;  ///< by name
-  fs::path default_labels_;                     ///< where labels lie unless the manifest says
   LabelSchema schema_;
   std::vector<LabelledFrame> labelled_;
   std::vector<std::string> annotation_files_;  ///< as FrameRef::path is written

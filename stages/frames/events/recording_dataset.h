@@ -13,16 +13,19 @@ namespace eventgan {
 ///
 /// The root is a recording (a file; a folder of ECD or DSEC) or a folder of recordings, named NAME
 /// as its file or folder. Labels are NAME.csv, NAME.json or NAME_bbox.npy (of NAME_td.* as well;
-/// read_recording_labels) beside it, or what the manifest's `annotations` names; a manifest of this
-/// program that has such a name is left alone. A sample is a labelled time; of a source without
-/// labels the time of a frame, or, of recordings without frames, of one of the windows of
-/// duration_s that follow each other from a quarter of a microsecond before the first event until
-/// all events are in one. Of a source with labels, recordings without are left out, with a note.
+/// read_recording_labels) beside it, of a table NAME.txt as well (read_window_labels), or what the
+/// manifest's `annotations` names; a manifest of this program that has such a name is left alone. A
+/// sample is a labelled time, of NAME.txt that of the last event or, in the middle, of the middle
+/// of all; of a source without labels the time of a frame, or, of recordings without frames, of one
+/// of the windows of duration_s that follow each other from a quarter of a microsecond before the
+/// first event until all events are in one. Of a source with labels, recordings without are left
+/// out, with a note.
 ///
 /// The window of a time t, which lies at its end (SourceSpec::window):
 ///   frames      (t - d, t], d the interval between the two frames around t, or next to it beyond
 ///               them; for a frame's own time it begins exactly at the frame before;
 ///   duration_s  (t - duration_s, t];
+///   neither, of NAME.txt: all events;
 ///   events      the last so many events with a time ≤ t.
 /// With t in its middle it is shifted by half of its length, of n events by the later n - n/2. A
 /// label within a microsecond of a frame has the frame's time. A time outside the recording's

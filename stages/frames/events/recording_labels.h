@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "manifests/values/frames.h"
 #include "manifests/values/labels.h"
 
 namespace eventgan {
@@ -40,6 +41,20 @@ RecordingLabels read_recording_labels(const std::filesystem::path& file);
 
 /// What is read beside such a file and decides what its labels mean, whether it is there or not.
 std::vector<std::filesystem::path> recording_label_companions(const std::filesystem::path& file);
+
+/// Labels of a recording that is one window, which have no time: NAME.txt beside a table NAME.npy,
+/// .npz or .csv, as PEDRo has them.
+bool is_window_label_file(const std::filesystem::path& file);
+
+/// Whether it is YOLO's text, or empty: a window without objects.
+bool is_window_label_text(const std::filesystem::path& file);
+
+/// Boxes as shares of a sensor of that size, at that time. Their classes are named by data.yaml,
+/// classes.txt or the like beside the file or in the folder above it, else by their numbers. Throws
+/// InputError: "expected X, got Y, in FILE:3".
+RecordingLabels read_window_labels(const std::filesystem::path& file, ImageSize sensor,
+                                   double time_s);
+std::vector<std::filesystem::path> window_label_companions(const std::filesystem::path& file);
 
 /// Whether a NAME.csv is one of labels: its first line has one of their columns, or there is none.
 bool is_label_table(const std::filesystem::path& file);

@@ -46,24 +46,6 @@ bool is_other_text(std::string_view file) {
 
 const LabelFiles kYoloFiles{".txt", {"images"}, {"labels"}, is_other_text};
 
-/// data.yaml, classes.txt, obj.names of CVAT, _darknet.labels of Roboflow, or the only other YAML
-/// file; empty if there is none.
-std::string names_file_in(const std::filesystem::path& folder) {
-  for (const char* name :
-       {"data.yaml", "data.yml", "classes.txt", "obj.names", "_darknet.labels"}) {
-    if (has_file(folder / name)) return name;
-  }
-  std::vector<std::filesystem::path> others;
-  for (const char* extension : {".yaml", ".yml"}) {
-    for (const auto& name : names_with(look_into(folder), extension)) {
-      if (("\n" + beginning_of(folder / name)).find("\nnames:") != std::string::npos) {
-        others.push_back(name);
-      }
-    }
-  }
-  return others.size() == 1 ? others.front().string() : "";
-}
-
 class YoloLabels : public FilePerImage {
  public:
   YoloLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
@@ -86,13 +68,10 @@ class YoloLabels : public FilePerImage {
  private:
   void read_classes() {
     for (const SourceRoot& place : {root(), root().above()}) {
-      const std::string name = names_file_in(place.on_disk(""));
+      const std::string name = yolo_names_file(place.on_disk(""));
       if (name.empty()) continue;
-      const std::string text = place.read_or_throw(name);
       const std::string path = place.written(name);
-      const std::string extension = lower_extension(name);
-      classes_ = extension == ".yaml" || extension == ".yml" ? parse_yolo_yaml(text, path)
-                                                             : parse_yolo_classes(text, path);
+      classes_ = parse_yolo_names(place.read_or_throw(name), path);
       schema_ = classes_.names;
       annotation_files_.push_back(path);
       return;
@@ -102,18 +81,12 @@ class YoloLabels : public FilePerImage {
 
   /// Without names these are the numbers, up to the highest that a text has.
   void number_classes() {
-    constexpr int kMost = 100'000;
     int highest = -1;
     for (const FrameLabel& label : labels()) {
       const Outcome<std::string> text =
           label.key.empty() ? Outcome<std::string>(std::string()) : root().read(label.key);
       if (is_fault(text)) continue;  // a fault of its sample
-      for (const TextLine& line : split_lines(*text)) {
-        const std::vector<std::string_view> columns = split_columns(line.bytes);
-        const auto number = columns.empty() ? std::nullopt : parse_number<double>(columns[0]);
-        const bool is_class = number && *number >= 0 && *number <= kMost;
-        if (is_class) highest = std::max(highest, static_cast<int>(*number));
-      }
+      highest = std::max(highest, highest_yolo_class(*text));
     }
     if (highest < 0) {
       throw InputError(
@@ -121,8 +94,8 @@ class YoloLabels : public FilePerImage {
           "neither, in " +
           root().written("") + " and the folder above it");
     }
-    for (int i = 0; i <= highest; ++i) schema_.class_names.push_back(std::to_string(i));
-    classes_.names = schema_;
+    classes_ = numbered_yolo_classes(highest);
+    schema_ = classes_.names;
     notes_.push_back("classes are named by their numbers, 0.." + std::to_string(highest) +
                      ", since no data.yaml or classes.txt with names is in " + root().written("") +
                      " or the folder above it");
@@ -158,7 +131,7 @@ std::optional<std::filesystem::path> find_yolo(const FoundFrames& frames,
   const bool is_beside = labels == frames.root;  // of texts there, folders above have none
   std::filesystem::path folder = labels;
   for (int level = 0; level < (is_beside ? 2 : 3); ++level, folder = folder.parent_path()) {
-    if (!names_file_in(folder).empty()) return is_beside ? labels : folder;
+    if (!yolo_names_file(folder).empty()) return is_beside ? labels : folder;
   }
   if (has_yolo_texts(labels)) return labels;  // which tell that their classes are numbers
   if (!is_beside) {

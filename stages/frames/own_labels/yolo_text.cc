@@ -16,7 +16,9 @@
 #include "manifests/values/text.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
+#include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
+#include "stages/frames/sequences/image_folder.h"
 
 namespace eventgan {
 namespace {
@@ -266,6 +268,46 @@ YoloSchema parse_yolo_classes(std::string_view text, const std::string& path) {
     throw InputError("expected a name of its own a line, got " + in_quotes(names[i]) + ", in " +
                      place_in_file(path, static_cast<int>(i) + 1));
   }
+  return schema;
+}
+
+std::string yolo_names_file(const std::filesystem::path& folder) {
+  for (const char* name :
+       {"data.yaml", "data.yml", "classes.txt", "obj.names", "_darknet.labels"}) {
+    if (has_file(folder / name)) return name;
+  }
+  std::vector<std::filesystem::path> others;
+  for (const char* extension : {".yaml", ".yml"}) {
+    for (const auto& name : names_with(look_into(folder), extension)) {
+      if (("\n" + beginning_of(folder / name)).find("\nnames:") != std::string::npos) {
+        others.push_back(name);
+      }
+    }
+  }
+  return others.size() == 1 ? others.front().string() : "";
+}
+
+YoloSchema parse_yolo_names(const std::string& text, const std::string& path) {
+  const std::string extension = lower_extension(path);
+  return extension == ".yaml" || extension == ".yml" ? parse_yolo_yaml(text, path)
+                                                     : parse_yolo_classes(text, path);
+}
+
+int highest_yolo_class(std::string_view text) {
+  constexpr int kMost = 100'000;
+  int highest = -1;
+  for (const TextLine& line : split_lines(text)) {
+    const std::vector<std::string_view> columns = split_columns(line.bytes);
+    const auto number = columns.empty() ? std::nullopt : parse_number<double>(columns[0]);
+    const bool is_class = number && *number >= 0 && *number <= kMost;
+    if (is_class) highest = std::max(highest, static_cast<int>(*number));
+  }
+  return highest;
+}
+
+YoloSchema numbered_yolo_classes(int highest) {
+  YoloSchema schema;
+  for (int i = 0; i <= highest; ++i) schema.names.class_names.push_back(std::to_string(i));
   return schema;
 }
 

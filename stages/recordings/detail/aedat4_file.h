@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "manifests/values/frames.h"
-#include "stages/base/files/input_file.h"
 #include "stages/recordings/detail/event_check.h"
 #include "stages/recordings/detail/event_parts.h"
+#include "stages/recordings/detail/open_files.h"
 
 namespace eventgan {
 
@@ -101,7 +101,7 @@ class Aedat4File {
   std::string unpack(std::string bytes) const;
   std::string content(const PacketPlace& packet) const;
 
-  InputFile file_;
+  RecordingFile file_;
   Header header_;
 };
 

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "manifests/values/events.h"
-#include "stages/base/files/input_file.h"
 #include "stages/recordings/detail/event_check.h"
 #include "stages/recordings/detail/event_order.h"
+#include "stages/recordings/detail/open_files.h"
 
 namespace eventgan {
 
@@ -52,9 +52,10 @@ class EcdEventFile {
 
  private:
   const EventOrder& order() const;
+  EventOrder look_at_times() const;
   [[noreturn]] void refuse(const EventFault& fault, std::int64_t line_begin) const;
 
-  InputFile file_;
+  RecordingFile file_;
   std::int64_t begin_ = 0;  ///< of the first line that is no comment
   mutable std::once_flag order_once_;
   mutable EventOrder order_;  ///< by bytes

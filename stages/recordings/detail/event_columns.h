@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "stages/recordings/detail/stored_recording.h"
 #include "stages/recordings/recording.h"
 
 namespace eventgan {
@@ -12,13 +13,21 @@ namespace eventgan {
 /// Where an HDF5 file has a dataset for each column of its events: whole numbers [events], x and y
 /// in pixels, t in µs, p 0 or 1 (or -1 or 1, or a bool).
 struct ColumnLayout {
-  std::string events;    ///< the group of x, y, t, p
-  std::string ms_index;  ///< whole numbers [ms]: the first event at or after each ms; may be absent
-  std::string t_offset;  ///< µs, added to t; may be absent
-  std::vector<std::string> size;  ///< of the sensor: [width, height], or height and width
+  std::string events;  ///< the group of the columns
+  /// Whole numbers [ms]: the first event at or after each ms; empty or absent: there is none.
+  std::string ms_index = "";
+  std::string t_offset = "";  ///< µs, added to t; likewise
+  /// Of the sensor: [width, height], or height and width; likewise.
+  std::vector<std::string> size = {};
+  std::string ending = "";      ///< of the columns' names: "s" where they are xs, ys, ts, ps
+  bool counts_seconds = false;  ///< t is seconds, float
 
-  std::string column(const std::string& name) const { return events + "/" + name; }
+  std::string column(const std::string& name) const { return events + "/" + name + ending; }
 };
+
+/// The events and the size, which the options may give. Throws InputError.
+StoredParts open_event_columns(const std::filesystem::path& path, const ColumnLayout& layout,
+                               const RecordingOptions& options);
 
 /// DSEC's, as EventColumnsWriter writes it, too. Files of RVT and Prophesee (NAME_td.h5) are read
 /// as well, which have no index and no offset, but height and width.

@@ -3,10 +3,15 @@
 #include <array>
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
+
+#include "stages/recordings/detail/event_check.h"
 
 namespace eventgan {
 
@@ -63,6 +68,14 @@ class EventOrder {
   /// Every one, in the order of their times, none touching another.
   const std::vector<Fall>& falls() const { return falls_; }
 
+  /// Where the last block ends; 0: there is none.
+  std::int64_t end() const { return blocks_.empty() ? 0 : blocks_.back().end; }
+
+  /// As it is now, for take_bytes; none where something could not be read, which may be read later.
+  std::optional<std::string> to_bytes() const;
+  /// Takes these off the front of `bytes`; none if they are no such.
+  static std::optional<EventOrder> take_bytes(std::string_view& bytes);
+
   /// The earliest and the latest time; none if no time is finite.
   std::optional<std::array<double, 2>> span() const;
 
@@ -85,7 +98,15 @@ class EventOrder {
   std::vector<Block> blocks_;
 };
 
-/// Throws EventFault, or where nothing could be read what was thrown then.
-[[noreturn]] void refuse_fall(const EventOrder::Fall& fall);
+/// What EventIndexes has under the key of a file whose places end at `end`, else what `look` finds,
+/// which it has from then on. Of an empty key always that.
+EventOrder known_order(const std::string& index_key, std::int64_t end,
+                       const std::function<EventOrder()>& look);
+
+/// Nothing where the events of times in (after_s, until_s] lie among the others of theirs; else
+/// `refuse(fault, place)`, which throws, is called with what is wrong at which place, or where
+/// nothing could be read, what was thrown then is thrown again.
+void require_order(const EventOrder& order, double after_s, double until_s,
+                   const std::function<void(const EventFault&, std::int64_t)>& refuse);
 
 }  // namespace eventgan

@@ -3,16 +3,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <list>
 #include <map>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <string>
-#include <utility>
+#include <string_view>
 #include <vector>
 
 #include "stages/recordings/detail/event_check.h"
+#include "stages/recordings/detail/recently_used.h"
 #include "stages/recordings/detail/stored_recording.h"
 
 namespace eventgan {
@@ -36,43 +34,12 @@ class CompactEvents {
   std::map<std::int64_t, StoredEvent> others_;  ///< by their places
 };
 
-/// The events that were read last, whoever reads them, so that windows and threads share them:
-/// those used longest ago go where there are more than `most_events`, but never the latest. Thread
-/// safe: of several threads that ask for the same, one reads and the others wait for it.
-class RecentEvents {
- public:
-  explicit RecentEvents(std::int64_t most_events) : most_events_(most_events) {}
-
-  /// Of the whole process: sixteen million events, or 220 MB.
-  static RecentEvents& of_process();
-
-  using Events = std::shared_ptr<const CompactEvents>;
-  /// What `read` gives, unless it is kept. What it throws passes through.
-  Events get(const void* reader, std::size_t part, const std::function<CompactEvents()>& read);
-
-  /// Of a reader that is gone.
-  void forget(const void* reader);
-
- private:
-  using Key = std::pair<const void*, std::size_t>;
-  struct Entry {
-    std::mutex reading;
-    Events events;             ///< null until they are read; guarded by `reading`
-    std::int64_t counted = 0;  ///< of kept_
-    std::list<Key>::iterator age;
-  };
-  void drop(const Key& key);
-
-  const std::int64_t most_events_;
-  std::mutex mutex_;  ///< of all but `Entry::events`
-  std::map<Key, std::shared_ptr<Entry>> entries_;
-  std::list<Key> ages_;  ///< the one used last is first
-  std::int64_t kept_ = 0;
-};
+/// The events that were read last, of the whole process: sixteen million, or 220 MB.
+RecentlyUsed& recent_events();
 
 /// The events of a file that is read in parts: a table as a whole, the packets of AEDAT4. A part is
-/// read when one of its events is first asked for, and then as long as RecentEvents keeps it, not
-/// again.
+/// read when one of its events is first asked for, and then as long as recent_events() keeps it,
+/// not again.
 class EventParts : public EventStore {
  public:
   ~EventParts() override { recent_.forget(this); }
@@ -86,7 +53,7 @@ class EventParts : public EventStore {
 
  protected:
   /// `name` is for messages.
-  explicit EventParts(std::string name, RecentEvents& recent = RecentEvents::of_process())
+  explicit EventParts(std::string name, RecentlyUsed& recent = recent_events())
       : name_(std::move(name)), recent_(recent) {}
 
   /// While it is opened: the next part, which has events of times from `begin_s` to `end_s`.
@@ -94,18 +61,26 @@ class EventParts : public EventStore {
   /// The same, of what has been read already; nothing if it is empty.
   void add_part(CompactEvents events);
 
+  /// What the parts added so far tell; the second takes it from `bytes` instead of adding them,
+  /// false if it is not of so many parts.
+  void pack_parts(std::string& bytes) const;
+  bool unpack_parts(std::string_view bytes, std::size_t parts);
+
   /// The events of a part. If they are not as many as it was added with, the file has changed,
   /// which is told the caller as InputError. Thread safe.
   virtual CompactEvents read_part(std::size_t part) const = 0;
 
  private:
-  RecentEvents::Events part(std::size_t number) const;
+  using Events = std::shared_ptr<const CompactEvents>;
+  /// The part as it is kept, else what `read` gives.
+  Events kept_part(std::size_t number, const std::function<CompactEvents()>& read) const;
+  Events part(std::size_t number) const;
   /// Calls `take(events, begin, end)` for the places in each part that has some of these.
   template <class Take>
   void for_each_part(std::int64_t first, std::int64_t count, Take take) const;
 
   std::string name_;
-  RecentEvents& recent_;
+  RecentlyUsed& recent_;
   std::vector<std::int64_t> firsts_;  ///< the number of each part's first event
   std::int64_t count_ = 0;
   EventOrder order_;

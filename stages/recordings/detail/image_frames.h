@@ -10,6 +10,12 @@
 
 namespace eventgan {
 
+struct ColourFrame;  // stages/base/images/image_file.h
+
+/// Made grey (ITU-R BT.601). Of a grey image all three channels are one, and stay what they are;
+/// else `has_colour` becomes true.
+GreyImage grey_of(const ColourFrame& colour, bool& has_colour);
+
 /// Frames that are image files. The first one, which tells the size, is read on opening.
 class ImageFrames final : public FrameStore {
  public:

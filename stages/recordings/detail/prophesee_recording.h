@@ -19,8 +19,8 @@ namespace eventgan {
 /// triggers and other words are passed over.
 ///
 /// The whole file is read once on opening. Of it, what the words before each 128 KiB have said
-/// stays in memory, and the events as long as RecentEvents keeps them. Throws InputError "expected
-/// X, got Y, in PATH (byte 4567)".
+/// stays in memory, and the events as long as recent_events() keeps them. Throws InputError
+/// "expected X, got Y, in PATH (byte 4567)".
 StoredParts open_prophesee(const std::filesystem::path& path, const RecordingOptions& options = {});
 
 }  // namespace eventgan

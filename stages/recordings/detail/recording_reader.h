@@ -34,6 +34,8 @@ class RecordingInput {
   std::vector<std::string> hdf5_names() const;
   /// Whether it is an HDF5 file that has the object, such as "events/t".
   bool has_hdf5_object(const std::string& object) const;
+  /// Whether that is a dataset.
+  bool has_hdf5_dataset(const std::string& path) const;
 
  private:
   struct Hdf5File;
@@ -69,12 +71,12 @@ struct RecordingReader {
 };
 
 extern const RecordingReader kMvsecReader, kEventganReader, kEcdReader, kAedat4Reader, kDsecReader,
-    kM3edReader, kPropheseeReader, kTableReader;
+    kM3edReader, kEventUtilsReader, kV2eReader, kPropheseeReader, kTableReader;
 
 /// Every format's, in the order of kRecordingFormats.
-inline constexpr std::array kRecordingReaders{&kMvsecReader,     &kEventganReader, &kEcdReader,
-                                              &kAedat4Reader,    &kDsecReader,     &kM3edReader,
-                                              &kPropheseeReader, &kTableReader};
+inline constexpr std::array kRecordingReaders{
+    &kMvsecReader, &kEventganReader,   &kEcdReader, &kAedat4Reader,    &kDsecReader,
+    &kM3edReader,  &kEventUtilsReader, &kV2eReader, &kPropheseeReader, &kTableReader};
 static_assert(kRecordingReaders.size() == kRecordingFormats.size());
 
 }  // namespace eventgan

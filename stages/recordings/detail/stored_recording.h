@@ -61,6 +61,8 @@ struct StoredParts {
   std::function<bool(Event&)> move = nullptr;
   std::vector<std::string> notes = {};
   std::vector<std::string> warnings = {};  ///< Recording::warnings
+  /// Under which EventStore::order is known (event_index_key); empty: not at all.
+  std::string index_key = {};
 };
 
 /// The sensor's size: what the manifest gives, else what the file tells. Where they differ,

@@ -3,12 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <chrono>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
-#include <thread>
 #include <vector>
 
 #include "manifests/values/faults.h"
@@ -55,7 +51,7 @@ TEST(CompactEvents, HoldAnyNumbers) {
 /// Three parts, of times 1, 2, 2; 3; 5, 6 s.
 class TestParts final : public EventParts {
  public:
-  explicit TestParts(RecentEvents& recent) : EventParts("FILE", recent) {
+  explicit TestParts(RecentlyUsed& recent) : EventParts("FILE", recent) {
     for (const auto& times_s : parts)
       add_part(std::ssize(times_s), times_s.front(), times_s.back());
   }
@@ -77,7 +73,7 @@ std::vector<double> times_of(const std::vector<StoredEvent>& events) {
 }
 
 TEST(EventParts, AreReadWhereTheyAreAskedForAndOnce) {
-  RecentEvents recent(100);
+  RecentlyUsed recent(100);
   const TestParts events(recent);
   EXPECT_EQ(events.count(), 6);
   EXPECT_THAT(events.reads, IsEmpty());
@@ -90,7 +86,7 @@ TEST(EventParts, AreReadWhereTheyAreAskedForAndOnce) {
 }
 
 TEST(EventParts, TellInWhichPartTheEventsBehindATimeBegin) {
-  RecentEvents recent(100);
+  RecentlyUsed recent(100);
   const TestParts events(recent);
   const std::pair<double, std::int64_t> expected[] = {{0.5, 0}, {1, 0}, {1.5, 0}, {2, 3}, {2.5, 3},
                                                       {3, 4},   {4, 4}, {5, 4},   {6, 6}, {9, 6}};
@@ -102,7 +98,7 @@ TEST(EventParts, TellInWhichPartTheEventsBehindATimeBegin) {
 }
 
 TEST(EventParts, ThatAreNotAsTheyWereAreRefused) {
-  RecentEvents recent(100);
+  RecentlyUsed recent(100);
   TestParts events(recent);
   events.parts[1].push_back(4);
   EXPECT_THAT(times_of(events.read(0, 3)), ElementsAre(1, 2, 2));
@@ -111,7 +107,7 @@ TEST(EventParts, ThatAreNotAsTheyWereAreRefused) {
 }
 
 TEST(EventParts, ThoseUsedLongestAgoGo) {
-  RecentEvents recent(4);
+  RecentlyUsed recent(4);
   const TestParts events(recent);
   events.read(0, 4);  // parts 0 and 1: four events
   events.read(0, 1);
@@ -126,75 +122,12 @@ TEST(EventParts, ThoseUsedLongestAgoGo) {
   EXPECT_THAT(events.reads, ElementsAre(0, 1, 2, 1, 0));
 }
 
-TEST(RecentEvents, TheLatestStaysHoweverLargeItIs) {
-  RecentEvents recent(1);
+TEST(EventParts, TheLatestStaysHoweverLargeItIs) {
+  RecentlyUsed recent(1);
   const TestParts events(recent);
   events.read(0, 1);
   events.read(1, 2);
   EXPECT_THAT(events.reads, ElementsAre(0));
-}
-
-TEST(RecentEvents, WhatIsBeingReadStays) {
-  RecentEvents recent(1);
-  const auto fail = []() -> CompactEvents { throw InputError("is read"); };
-  recent.get(&recent, 0, [&] {  // others read more than are kept meanwhile
-    for (std::size_t part = 1; part < 4; ++part) {
-      recent.get(&recent, part, [] { return events_at({7}); });
-    }
-    return events_at({8});
-  });
-  EXPECT_EQ(recent.get(&recent, 0, fail)->times_s()[0], 8);
-  for (std::size_t part = 1; part < 4; ++part) {
-    EXPECT_THAT([&] { recent.get(&recent, part, fail); }, ThrowsMessage<InputError>("is read"));
-  }
-}
-
-TEST(RecentEvents, WhatCouldNotBeReadIsReadAgain) {
-  RecentEvents recent(10);
-  const auto fail = []() -> CompactEvents { throw InputError("unreadable"); };
-  EXPECT_THAT([&] { recent.get(&recent, 0, fail); }, ThrowsMessage<InputError>("unreadable"));
-  EXPECT_EQ(recent.get(&recent, 0, [] { return events_at({7}); })->times_s()[0], 7);
-}
-
-TEST(RecentEvents, OfAReaderThatIsGoneAreForgotten) {
-  RecentEvents recent(10);
-  const int readers[2] = {};
-  for (const int& reader : readers) {
-    for (std::size_t part = 0; part < 3; ++part) {
-      recent.get(&reader, part, [] { return events_at({7}); });
-    }
-  }
-  recent.forget(&readers[0]);
-  const auto fail = []() -> CompactEvents { throw InputError("is read"); };
-  EXPECT_THAT([&] { recent.get(&readers[0], 1, fail); }, ThrowsMessage<InputError>("is read"));
-  EXPECT_EQ(recent.get(&readers[1], 1, fail)->size(), 1);
-}
-
-TEST(RecentEvents, OfManyThreadsOneReads) {
-  RecentEvents recent(3);
-  std::atomic<int> reads = 0, wrong = 0;
-  const auto run = [](const auto& body) {
-    std::vector<std::thread> threads;
-    for (int i = 0; i < 8; ++i) threads.emplace_back(body);
-    for (std::thread& thread : threads) thread.join();
-  };
-  run([&] {
-    const auto events = recent.get(&recent, 0, [&] {
-      ++reads;
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-      return events_at({1, 2});
-    });
-    wrong += events->size() != 2;
-  });
-  EXPECT_EQ(reads, 1);
-  run([&] {  // more than are kept
-    for (std::size_t i = 0; i < 200; ++i) {
-      const auto time_s = static_cast<double>(i % 7);
-      const auto events = recent.get(&reads, i % 7, [&] { return events_at({time_s, 9}); });
-      wrong += events->times_s()[0] != time_s;
-    }
-  });
-  EXPECT_EQ(wrong, 0);
 }
 
 }  // namespace

@@ -329,5 +329,64 @@ TEST_F(Hdf5RecordingTest, RefusesWhatIsNoHdf5File) {
               ThrowsMessage<InputError>(HasSubstr("got a folder")));
 }
 
+/// A file of v2e's: three events of 3x2 pixels (width x height), in rows t, x, y, p.
+class V2eTest : public ::testing::Test {
+ protected:
+  std::unique_ptr<Recording> open() {
+    std::filesystem::remove(path_);  // not over the file of a recording that is open
+    testing::write_hdf5(path_, datasets_);
+    return open_recording(path_, std::nullopt, options_);
+  }
+
+  using Numbers = std::vector<std::int64_t>;
+  testing::TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "v2e.h5";
+  std::map<std::string, testing::Hdf5Dataset> datasets_ = {
+      {"events", {{3, 4}, Numbers{1000, 2, 1, 1, 2500, 0, 1, 0, 2500, 1, 0, 1}}}};
+  RecordingOptions options_;
+};
+
+TEST_F(V2eTest, HasMicrosecondsFirstAndAsksForTheSize) {
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("expected the sensor's size")));
+  options_.sensor = ImageSize{2, 3};
+  const auto recording = open();
+  EXPECT_EQ(find_recording_format(path_), RecordingFormat::kV2e);
+  EXPECT_EQ(recording->frame_count(), 0);
+  EXPECT_EQ(recording->event_span(), (std::array{0.001, 0.0025}));
+  EXPECT_THAT(
+      recording->events_in(0, 1),
+      ElementsAre(Event{2, 1, 0.001, true}, Event{0, 1, 0.0025, false}, Event{1, 0, 0.0025, true}));
+  EXPECT_THAT(recording->events_around(0.002, 5, 1),
+              ElementsAre(Event{2, 1, 0.001, true}, Event{0, 1, 0.0025, false}));
+}
+
+TEST_F(V2eTest, FramesTellTheSize) {
+  datasets_["frame"] = {{2, 2, 3},
+                        std::vector<std::uint8_t>{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}};
+  datasets_["frame_ts"] = {{2}, Numbers{500, 2500}};
+  datasets_["frame_idx"] = {{2}, Numbers{0, 3}};
+  const auto recording = open();
+  EXPECT_EQ(recording->size(), (ImageSize{2, 3}));
+  EXPECT_EQ(recording->frame_time_s(1), 0.0025);
+  EXPECT_THAT(recording->frame(1).pixels, ElementsAre(7, 8, 9, 10, 11, 12));
+  EXPECT_EQ(recording->events_between(0, 1).size(), 3u);
+  EXPECT_EQ(recording->flow(0), std::nullopt);
+  options_.sensor = ImageSize{5, 5};  // frames of another size are none
+  const auto larger = open();
+  EXPECT_EQ(larger->frame_count(), 0);
+  EXPECT_THAT(larger->warnings(), ElementsAre(HasSubstr("a sensor of 3x2")));
+}
+
+TEST_F(V2eTest, OtherTablesAreRefused) {
+  options_.sensor = ImageSize{2, 3};
+  datasets_["events"] = {{2, 3}, Numbers{1, 2, 3, 4, 5, 6}};
+  const auto refuses = [&](const char* what) {
+    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr(what)));
+  };
+  refuses("expected whole numbers [events, 4] of t, x, y, p, got int64 [2, 3]");
+  datasets_["events"] = {{1, 4}, std::vector<double>{0.5, 1, 1, 1}};
+  refuses("expected whole numbers [events, 4] of t, x, y, p, got float64 [1, 4]");
+}
+
 }  // namespace
 }  // namespace eventgan

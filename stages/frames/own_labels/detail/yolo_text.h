@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -22,6 +23,18 @@ YoloSchema parse_yolo_yaml(const std::string& text, const std::string& path);
 
 /// classes.txt: a name a line. Throws InputError if there is none, one is empty or there twice.
 YoloSchema parse_yolo_classes(std::string_view text, const std::string& path);
+
+/// Which file of a folder names the classes: data.yaml, classes.txt, obj.names of CVAT,
+/// _darknet.labels of Roboflow, or the only other YAML file with names; empty if there is none.
+std::string yolo_names_file(const std::filesystem::path& folder);
+
+/// Of such a file, by its extension.
+YoloSchema parse_yolo_names(const std::string& text, const std::string& path);
+
+/// The highest class of an image's text; -1: there is none. Where no file names the classes, their
+/// numbers do.
+int highest_yolo_class(std::string_view text);
+YoloSchema numbered_yolo_classes(int highest);
 
 /// An image's text (kYoloReader): its boxes, and with joints its persons, in pixels of an image of
 /// that size; `original` is the text. An outline among boxes (class and at least three points, of a

@@ -268,5 +268,55 @@ TEST_F(RecordingLabelsTest, NpyIsStrict) {
   refuses("g.npy", boxes({}), {"expected {\"0\": \"car\", ...}, got \"car\""});
 }
 
+class WindowLabelsTest : public ::testing::Test {
+ protected:
+  RecordingLabels read(const std::string& text) {
+    testing::write_file(file_, text);
+    return read_window_labels(file_, ImageSize{100, 200}, 1.5);
+  }
+
+  testing::TemporaryFolder folder_;
+  std::filesystem::path file_ = folder_ / "yolo/train/a.txt";
+};
+
+TEST_F(WindowLabelsTest, AreSharesOfTheSensorAtTheWindowsTime) {
+  const RecordingLabels labels = read("1 0.5 0.5 0.1 0.2\n0 0.25 0.5 0.5 1\n");
+  EXPECT_THAT(labels.class_names, ElementsAre("0", "1"));
+  ASSERT_EQ(labels.annotations.size(), 1u);
+  const Annotation& window = labels.annotations.at(1.5);
+  ASSERT_EQ(window.boxes.size(), 2u);
+  EXPECT_EQ(window.boxes[0], (Box{.class_id = 1, .xyxy = {90, 40, 110, 60}}));
+  EXPECT_EQ(window.boxes[1], (Box{.class_id = 0, .xyxy = {0, 0, 100, 100}}));
+  EXPECT_EQ(window.original, "1 0.5 0.5 0.1 0.2\n0 0.25 0.5 0.5 1\n");
+  EXPECT_THAT(read("").annotations.at(1.5).boxes, IsEmpty());
+}
+
+TEST_F(WindowLabelsTest, ClassesAreNamedBesideOrAboveThem) {
+  EXPECT_THAT(window_label_companions(file_), IsEmpty());
+  testing::write_file(folder_ / "yolo/classes.txt", "person\n");
+  EXPECT_THAT(read("0 0.5 0.5 0.1 0.2").class_names, ElementsAre("person"));
+  testing::write_file(folder_ / "yolo/train/data.yaml", "names: [man, dog]\n");
+  EXPECT_THAT(read("0 0.5 0.5 0.1 0.2").class_names, ElementsAre("man", "dog"));
+  EXPECT_THAT(window_label_companions(file_), ElementsAre(folder_ / "yolo/train/data.yaml"));
+}
+
+TEST_F(WindowLabelsTest, MistakesAreNamedByTheirLine) {
+  EXPECT_THAT([&] { read("0 0.5 0.5 0.1 0.2\n0 0.5 nan 0.1 0.2\n"); },
+              ThrowsMessage<InputError>(HasSubstr("a.txt:2")));
+  EXPECT_THAT([&] { read("0 0.5 0.5 0.1\n"); },
+              ThrowsMessage<InputError>(HasSubstr("expected 5 columns, got 4")));
+}
+
+TEST_F(WindowLabelsTest, OtherTextsAreNone) {
+  const auto is_text = [&](const char* text) {
+    testing::write_file(file_, text);
+    return is_window_label_text(file_);
+  };
+  EXPECT_TRUE(is_text(""));
+  EXPECT_TRUE(is_text("0 0.5 0.5 0.1 0.2\n"));
+  EXPECT_FALSE(is_text("recorded on a Monday\n"));
+  EXPECT_FALSE(is_text("0.003811 96 133 0\n"));
+}
+
 }  // namespace
 }  // namespace eventgan

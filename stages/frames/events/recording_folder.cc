@@ -1,0 +1,212 @@
+#include "stages/frames/events/recording_folder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "manifests/documents/detail/json_text.h"
+#include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
+#include "stages/frames/events/recording_labels.h"
+#include "stages/frames/source_folders.h"
+#include "stages/recordings/recording.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A manifest of this program may lie beside a recording under its name.
+bool is_manifest(const fs::path& file) try {
+  if (file.extension() != ".json") return false;
+  const nlohmann::ordered_json document =
+      parse_json_data(read_text_file(file), file.filename().string(), JsonComments::kPassedOver);
+  return document.is_object() && document.value("format", "") == "eventgan-manifest";
+} catch (const std::exception&) {  // reported when it is read as labels
+  return false;
+}
+
+/// Prophesee's NAME_bbox.npy is that of NAME_td.dat, NAME_td.dat.h5 and NAME.raw.
+std::string bbox_name(std::string name) {
+  for (const std::string_view events : {std::string_view("_td.dat"), std::string_view("_td")}) {
+    if (!name.ends_with(events)) continue;
+    name.resize(name.size() - events.size());
+    break;
+  }
+  return name + "_bbox.npy";
+}
+
+bool is_label_file(const fs::path& file) {
+  return file.extension() == ".csv" || file.extension() == ".json" ||
+         file.filename().string().ends_with("_bbox.npy");
+}
+
+class FolderSearch {
+ public:
+  FolderSearch(const SourceSpec& spec, const fs::path& base) : options_(spec.recording) {
+    find_recordings(spec, base);
+    find_labels(spec, base);
+  }
+
+  RecordingFolder take() { return std::move(found_); }
+
+ private:
+  void add(const std::string& name, const std::string& path, RecordingFormat format) {
+    const auto [recorded, is_new] = found_.recordings.try_emplace(name);
+    const auto is_csv = [](const fs::path& file) { return file.extension() == ".csv"; };
+    if (!is_new && is_csv(path) != is_csv(recorded->second.path)) {  // tools write one beside it
+      found_.notes.push_back("left out, since the recording is there in another file: " +
+                             (is_csv(path) ? path : recorded->second.path));
+      if (is_csv(path)) return;
+    } else if (!is_new) {
+      throw InputError("expected recordings of different names, got " + name + " twice, in " +
+                       path);
+    }
+    recorded->second.path = path;
+    recorded->second.format = format;
+  }
+
+  void find_recordings(const SourceSpec& spec, const fs::path& base) {
+    const fs::path root = base / spec.root;
+    /// `written`: as FrameRef::path is.
+    const auto spelled = [&](const fs::path& written) {
+      const fs::path file = event_file(base / written, options_);
+      return (written / file.lexically_relative(base / written)).generic_string();
+    };
+    if (const auto format = find_recording_format(root, options_)) {
+      fs::path named = fs::absolute(root).lexically_normal();
+      if (!named.has_filename()) named = named.parent_path();
+      const bool is_folder = fs::is_directory(root);
+      add((is_folder ? named.filename() : named.stem()).string(),
+          is_folder ? spelled(spec.root) : spec.root, *format);
+      default_labels_ = named.parent_path();
+      return;
+    }
+    if (fs::is_regular_file(root)) throw InputError(recording_fault(root, options_).reason);
+    const SourceRoot folder(spec.root, base);
+    folder.require_folder("");
+    std::vector<std::string> left_out;
+    std::string reason;  // of the last
+    for (const std::string& name : folder.folders_in("")) {
+      if (const auto format = find_recording_format(folder.on_disk(name), options_)) {
+        add(name, spelled(folder.written(name)), *format);
+      } else {
+        left_out.push_back(name);
+      }
+    }
+    for (const fs::path name : folder.files_in("")) {
+      if (const auto format = find_recording_format(folder.on_disk(name.string()), options_)) {
+        add(name.stem().string(), folder.written(name.string()), *format);
+        continue;
+      }
+      const RecordingFault fault = recording_fault(folder.on_disk(name.string()), options_);
+      if (fault.is_recording) {
+        found_.unreadable.push_back(fault.reason);
+        found_.unopened.emplace(name.stem().string(), fault.reason);
+      } else if (!is_label_file(name)) {
+        left_out.push_back(name.string());
+        reason = fault.reason;
+      }
+    }
+    if (found_.recordings.empty()) {
+      std::vector<std::string_view> titles;
+      for (const RecordingFormatRow& row : kRecordingFormats) titles.push_back(row.title);
+      if (!found_.unreadable.empty()) reason = found_.unreadable[0];
+      throw InputError(fmt::format(
+          "expected a recording of an event camera ({}), or a folder of them, got none, in {}{}",
+          fmt::join(titles, ", "), root.string(), reason.empty() ? "" : " (" + reason + ")"));
+    }
+    std::erase_if(left_out, [&](const fs::path& name) {  // labels, or told of as no such
+      const auto recorded = found_.recordings.find(name.stem().string());
+      return is_window_label_file(name) && recorded != found_.recordings.end() &&
+             recorded->second.format == RecordingFormat::kTable;
+    });
+    if (!left_out.empty()) {
+      found_.notes.push_back(counted(left_out, "entry", " left out in " + folder.written("")));
+    }
+    default_labels_ = root;
+  }
+
+  void find_labels(const SourceSpec& spec, const fs::path& base) {
+    const fs::path named = base / spec.annotations.value_or("");
+    if (spec.annotations && !fs::is_directory(named)) {
+      if (found_.recordings.size() > 1) {
+        throw UsageError(
+            "annotations: expected a folder of NAME.csv, NAME.json, NAME_bbox.npy or NAME.txt "
+            "for " +
+            std::to_string(found_.recordings.size()) + " recordings, got a file, in " + spec.root);
+      }
+      found_.recordings.begin()->second.set_labels(*spec.annotations, named);
+      return;
+    }
+    const fs::path folder = spec.annotations ? named : default_labels_;
+    for (auto& [name, recorded] : found_.recordings) {
+      std::vector<fs::path> files = {folder / (name + ".csv"), folder / (name + ".json"),
+                                     folder / bbox_name(name)};
+      if (recorded.format == RecordingFormat::kTable) files.push_back(folder / (name + ".txt"));
+      // A table of events is a .csv, too.
+      const fs::path own = fs::absolute(base / recorded.path).lexically_normal();
+      std::erase_if(files, [&](const fs::path& file) {
+        return !fs::exists(file) || is_manifest(file) ||
+               fs::absolute(file).lexically_normal() == own;
+      });
+      std::erase_if(files, [&](const fs::path& file) {
+        const bool is_other = (file.extension() == ".csv" && !is_label_table(file)) ||
+                              (is_window_label_file(file) && !is_window_label_text(file));
+        if (is_other) {
+          found_.notes.push_back("no labels, since its first line has none of their columns: " +
+                                 file.string());
+        }
+        return is_other;
+      });
+      if (files.size() > 1) {
+        throw InputError("expected labels in one file, got two, in " + files[0].string() + " and " +
+                         files[1].string());
+      }
+      if (!files.empty()) recorded.set_labels(written(files[0], spec, base), files[0]);
+    }
+    const auto is_labelled = [](const auto& entry) { return !entry.second.label_file.empty(); };
+    if (std::ranges::none_of(found_.recordings, is_labelled)) {
+      if (!spec.annotations) return;
+      throw InputError(
+          "expected NAME.csv, NAME.json, NAME_bbox.npy or NAME.txt of a recording, got none, in " +
+          folder.string());
+    }
+    std::vector<std::string> without;
+    std::erase_if(found_.recordings, [&](const auto& entry) {
+      if (is_labelled(entry)) return false;
+      without.push_back(entry.first);
+      return true;
+    });
+    if (!without.empty()) {
+      found_.notes.push_back(
+          counted(without, "recording", " without labels left out in " + spec.root));
+    }
+  }
+
+  /// Relative to the manifest where the root is.
+  static std::string written(const fs::path& file, const SourceSpec& spec, const fs::path& base) {
+    if (spec.annotations) return (fs::path(*spec.annotations) / file.filename()).generic_string();
+    if (fs::path(spec.root).is_absolute()) return file.generic_string();
+    return file.lexically_normal()
+        .lexically_relative(fs::absolute(base).lexically_normal())
+        .generic_string();
+  }
+
+  RecordingOptions options_;
+  RecordingFolder found_;
+  fs::path default_labels_;  ///< where labels lie unless the manifest says
+};
+
+}  // namespace
+
+RecordingFolder look_into_recordings(const SourceSpec& spec, const fs::path& base) {
+  return FolderSearch(spec, base).take();
+}
+
+}  // namespace eventgan
