@@ -11,8 +11,8 @@
 
 #include "stages/base/processor_clones.h"
 
-#if defined(__SSE2__)
-#include <emmintrin.h>
+#if defined(__x86_64__)
+#include <immintrin.h>
 #endif
 
 namespace eventgan {
@@ -87,7 +87,7 @@ std::size_t value_of(Literal literal) { return literal & 0xff; }
 /// Bit i tells whether bytes[i] is not zero.
 std::uint64_t nonzero_of_64(const std::byte* bytes) {
   std::uint64_t nonzero = 0;
-#if defined(__SSE2__)
+#if defined(__x86_64__)
   for (int i = 0; i < 4; ++i) {
     const __m128i some = _mm_loadu_si128(reinterpret_cast<const __m128i*>(bytes) + i);
     const int zeros = _mm_movemask_epi8(_mm_cmpeq_epi8(some, _mm_setzero_si128()));
@@ -99,18 +99,18 @@ std::uint64_t nonzero_of_64(const std::byte* bytes) {
   return nonzero;
 }
 
-constexpr int kAtOnce = 4;
+constexpr int kAtOnce = 16;
 
-/// Writes the literals of a block to `found`, which has room for kCoded + kAtOnce; returns their
-/// number. Some are taken at once, needed or not: a loop that ends with the last one of each 64
-/// bytes is hard to predict.
-EVENTGAN_CLONES std::size_t find_literals(std::span<const std::byte> block, Literal* found) {
-  const Literal* const first = found;
-  const auto take = [&](const std::byte* bytes, std::size_t place) {
+/// Adds the literals of a block from a place on to `found`, which has room for kCoded + kAtOnce;
+/// returns where the next one goes. Some are taken at once, needed or not: a loop that ends with
+/// the last one of each 64 bytes is hard to predict.
+EVENTGAN_CLONES Literal* find_literals(std::span<const std::byte> block, std::size_t place,
+                                       Literal* found) {
+  const auto take = [&](const std::byte* bytes) {
     std::uint64_t nonzero = nonzero_of_64(bytes);
     const int count = std::popcount(nonzero);
-    for (int done = 0; done < count; done += kAtOnce) {
-      for (int i = 0; i < kAtOnce; ++i, nonzero &= nonzero - 1) {
+    for (int done = 0; done < count; done += 4) {
+      for (int i = 0; i < 4; ++i, nonzero &= nonzero - 1) {
         const int here = std::countr_zero(nonzero) & 63;
         found[done + i] =
             static_cast<Literal>(place + here) << 8 | std::to_integer<Literal>(bytes[here]);
@@ -118,12 +118,43 @@ EVENTGAN_CLONES std::size_t find_literals(std::span<const std::byte> block, Lite
     }
     found += count;
   };
-  std::size_t place = 0;
-  for (; place + 64 <= block.size(); place += 64) take(block.data() + place, place);
+  for (; place + 64 <= block.size(); place += 64) take(block.data() + place);
   std::array<std::byte, 64> rest{};
   std::ranges::copy(block.subspan(place), rest.begin());
-  take(rest.data(), place);
-  return static_cast<std::size_t>(found - first);
+  take(rest.data());
+  return found;
+}
+
+#if defined(__x86_64__)
+/// The same, 16 bytes at a time, for as many of them as there are; `place` is then after these.
+__attribute__((target("avx512f,popcnt"))) Literal* find_sixteens(std::span<const std::byte> block,
+                                                                 std::size_t& place,
+                                                                 Literal* found) {
+  const __m512i step = _mm512_set1_epi32(16 << 8);
+  std::array<Literal, 16> first;
+  for (Literal i = 0; i < 16; ++i) first[i] = static_cast<Literal>(place + i) << 8;
+  __m512i places = _mm512_loadu_si512(first.data());
+  for (; place + 16 <= block.size(); place += 16, places = _mm512_add_epi32(places, step)) {
+    const __m512i bytes = _mm512_maskz_cvtepu8_epi32(
+        0xffff, _mm_loadu_si128(reinterpret_cast<const __m128i*>(block.data() + place)));
+    const __mmask16 nonzero = _mm512_test_epi32_mask(bytes, bytes);
+    const __m512i some = _mm512_maskz_compress_epi32(nonzero, _mm512_or_si512(bytes, places));
+    _mm512_storeu_si512(found, some);
+    found += std::popcount(static_cast<unsigned>(nonzero));
+  }
+  return found;
+}
+
+const bool kHasAvx512 = __builtin_cpu_supports("avx512f");
+#endif
+
+std::size_t find_literals(std::span<const std::byte> block, Literal* found) {
+  std::size_t place = 0;
+  Literal* end = found;
+#if defined(__x86_64__)
+  if (kHasAvx512) end = find_sixteens(block, place, end);
+#endif
+  return static_cast<std::size_t>(find_literals(block, place, end) - found);
 }
 
 /// The symbol of a match's length, 3..258 (RFC 1951, 3.2.5): 8 lengths have one each, then four
@@ -234,10 +265,31 @@ struct RunDeflater::Codes {
       out.write(bits);
     };
     std::size_t next = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      write_with_zeros(place_of(found[i]) - next, literals[value_of(found[i])]);
-      next = place_of(found[i]) + 1;
+    const auto write_one = [&](Literal literal) {
+      write_with_zeros(place_of(literal) - next, literals[value_of(literal)]);
+      next = place_of(literal) + 1;
+    };
+    std::size_t i = 0;
+    for (; i + 2 <= count; i += 2) {  // two at once, since a write waits for the one before it
+      const Literal one = found[i], two = found[i + 1];
+      const std::size_t zeros_one = place_of(one) - next;
+      const std::size_t zeros_two = place_of(two) - place_of(one) - 1;
+      if (std::max(zeros_one, zeros_two) <= kRun) [[likely]] {
+        const std::array parts{runs[zeros_one], literals[value_of(one)], runs[zeros_two],
+                               literals[value_of(two)]};
+        if (parts[0].count + parts[1].count + parts[2].count + parts[3].count <= BitWriter::kMost)
+            [[likely]] {
+          Bits both;
+          for (const Bits& part : parts) both.append(part);
+          out.write(both);
+          next = place_of(two) + 1;
+          continue;
+        }
+      }
+      write_one(one);
+      write_one(two);
     }
+    if (i < count) write_one(found[i]);
     write_with_zeros(block_size - next, end);
     writer = out;
   }
