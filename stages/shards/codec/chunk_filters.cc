@@ -1,6 +1,5 @@
 #include "stages/shards/codec/chunk_filters.h"
 
-#include <isa-l/igzip_lib.h>
 #include <libdeflate.h>
 
 #include <algorithm>
@@ -14,10 +13,6 @@
 #include <string>
 
 #include "stages/base/processor_clones.h"
-
-#if defined(__x86_64__)
-#include <immintrin.h>
-#endif
 
 namespace eventgan {
 namespace {
@@ -47,106 +42,36 @@ EVENTGAN_CLONES void split_into_planes(std::span<const std::uint32_t> numbers, s
   split(numbers, planes, plane_size);
 }
 
-namespace {
-
-/// ISA-L 2.30 leaves the upper halves of the vector registers in use, and until they are cleared
-/// whatever was compiled for SSE takes several times as long on this thread.
-#if defined(__x86_64__)
-__attribute__((target("avx"))) void clear_with_avx() { _mm256_zeroupper(); }
-const bool kHasAvx = __builtin_cpu_supports("avx");
-void clear_upper_halves() {
-  if (kHasAvx) clear_with_avx();
+Deflater::Deflater(int level) {
+  if (level == 1) {
+    runs_ = std::make_unique<RunDeflater>();
+  } else if (library_.reset(libdeflate_alloc_compressor(level)); !library_) {
+    throw std::bad_alloc();
+  }
 }
-#else
-void clear_upper_halves() {}
-#endif
 
-}  // namespace
-
-struct Deflater::Compressor {
-  /// ISA-L's level 0 with codes of our own. Its levels 1 and 2 (2.30) hash what a register holds
-  /// from before, the stream's address, so that the same bytes are deflated to others now and then.
-  /// All zero from the start, since isal_deflate_stateless_init() leaves fields as they were, among
-  /// them hist_bits, the reach of matches.
-  struct Isal {
-    isal_zstream stream{};
-    isal_huff_histogram histogram{};
-    isal_hufftables codes{};
-  };
-
-  explicit Compressor(int level) {
-    if (level == 1) {
-      isal = std::make_unique<Isal>();
-    } else if (library = libdeflate_alloc_compressor(level); library == nullptr) {
-      throw std::bad_alloc();
-    }
-  }
-  ~Compressor() { libdeflate_free_compressor(library); }
-  Compressor(const Compressor&) = delete;
-  Compressor& operator=(const Compressor&) = delete;
-
-  /// The shortest codes for a sample of the bytes: of every eighth block, of few blocks for all.
-  /// That finds as good ones as all blocks do, for an eighth of the time.
-  void choose_codes(std::span<const std::byte> bytes) {
-    constexpr std::size_t kBlock = std::size_t{1} << 15;  // the reach of matches
-    const std::size_t step = kBlock * std::clamp<std::size_t>(bytes.size() / kBlock / 8, 1, 8);
-    isal->histogram = {};
-    for (std::size_t at = 0; at < bytes.size(); at += step) {
-      const std::span<const std::byte> block =
-          bytes.subspan(at, std::min(kBlock, bytes.size() - at));
-      isal_update_histogram(input_of(block), static_cast<int>(block.size()), &isal->histogram);
-    }
-    isal_create_hufftables(&isal->codes, &isal->histogram);
-  }
-
-  /// Both return the size of what they wrote; 0 if `room` did not do.
-  std::size_t with_isal(std::span<const std::byte> bytes, std::span<std::byte> room) {
-    choose_codes(bytes);
-    isal_zstream& stream = isal->stream;
-    isal_deflate_stateless_init(&stream);
-    stream.hufftables = &isal->codes;
-    stream.gzip_flag = IGZIP_ZLIB;
-    stream.end_of_stream = 1;
-    stream.next_in = input_of(bytes);
-    stream.avail_in = static_cast<std::uint32_t>(bytes.size());
-    stream.next_out = reinterpret_cast<std::uint8_t*>(room.data());
-    stream.avail_out = static_cast<std::uint32_t>(room.size());
-    const int result = isal_deflate_stateless(&stream);
-    clear_upper_halves();
-    return result == COMP_OK ? stream.total_out : 0;
-  }
-  std::size_t with_libdeflate(std::span<const std::byte> bytes, std::span<std::byte> room) {
-    return libdeflate_zlib_compress(library, bytes.data(), bytes.size(), room.data(), room.size());
-  }
-
-  /// ISA-L's interface is not const, but it only reads its input.
-  static std::uint8_t* input_of(std::span<const std::byte> bytes) {
-    return reinterpret_cast<std::uint8_t*>(const_cast<std::byte*>(bytes.data()));
-  }
-
-  libdeflate_compressor* library = nullptr;  ///< none at level 1
-  std::unique_ptr<Isal> isal;                ///< at level 1
-};
-
-Deflater::Deflater(int level) : compressor_(std::make_unique<Compressor>(level)) {}
+void Deflater::FreeLibrary::operator()(libdeflate_compressor* library) const {
+  libdeflate_free_compressor(library);
+}
 
 Deflater::~Deflater() = default;
 
 std::span<const std::byte> Deflater::deflate(std::span<const std::byte> bytes) {
-  // For both libraries: at worst they store the bytes as they are.
-  const std::size_t bound = libdeflate_zlib_compress_bound(nullptr, bytes.size());
-  if (bound > std::numeric_limits<std::uint32_t>::max()) {
+  const std::size_t bound = runs_ ? RunDeflater::bound(bytes.size())
+                                  : libdeflate_zlib_compress_bound(library_.get(), bytes.size());
+  if (bytes.size() > std::numeric_limits<std::uint32_t>::max()) {
     throw std::length_error("expected at most 4 GiB to compress, got " +
                             std::to_string(bytes.size()) + " bytes");
   }
-  if (buffer_.size() < bound) buffer_.resize(bound);
-  // Always the same room for the same input, however large the buffer has grown.
-  const std::span<std::byte> room(buffer_.data(), bound);
-  const std::size_t size = compressor_->library == nullptr
-                               ? compressor_->with_isal(bytes, room)
-                               : compressor_->with_libdeflate(bytes, room);
-  if (size == 0) throw std::logic_error("a compressor broke libdeflate's bound");
-  return room.first(size);
+  if (room_size_ < bound) {  // not cleared: what is never written to takes no memory
+    room_ = std::make_unique_for_overwrite<std::byte[]>(bound);
+    room_size_ = bound;
+  }
+  const std::size_t size = runs_ ? runs_->deflate(bytes, room_.get())
+                                 : libdeflate_zlib_compress(library_.get(), bytes.data(),
+                                                            bytes.size(), room_.get(), bound);
+  if (size == 0) throw std::logic_error("libdeflate broke its own bound");
+  return {room_.get(), size};
 }
 
 namespace {

@@ -6,6 +6,10 @@
 #include <span>
 #include <vector>
 
+#include "stages/shards/codec/run_deflate.h"
+
+struct libdeflate_compressor;
+
 namespace eventgan {
 
 // HDF5's filter shuffle: all first bytes (the lowest, little endian) of a chunk's numbers, then all
@@ -18,11 +22,9 @@ void split_into_planes(std::span<const std::uint16_t> numbers, std::byte* planes
 void split_into_planes(std::span<const std::uint32_t> numbers, std::byte* planes,
                        std::size_t plane_size);
 
-/// Compresses into zlib's format, again and again with the same memory: at level 1 with ISA-L,
-/// three times as fast as libdeflate at its quickest and 5 to 12 % larger; above with libdeflate.
-/// What comes out depends on the bytes and the level alone, not on what was compressed before, nor
-/// on addresses; ISA-L's also on whether the processor has SSE4.2 (its kernels for that, AVX, and
-/// AVX2 give the same bytes). Thread safety: one thread at a time.
+/// Compresses into zlib's format, again and again with the same memory: at level 1 by runs of zeros
+/// alone (run_deflate.h), above with libdeflate. What comes out depends on the bytes and the level
+/// alone. Thread safety: one thread at a time.
 class Deflater {
  public:
   /// `level` 1..9. Throws std::bad_alloc.
@@ -36,9 +38,13 @@ class Deflater {
   std::span<const std::byte> deflate(std::span<const std::byte> bytes);
 
  private:
-  struct Compressor;
-  std::unique_ptr<Compressor> compressor_;
-  std::vector<std::byte> buffer_;  ///< as large as the worst case of the largest input so far
+  struct FreeLibrary {
+    void operator()(libdeflate_compressor* library) const;
+  };
+  std::unique_ptr<RunDeflater> runs_;  ///< at level 1
+  std::unique_ptr<libdeflate_compressor, FreeLibrary> library_;
+  std::unique_ptr<std::byte[]> room_;  ///< for the worst case of the largest input so far
+  std::size_t room_size_ = 0;
 };
 
 /// The checksum of HDF5's filter fletcher32: Fletcher's sums modulo 65535 over big-endian 16-bit
