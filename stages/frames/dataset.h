@@ -12,7 +12,7 @@
 #include "manifests/values/frames.h"
 #include "manifests/values/job.h"
 #include "manifests/values/labels.h"
-#include "manifests/values/outline_counts.h"
+#include "manifests/values/outlines.h"
 
 namespace eventgan {
 
