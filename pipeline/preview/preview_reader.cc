@@ -135,10 +135,10 @@ struct PreviewReader::State {
     }
     const auto number = static_cast<std::size_t>(source - manifest.sources.data());
     if (clips.empty() || clips_of != std::pair(reader->header().plan_hash, number)) {
-      clips.clear();
-      clips.resize(manifest.sources.size());
-      clips[number] = open_dataset(*source, manifest.directory);
-      make_clips(manifest, clips);
+      std::vector<std::unique_ptr<Dataset>> opened(manifest.sources.size());
+      opened[number] = open_dataset(*source, manifest.directory);
+      make_clips(manifest, opened);
+      clips = std::move(opened);
       clips_of = {reader->header().plan_hash, number};
     }
     const Dataset& dataset = *clips[number];

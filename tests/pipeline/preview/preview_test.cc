@@ -200,6 +200,38 @@ TEST(PreviewOfClips, MakesTheFramesOfAStillAgain) {
   EXPECT_EQ(warnings.size(), 1u);
 }
 
+TEST(PreviewOfClips, ASourceThatIsGoneLeavesTheOthers) {
+  const testing::TemporaryFolder folder;
+  const std::vector<int> levels(64 * 96, 7);
+  testing::write_index_image(folder / "a/a.png", {64, 96}, levels);
+  testing::write_index_image(folder / "b/b.png", {64, 96}, levels);
+  const std::string pairs = R"("pairs": { "from": "stills", "frames": 2,
+                                          "motion": { "translation_px": [2, 3] } } })";
+  const JobManifest job =
+      parse_job_manifest(R"({
+    "format": "eventgan-manifest", "version": 1, "name": "job", "seed": 3,
+    "sources": [{ "dataset": "frames", "root": "a", )" +
+                             pairs + R"(, { "dataset": "frames", "root": "b", )" + pairs + R"(],
+    "image": { "preset": "mpii" }, "generator": { "weights": "untrained:1" },
+    "output": { "directory": "out", "samples_per_shard": 2 } })",
+                         folder.path(), "manifest.json");
+  ConversionOptions options;
+  options.output = folder / "out";
+  convert(job, testing::FakeGenerator(), "weights", options);
+  std::filesystem::remove_all(folder / "b");
+  std::vector<std::string> warnings;
+  PreviewReader reader(folder.path(), warnings);
+  std::size_t frames = 0;
+  for (int turn = 0; turn < 2; ++turn) {
+    for (const auto& entry : std::filesystem::directory_iterator(folder / "out")) {
+      if (entry.path().extension() != ".h5") continue;
+      frames += reader.content(entry.path(), 0).next_bgr.empty() ? 0 : 1;
+    }
+  }
+  EXPECT_EQ(frames, 2u);
+  EXPECT_EQ(warnings.size(), 2u);
+}
+
 TEST_F(Preview, WithoutShardsThereIsNothingToDraw) {
   EXPECT_THROW(draw("clip"), InputError);
   for (const char* shard : {"out/job-train-00000-of-00002.h5", "out/job-train-00001-of-00002.h5"}) {
