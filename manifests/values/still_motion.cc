@@ -199,7 +199,8 @@ std::vector<std::size_t> carriers(const std::vector<Box>& boxes) {
       if (!moves_alone(other) || !(area_of(other.xyxy) > area)) continue;
       const double share = shared_area(boxes[k].xyxy, other.xyxy) / area;
       const bool is_same = other.class_id == boxes[k].class_id;
-      if (share <= most || share < (is_same ? kOfTheSame : kOfAnotherClass)) continue;
+      // Of a box without area the share is no number.
+      if (!(share > most) || !(share >= (is_same ? kOfTheSame : kOfAnotherClass))) continue;
       most = share;
       carrier[k] = j;
     }

@@ -278,6 +278,7 @@ TEST(Carriers, AreLargerAndHoldMostOfABox) {
   ignored.ignore = true;
   without.outline = {};
   EXPECT_THAT(carriers({ignored, without, outlined(1, {50, 50, 70, 90})}), ElementsAre(0, 1, 2));
+  EXPECT_THAT(carriers({large, outlined(1, {50, 50, 50, 90})}), ElementsAre(0, 1)) << "no area";
 }
 
 TEST(ClipPoses, WhatLooksSmallMovesSlowly) {
