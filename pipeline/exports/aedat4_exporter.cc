@@ -33,8 +33,8 @@ class FrameReaders {
     PreviewContent content = reader->samples.content(shard, slot);
     if (!reader->warnings.empty()) {
       throw InputError(reader->warnings.front() +
-                       " (--frames names the folder that frame paths start at; --to raw goes "
-                       "without frames)");
+                       " (--frames names the folder that frame paths start at, with --overwrite; "
+                       "--to raw goes without frames)");
     }
     const std::lock_guard lock(mutex_);
     free_.push_back(std::move(reader));
@@ -78,8 +78,16 @@ class Aedat4Exporter : public RecordingsExporter {
   Aedat4Exporter(const ExportInput& input, const ExportOptions& options)
       : RecordingsExporter(input, options),
         folder_(input.folder()),
+        frames_(options.frames.empty() ? options.frames
+                                       : std::filesystem::absolute(options.frames / "")),
         readers_(options.frames.empty() ? recorded_manifest_folder(folder_).value_or(folder_)
-                                        : std::filesystem::absolute(options.frames)) {}
+                                        : frames_) {}
+
+  std::string settings() const override {
+    std::string text = RecordingsExporter::settings();
+    if (!frames_.empty()) text += "frames " + frames_.lexically_normal().string() + "\n";
+    return text;
+  }
 
   void check(const ExportInput& input, const std::function<void()>& check_stop) const override {
     require_sides(input, check_stop, Aedat4Writer::kLargestSide, "aedat4");
@@ -116,6 +124,7 @@ class Aedat4Exporter : public RecordingsExporter {
   }
 
   std::filesystem::path folder_;
+  std::filesystem::path frames_;  ///< the option's; else empty
   mutable FrameReaders readers_;
 };
 

@@ -372,9 +372,11 @@ class Recordings(Export):
         _, err = self.export("aedat4", source=frames, expect=66)
         self.assertIn("0000.png", err)
         self.assertIn("--frames names the folder", err)
-        self.export("aedat4", "--frames", moved, source=frames)
+        self.export("aedat4", "--frames", moved, "--overwrite", source=frames)
         _, _, found = aedat4.read(self.out / "aedat4" / "train" / "clip.aedat4")
         self.assertEqual(len(found), 4)
+        _, err = self.export("aedat4", "--frames", self.out.parent, source=frames, expect=64)
+        self.assertIn("got another export", err)
 
     def test_raw_says_at_once_that_its_pixels_have_eleven_bits(self):
         manifest = small_job.small_job(self.out.parent / "wide", cars=2, people=0, errors=small_job.LENIENT,
