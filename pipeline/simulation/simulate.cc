@@ -97,17 +97,26 @@ struct SourceWork {
   std::vector<RecordingSummary> made;
 };
 
-/// Labels beside a recording. Throws UsageError rather than replace another file.
-void write_labels(const fs::path& recording, const std::string& labels) {
-  const fs::path file = fs::path(recording).replace_extension(".json");
+fs::path labels_beside(const fs::path& recording) {
+  return fs::path(recording).replace_extension(".json");
+}
+
+/// Throws UsageError if the recording's labels would replace another file or, without `overwrite`,
+/// other labels: those of a recording of another format, or corrected ones.
+void check_labels(const PlannedRecording& recording, const StillScenes& stills, bool overwrite) {
+  const fs::path file = labels_beside(recording.file);
+  if (!fs::exists(file)) return;
   constexpr std::string_view kBegin = R"({"format":"eventgan-labels")";
-  if (fs::exists(file) && !read_text_file(file).starts_with(kBegin)) {
+  const std::string found = read_text_file(file);
+  if (!found.starts_with(kBegin)) {
     throw UsageError(
         "expected labels that eventgan simulate has written, or no file, got another, "
         "in " +
         file.string() + " (choose another output folder, or remove it yourself)");
   }
-  write_file_atomically(file, labels);
+  if (overwrite || found == stills.labels(recording.image.value())) return;
+  throw UsageError("expected the labels that this run would write, or no file, got others, in " +
+                   file.string() + " (--overwrite replaces them; or choose another output folder)");
 }
 
 /// Opens every source's clip and leaves out the recordings that are there, or with `overwrite`
@@ -128,6 +137,7 @@ std::vector<SourceWork> plan_work(const SimulationManifest& manifest, const fs::
       const auto stills = std::make_shared<const StillScenes>(source, manifest);
       for (PlannedRecording& recording : plan_recordings(manifest, source, *stills, folder)) {
         if (!is_to_do(recording)) continue;
+        check_labels(recording, *stills, overwrite);
         works.push_back({&source, nullptr, stills, {}, {}});
         works.back().to_do.push_back(std::move(recording));
       }
@@ -177,7 +187,8 @@ void run(SourceWork& work, const SimulationManifest& manifest,
     const CounterRandom random = CounterRandom(manifest.seed).keyed(recording.name);
     const auto scene = make_scene(work, recording, random);
     if (work.stills) {
-      write_labels(recording.file, work.stills->labels(recording.image.value()));
+      write_file_atomically(labels_beside(recording.file),
+                            work.stills->labels(recording.image.value()));
     }
     work.made.push_back(record(*scene, manifest.sensor, random.keyed("sensor"), recording.file,
                                recording.settings, on_frame));

@@ -78,11 +78,15 @@ class StillScenesTest : public ::testing::Test {
         folder_.path(), R"({"path": "job.json", "method": "stills", "name": "s"})", more);
   }
 
-  SimulationReport run(const std::string& output, int threads = 1, const std::string& more = "") {
+  SimulationReport run(const std::string& output, int threads = 1, const std::string& more = "",
+                       SimulatedFile file = SimulatedFile::kHdf5, bool overwrite = false) {
     SimulationOptions options;
     options.output = folder_ / output;
     options.threads = threads;
-    return simulate(manifest(more), options);
+    options.overwrite = overwrite;
+    SimulationManifest simulation = manifest(more);
+    simulation.file = file;
+    return simulate(simulation, options);
   }
 
   std::map<std::string, std::string> files(const std::string& output) const {
@@ -226,6 +230,24 @@ TEST_F(StillScenesTest, LabelsOfOthersAreNotReplaced) {
   EXPECT_THAT([&] { run("out"); }, ::testing::ThrowsMessage<UsageError>(HasSubstr("s-000.json")));
   EXPECT_EQ(files("out").at("s-000.json"), "mine");
   EXPECT_FALSE(files("out").contains("s-000.hdf5"));
+}
+
+TEST_F(StillScenesTest, OtherLabelsAreReplacedIfThatIsAskedForOnly) {
+  run("out");
+  const auto first = files("out");
+  run("out", 1, "", SimulatedFile::kAedat4);  // of the same labels
+  EXPECT_EQ(files("out").size(), 6u);
+  const std::string smaller = R"(, "size": {"width": 48, "height": 40})";
+  const auto run_smaller = [&](bool overwrite) {
+    run("out", 1, smaller, SimulatedFile::kRaw, overwrite);
+  };
+  EXPECT_THAT([&] { run_smaller(false); },
+              ::testing::ThrowsMessage<UsageError>(HasSubstr("s-000.json")));
+  EXPECT_EQ(files("out").size(), 6u) << "nothing was made";
+  EXPECT_EQ(files("out").at("s-000.json"), first.at("s-000.json"));
+  run_smaller(true);
+  EXPECT_EQ(files("out").size(), 8u);
+  EXPECT_NE(files("out").at("s-000.json"), first.at("s-000.json"));
 }
 
 TEST_F(StillScenesTest, RefusesAJobWithoutClipsAndAPhotographThatCannotBeRead) {
