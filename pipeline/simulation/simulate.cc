@@ -181,14 +181,16 @@ std::int64_t frame_total(const std::vector<SourceWork>& works) {
   return frames;
 }
 
-void run(SourceWork& work, const SimulationManifest& manifest,
+void run(SourceWork& work, const SimulationManifest& manifest, bool overwrite,
          const std::function<void()>& on_frame) {
   for (const PlannedRecording& recording : work.to_do) {
     const CounterRandom random = CounterRandom(manifest.seed).keyed(recording.name);
     const auto scene = make_scene(work, recording, random);
     if (work.stills) {
-      write_file_atomically(labels_beside(recording.file),
-                            work.stills->labels(recording.image.value()));
+      const std::string labels = work.stills->labels(recording.image.value());
+      // Never new labels beside an old recording, even if this ends here.
+      if (overwrite && fs::remove(recording.file)) sync_to_disk(recording.file.parent_path());
+      write_file_atomically(labels_beside(recording.file), labels);
     }
     work.made.push_back(record(*scene, manifest.sensor, random.keyed("sensor"), recording.file,
                                recording.settings, on_frame));
@@ -216,7 +218,7 @@ SimulationReport simulate(const SimulationManifest& manifest, const SimulationOp
     progress->advance(/*quarantined=*/false, /*bytes=*/0);
   };
   for_each_index(works.size(), thread_count(options.threads),
-                 [&](std::size_t i) { run(works[i], manifest, on_frame); });
+                 [&](std::size_t i) { run(works[i], manifest, options.overwrite, on_frame); });
   if (progress) progress->finish();
 
   for (const SourceWork& work : works) {

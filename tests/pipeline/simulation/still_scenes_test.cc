@@ -59,12 +59,14 @@ class StillScenesTest : public ::testing::Test {
                             R"(], "categories": [{"id": 1, "name": "box"}]})");
   }
 
-  void write_job(const std::string& pairs = R"("frames": 6)", const std::string& seed = "5") {
+  void write_job(const std::string& pairs = R"("frames": 6)", const std::string& seed = "5",
+                 const std::string& rate = "20") {
     testing::write_file(folder_ / "job.json", R"({
       "format": "eventgan-manifest", "version": 1, "name": "job", "seed": )" +
                                                   seed + R"(,
       "sources": [{"dataset": "frames", "root": "photos",
-        "labels": {"format": "coco", "path": "coco.json"},
+        "labels": {"format": "coco", "path": "coco.json"}, "frames_per_second": )" +
+                                                  rate + R"(,
         "pairs": {"from": "stills", )" + pairs + R"(,
           "motion": {"translation_px": [1, 2], "rotation_deg": 0, "scale": 0, "rests": 1,
                      "objects": {"translation_px": [3, 3], "rotation_deg": 0, "scale": 0}}}}],
@@ -248,6 +250,15 @@ TEST_F(StillScenesTest, OtherLabelsAreReplacedIfThatIsAskedForOnly) {
   run_smaller(true);
   EXPECT_EQ(files("out").size(), 8u);
   EXPECT_NE(files("out").at("s-000.json"), first.at("s-000.json"));
+}
+
+TEST_F(StillScenesTest, NewLabelsDoNotLieBesideAnOldRecording) {
+  run("out");
+  write_job(R"("frames": 6)", "5", "1e-6");
+  const std::string noise = R"(, "sensor": {"shot_noise_rate_hz": 1e5})";  // fits no memory
+  EXPECT_ANY_THROW(run("out", 1, noise, SimulatedFile::kHdf5, true));
+  EXPECT_TRUE(files("out").contains("s-000.json"));
+  EXPECT_FALSE(files("out").contains("s-000.hdf5"));
 }
 
 TEST_F(StillScenesTest, RefusesAJobWithoutClipsAndAPhotographThatCannotBeRead) {
