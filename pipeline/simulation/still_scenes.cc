@@ -152,12 +152,18 @@ nlohmann::ordered_json person_json(const VolumePerson& mapped, const Person& per
   return json;
 }
 
+/// What of a labelled frame's pair is the later one: itself, or the one after it.
+int next_of(const SourceSpec& spec) { return spec.pairs.side == PairSide::kBefore ? 0 : 1; }
+
 /// What an annotation says that the scene or its labels depend on, beyond what `original` has.
-std::string text_of(const Annotation& annotation) {
+std::string text_of(const Annotation& annotation, const LabelSchema& schema) {
   std::string text = annotation.original;
+  for (const std::string& joint : schema.joint_names) text += "\njoint " + joint;
   for (const Box& box : annotation.boxes) {
-    text += fmt::format("\n{} {} {} {} {} {} {}", box.class_id, box.xyxy.left, box.xyxy.top,
-                        box.xyxy.right, box.xyxy.bottom, box.ignore, outline_text(box.outline));
+    text += fmt::format("\n{} {} {} {} {} {} {}",
+                        schema.class_names.at(static_cast<std::size_t>(box.class_id)),
+                        box.xyxy.left, box.xyxy.top, box.xyxy.right, box.xyxy.bottom, box.ignore,
+                        outline_text(box.outline));
   }
   return text;
 }
@@ -184,7 +190,9 @@ StillScenes::StillScenes(const SimulationSource& source, const SimulationManifes
       const std::int64_t number = length++ - source.first_frame;
       const bool is_enough = source.frame_count > 0 && count() == source.frame_count;
       if (number < 0 || number % source.frame_step != 0 || is_enough) continue;
-      clips_.push_back({i, still, std::move(frames)});
+      const double start_s =
+          datasets_[i]->paired_frame(*frames[0], next_of(job_.sources[i])).frame.time_s;
+      clips_.push_back({i, still, std::move(frames), start_s});
     }
   }
   const std::int64_t least = std::max<std::int64_t>(source.frame_count, 1);
@@ -212,7 +220,9 @@ std::string StillScenes::hash(std::int64_t position) const {
     if (field.starts_with(pairs)) text += field.substr(pairs.size()) + " " + value + "\n";
     if (field.starts_with("$.image.range")) text += field + " " + value + "\n";
   }
-  text += text_of(found(datasets_[clip.source]->still_annotation(clip.frames[0]->label_key)));
+  const Dataset& dataset = *datasets_[clip.source];
+  text +=
+      text_of(found(dataset.still_annotation(clip.frames[0]->label_key)), dataset.label_schema());
   return sha256_hex(text);
 }
 
@@ -224,16 +234,12 @@ std::unique_ptr<Scene> StillScenes::scene(std::int64_t position) const try {
   std::vector<double> times_s;
   std::vector<Box> boxes;
   const Dataset& dataset = *datasets_[clip.source];
-  const int next = spec.pairs.side == PairSide::kBefore ? 0 : 1;  // frame of a labelled one's pair
+  const int next = next_of(spec);
   for (const LabelledFrame* frame : clip.frames) {
     MadePair made = found(dataset.made_pair(frame->label_key));
-    if (poses.empty()) {
-      poses.push_back(made.poses.at(0));
-      times_s.push_back(dataset.paired_frame(*frame, next - 1).frame.time_s);
-      boxes = std::move(made.boxes);
-    }
+    if (poses.empty()) boxes = std::move(made.boxes);
     poses.push_back(std::move(made.poses.at(1)));
-    times_s.push_back(dataset.paired_frame(*frame, next).frame.time_s);
+    times_s.push_back(dataset.paired_frame(*frame, next).frame.time_s - clip.start_s);
   }
   const ColourFrame colour =
       found(decoder_.decode(image, spec.every, orientation_of(spec.dataset), job_.image.range));
@@ -251,13 +257,14 @@ std::string StillScenes::labels(std::int64_t position) const {
   const LabelSchema& schema = dataset.label_schema();
   nlohmann::ordered_json samples = nlohmann::json::array();
   for (const LabelledFrame* frame : clip.frames) {
+    if (frame->frame.time_s < clip.start_s) continue;
     const Annotation annotation = found(dataset.annotation(frame->label_key));
     const Placement placement =
         sensor_placement(dataset.made_size(frame->label_key).value(), size_);
     const VolumeLabels mapped =
         found(map_labels(annotation, placement, dataset.label_place(frame->label_key)));
     nlohmann::ordered_json& sample = samples.emplace_back();
-    sample["time_s"] = frame->frame.time_s;
+    sample["time_s"] = frame->frame.time_s - clip.start_s;
     for (std::size_t k = 0; k < mapped.boxes.size(); ++k) {
       const Box& box = annotation.boxes[k];
       if (is_empty(mapped.boxes[k].clipped)) continue;

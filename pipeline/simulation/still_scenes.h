@@ -29,21 +29,22 @@ class StillScenes {
   /// The still's sample_id in its dataset.
   const std::string& still(std::int64_t position) const { return clip(position).still; }
 
-  /// The clip's frames: its labelled ones, and one more.
+  /// The clip's frames but its first one, which is the still itself: it alone is not smoothed by
+  /// interpolation, and that would look like events.
   std::int64_t frame_count(std::int64_t position) const {
-    return static_cast<std::int64_t>(clip(position).frames.size()) + 1;
+    return static_cast<std::int64_t>(clip(position).frames.size());
   }
 
-  /// What the scene and its labels are made of, hashed: the image's name and size, its annotation,
-  /// the manifest's settings of clips.
+  /// What the scene and its labels are made of, hashed: the image's name and size, its annotation
+  /// with the names of classes and joints, the manifest's settings of clips.
   std::string hash(std::int64_t position) const;
 
   /// What moves between two frames is the layers, not their pixels. Throws InputError if the image
   /// or its annotation cannot be read.
   std::unique_ptr<Scene> scene(std::int64_t position) const;
 
-  /// The labels of its frames in pixels of the sensor as JSON, as `convert` reads them beside a
-  /// recording (manifests/guides/real_events.md). Throws as above.
+  /// The labels of those of its frames that have some, in pixels of the sensor as JSON, as
+  /// `convert` reads them beside a recording (manifests/guides/real_events.md). Throws as above.
   std::string labels(std::int64_t position) const;
 
  private:
@@ -51,6 +52,7 @@ class StillScenes {
     std::size_t source;
     std::string still;
     std::vector<const LabelledFrame*> frames;  ///< in order of time
+    double start_s;  ///< of the recording: the time of its first frame within the clip
   };
 
   const Clip& clip(std::int64_t position) const {

@@ -130,12 +130,13 @@ TEST_F(StillScenesTest, EachIsARecordingWhoseLabelsAreWhereItsFramesShowThem) {
       for (const char* name : {"s-000", "s-001"}) {
         const auto recording =
             open_recording(folder_ / out / (name + std::string(".hdf5")), RecordingFormat::kMvsec);
-        ASSERT_EQ(recording->frame_count(), kFrames + 1);
+        ASSERT_EQ(recording->frame_count(), kFrames);
         const RecordingLabels labels =
             read_recording_labels(folder_ / out / (name + std::string(".json")));
         EXPECT_THAT(labels.class_names, ElementsAre("box"));
-        EXPECT_EQ(labels.annotations.size(), std::size_t{kFrames});
-        std::vector<Rectangle> boxes(kFrames + 1);
+        const int labelled = side == "before" ? kFrames : kFrames - 1;
+        EXPECT_EQ(std::ssize(labels.annotations), labelled);
+        std::vector<Rectangle> boxes(kFrames);
         for (const auto& [time_s, annotation] : labels.annotations) {
           const auto k = std::lround(time_s * kRate_hz);
           EXPECT_DOUBLE_EQ(recording->frame_time_s(k), time_s);
@@ -150,8 +151,7 @@ TEST_F(StillScenesTest, EachIsARecordingWhoseLabelsAreWhereItsFramesShowThem) {
           EXPECT_NEAR(box.xyxy.right, seen.right, 1.5);
           EXPECT_NEAR(box.xyxy.bottom, seen.bottom, 1.5);
         }
-        const int first = side == "before" ? 1 : 0;
-        for (int k = first; k + 1 < first + kFrames; ++k) {
+        for (int k = 0; k + 1 < labelled; ++k) {
           const Rectangle &from = boxes[static_cast<std::size_t>(k)],
                           &to = boxes[static_cast<std::size_t>(k) + 1];
           const GreyImage frame = recording->frame(k);
@@ -180,7 +180,7 @@ TEST_F(StillScenesTest, BetweenItsFramesThingsMove) {
   const SimulationManifest simulation = manifest();
   const StillScenes scenes(simulation.sources[0], simulation);
   ASSERT_EQ(scenes.count(), 2);
-  EXPECT_EQ(scenes.frame_count(0), kFrames + 1);
+  EXPECT_EQ(scenes.frame_count(0), kFrames);
   const auto scene = scenes.scene(0);
   EXPECT_EQ(scene->time_s(), 0);
   const auto interval = scene->advance();
@@ -225,6 +225,41 @@ TEST_F(StillScenesTest, AnotherPhotographLeavesTheFirstOnesAndAnotherSeedDoesNot
   EXPECT_EQ(files("out").at("s-000.hdf5"), before.at("s-000.hdf5"));
   write_job(R"("frames": 6)", "6");
   EXPECT_THROW(run("out"), UsageError);
+}
+
+TEST_F(StillScenesTest, TheStillThatIsNotInterpolatedIsNoFrame) {
+  const SimulationManifest simulation = manifest();
+  const auto scene = StillScenes(simulation.sources[0], simulation).scene(0);
+  const cv::Mat still = cv::imread((folder_ / "photos/a.png").string(),
+                                   cv::IMREAD_GRAYSCALE)(cv::Rect(16, 12, 96, 72));
+  const auto& frame = scene->frame();
+  ASSERT_EQ(frame.size, (ImageSize{72, 96}));
+  EXPECT_NE(cv::norm(cv::Mat(72, 96, CV_8UC1, const_cast<std::uint8_t*>(frame.pixels.data())),
+                     still, cv::NORM_INF),
+            0);
+}
+
+TEST_F(StillScenesTest, ARenamedClassMakesOthersAndAnotherSourceDoesNot) {
+  const SimulationManifest simulation = manifest();
+  const auto hash = [&](std::int64_t position) {
+    return StillScenes(simulation.sources[0], simulation).hash(position);
+  };
+  const auto replace = [&](const char* file, const std::string& from, const std::string& to) {
+    std::string text = testing::read_file(folder_ / file);
+    text.replace(text.find(from), from.size(), to);
+    testing::write_file(folder_ / file, text);
+  };
+  const std::string before = hash(0);
+  std::filesystem::copy(folder_ / "coco.json", folder_ / "other.json");
+  replace("other.json", R"("name": "box")", R"("name": "other")");  // is class 0 now
+  replace("job.json", R"("sources": [)",
+          R"("sources": [{"dataset": "frames", "root": "photos", "split": "val",
+                          "labels": {"format": "coco", "path": "other.json"},
+                          "pairs": {"from": "stills", "frames": 6,
+                                    "motion": {"translation_px": [1, 2]}}},)");
+  EXPECT_EQ(hash(2), before);
+  replace("coco.json", R"("name": "box")", R"("name": "crate")");
+  EXPECT_NE(hash(2), before);
 }
 
 TEST_F(StillScenesTest, LabelsOfOthersAreNotReplaced) {
