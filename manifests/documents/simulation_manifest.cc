@@ -1,5 +1,8 @@
 #include "manifests/documents/simulation_manifest.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <set>
 
 #include "manifests/documents/detail/document_tables.h"
@@ -22,8 +25,7 @@ void list_clip(Fields& fields, SimulationSource& source) {
   source.name = std::filesystem::path(source.path).stem().string();
   constexpr char kName[] =
       "Name of the recording, NAME.hdf5; with methods affine and stills NAME-000.hdf5 and so on, "
-      "one "
-      "for each image. Default: the path's last part without extension.";
+      "one for each image. Default: the path's last part without extension.";
   if (source.path.empty() || is_name(source.name)) {
     fields.find("name", source.name, names(), kName);
   } else {
@@ -89,6 +91,8 @@ void check_names(const std::vector<StrictValue>& elements,
   }
 }
 
+constexpr int kLargestRawSide = 2048;  // the words of EVT 3.0 have 11 bits for a coordinate
+
 void list_simulation_output(Fields& fields, SimulationManifest& manifest) {
   fields.at("directory", manifest.output_directory, paths(),
             "Folder of the recordings; made if it is absent.");
@@ -107,13 +111,23 @@ void list_simulation(Fields& fields, SimulationManifest& manifest) {
       fields.at("sources", manifest.sources, lists(objects(list_clip), 1),
                 "The clips, each a recording or, with methods affine and stills, several.");
   if (sources && sources->is_array()) check_names(sources->elements(), manifest.sources);
-  fields.find("size", manifest.size, sizes(kSmallestSensorSide, kLargestSensorSide),
-              "Size of the sensor in pixels: frames are scaled to cover it and cut around the "
-              "centre. Without it, the frames' own size.");
+  const auto size =
+      fields.find("size", manifest.size, sizes(kSmallestSensorSide, kLargestSensorSide),
+                  "Size of the sensor in pixels: frames are scaled to cover it and cut around the "
+                  "centre. Without it, the frames' own size.");
   fields.find("sensor", manifest.sensor, objects(list_sensor),
               "The simulated sensor: a pixel signals when the natural logarithm of its intensity "
               "u/255 has moved by a threshold since its last event.");
   fields.at("output", manifest, objects(list_simulation_output), "The files that are made.");
+  if (size && fields.is_sound("size") && manifest.file == SimulatedFile::kRaw &&
+      std::max(manifest.size->width, manifest.size->height) > kLargestRawSide) {
+    size->fault(fmt::format("at most {} pixels a side for the format raw", kLargestRawSide),
+                fmt::format("{}x{}", manifest.size->width, manifest.size->height));
+  }
+  fields.rule(R"({"if": {"properties": {"output": {"required": ["format"],
+                                                   "properties": {"format": {"const": "raw"}}}}},
+                  "then": {"properties": {"size": {"properties": {"width": {"maximum": 2048},
+                                                                  "height": {"maximum": 2048}}}}}})");
 }
 
 SimulationManifest parse_simulation_manifest(std::string_view text,
