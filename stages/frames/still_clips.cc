@@ -177,6 +177,8 @@ class FrameLabels {
     GreyImage mask = mask_of(whole, frame_.size());
     const double pixels = static_cast<double>(covered_pixels(whole, frame_.size()));
     const double inside = static_cast<double>(count(mask));
+    const bool is_cut_out = box.outline.empty();
+    const Rectangle uncovered = is_cut_out ? bounds(outline_of(mask)) : Rectangle();
     for (std::size_t i = 0; i < mask.pixels.size(); ++i) {
       if (mask.pixels[i] == 0) continue;
       if (owner_[i] == kNobody) {
@@ -188,8 +190,8 @@ class FrameLabels {
     const double seen = static_cast<double>(count(mask));
     if (seen == 0 || seen < kLeastSeen * pixels) return std::nullopt;
     const Outline visible = outline_of(mask);
-    if (box.outline.empty()) {
-      box.xyxy = box_around(bounds(visible), bounds(whole), k, scale_of(map));
+    if (is_cut_out) {
+      box.xyxy = box_around(bounds(visible), uncovered, k, scale_of(map));
     } else {
       box.outline = visible;
       box.xyxy = bounds(visible);
@@ -279,7 +281,7 @@ class FrameLabels {
   }
 
   const Annotation& still_;
-  const std::vector<Box>& boxes_;  ///< as Still's, and
+  const std::vector<Box>& boxes_;  ///< with the outlines of what was cut out: Still::boxes
   const std::vector<std::size_t>& carriers_;
   Rectangle image_;
   const Frame& frame_;
@@ -402,7 +404,7 @@ class StillClips final : public WrappedDataset {
     still.boxes = still.annotation.boxes;
     if (!spec_.pairs.stills.value().objects) return still;
     const auto has_no_outline = [](const Box& box) { return !box.ignore && box.outline.empty(); };
-    ColourFrame image;  // which nobody needs else
+    ColourFrame image;  // needed for nothing else
     if (std::ranges::any_of(still.boxes, has_no_outline)) {
       Outcome<ColourFrame> decoded =
           decoder_.decode(frame.frame, spec_.every, orientation_of(spec_.dataset), range_);

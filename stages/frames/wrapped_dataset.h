@@ -11,8 +11,9 @@
 
 namespace eventgan {
 
-/// A dataset as another one has it, but for what a class derived from it says. (Its
-/// still_annotation is its annotation, which may be more than the other one's.)
+/// A dataset as another one has it, but for what a class derived from it says. still_annotation is
+/// not passed on, but is the derived class's annotation: one that wraps a dataset of clips must say
+/// it, too.
 class WrappedDataset : public Dataset {
  public:
   const LabelSchema& label_schema() const override { return dataset_->label_schema(); }
