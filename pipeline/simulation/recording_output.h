@@ -10,8 +10,11 @@
 
 namespace eventgan {
 
-/// Where a simulated recording goes. As MvsecWriter has them: its calls, what it throws and how its
-/// file appears. Not thread safe.
+/// Where a simulated recording goes: its file appears on commit() only, whole. Events and frames
+/// come in order of time, a frame behind the events before it, of the size that it was opened with.
+/// Members throw std::invalid_argument where a writer sees that they do not, AEDAT 4.0 also for two
+/// frames in one microsecond, and std::runtime_error naming the file on I/O errors. Not thread
+/// safe.
 class RecordingOutput {
  public:
   virtual ~RecordingOutput() = default;
@@ -22,7 +25,7 @@ class RecordingOutput {
 };
 
 /// Opens the writer of the file's extension, a word of kSimulatedFileWords. What a format does not
-/// have is left out: of AEDAT 4.0 flows, of Prophesee's RAW frames, too; in both times are rounded
+/// have is left out: AEDAT 4.0 has no flow, RAW neither flow nor frames; in both times are rounded
 /// to microseconds. Throws UsageError for a size that the format does not hold.
 std::unique_ptr<RecordingOutput> open_recording_output(const std::filesystem::path& file,
                                                        ImageSize size, const std::string& settings);
