@@ -119,15 +119,18 @@ std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest
 std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest,
                                               const SimulationSource& source,
                                               const StillScenes& scenes,
-                                              const std::filesystem::path& folder) {
+                                              const std::filesystem::path& folder,
+                                              std::vector<std::string>& faults) {
   std::vector<PlannedRecording> recordings;
-  for (std::int64_t i = 0; i < scenes.count(); ++i) {
-    const std::string name = numbered(source.name, i);
-    recordings.push_back(
-        {name, folder / file_name(name, manifest),
-         recording_settings(manifest, source, name, scenes.hash(i), std::nullopt, scenes.still(i)),
-         i, scenes.frame_count(i)});
-  }
+  for (std::int64_t i = 0; i < scenes.count(); ++i) try {
+      const std::string name = numbered(source.name, i);
+      recordings.push_back({name, folder / file_name(name, manifest),
+                            recording_settings(manifest, source, name, scenes.hash(i), std::nullopt,
+                                               scenes.still(i)),
+                            i, scenes.frame_count(i)});
+    } catch (const InputError& error) {
+      faults.push_back(fmt::format("{} ({})", error.what(), scenes.still(i)));
+    }
   return recordings;
 }
 

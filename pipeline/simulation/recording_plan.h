@@ -49,10 +49,12 @@ std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest
                                               const ClipFrames& clip,
                                               const std::filesystem::path& folder);
 
-/// One for each clip, NAME-000 and so on. Throws as StillScenes::hash.
+/// One for each clip, NAME-000 and so on; of a still with a fault there is none, and what
+/// StillScenes::hash says of it is added to `faults`.
 std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest,
                                               const SimulationSource& source,
                                               const StillScenes& scenes,
-                                              const std::filesystem::path& folder);
+                                              const std::filesystem::path& folder,
+                                              std::vector<std::string>& faults);
 
 }  // namespace eventgan

@@ -1,6 +1,6 @@
 #include "pipeline/simulation/simulate.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
@@ -26,6 +26,7 @@
 #include "stages/base/files/unfinished_files.h"
 #include "stages/events/simulation/sensor.h"
 #include "stages/events/simulation/simulate_pair.h"
+#include "stages/recordings/evt3_writer.h"
 
 namespace eventgan {
 namespace {
@@ -87,11 +88,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A source, its clip, and the recordings of it that are to be made, one after another. Clips of
-/// stills, which read nothing in order, have one each.
+/// A source, its clip, and the recordings of it that are to be made, one after another. Of stills,
+/// which are not read in order, there is one work for each recording.
 struct SourceWork {
   const SimulationSource* source = nullptr;
-  std::unique_ptr<ClipFrames> clip;  ///< or else
+  std::unique_ptr<ClipFrames> clip;  ///< null for stills
   std::shared_ptr<const StillScenes> stills;
   std::vector<PlannedRecording> to_do;
   std::vector<RecordingSummary> made;
@@ -119,10 +120,22 @@ void check_labels(const PlannedRecording& recording, const StillScenes& stills, 
                    file.string() + " (--overwrite replaces them; or choose another output folder)");
 }
 
+/// Of frames that are not scaled to a size of the manifest's, whose own rule this is.
+void require_raw_size(ImageSize frame, const std::string& path) {
+  constexpr int kMost = Evt3Writer::kLargestSide;
+  if (frame.width <= kMost && frame.height <= kMost) return;
+  throw UsageError(
+      fmt::format("expected frames of 1 to {} pixels a side for the format raw, got "
+                  "{}x{}, in {} (\"size\" scales them)",
+                  kMost, frame.width, frame.height, path));
+}
+
 /// Opens every source's clip and leaves out the recordings that are there, or with `overwrite`
-/// makes sure that they are of this clip.
+/// makes sure that they are of this clip. Stills with a fault are left out and added to `faults`.
 std::vector<SourceWork> plan_work(const SimulationManifest& manifest, const fs::path& folder,
-                                  bool overwrite, std::vector<std::string>& kept) {
+                                  bool overwrite, std::vector<std::string>& kept,
+                                  std::vector<std::string>& faults) {
+  const bool any_size = manifest.file == SimulatedFile::kRaw && !manifest.size;
   std::vector<SourceWork> works;
   for (const SimulationSource& source : manifest.sources) {
     const auto is_to_do = [&](const PlannedRecording& recording) {
@@ -135,9 +148,17 @@ std::vector<SourceWork> plan_work(const SimulationManifest& manifest, const fs::
     };
     if (source.method == SimulationMethod::kStills) {
       const auto stills = std::make_shared<const StillScenes>(source, manifest);
-      for (PlannedRecording& recording : plan_recordings(manifest, source, *stills, folder)) {
+      for (PlannedRecording& recording :
+           plan_recordings(manifest, source, *stills, folder, faults)) {
         if (!is_to_do(recording)) continue;
-        check_labels(recording, *stills, overwrite);
+        const std::int64_t position = recording.image.value();
+        if (any_size) require_raw_size(stills->frame_size(position), stills->still(position));
+        try {
+          check_labels(recording, *stills, overwrite);
+        } catch (const InputError& error) {
+          faults.push_back(fmt::format("{} ({})", error.what(), stills->still(position)));
+          continue;
+        }
         works.push_back({&source, nullptr, stills, {}, {}});
         works.back().to_do.push_back(std::move(recording));
       }
@@ -147,6 +168,7 @@ std::vector<SourceWork> plan_work(const SimulationManifest& manifest, const fs::
     for (PlannedRecording& recording : plan_recordings(manifest, source, *work.clip, folder)) {
       if (is_to_do(recording)) work.to_do.push_back(std::move(recording));
     }
+    if (any_size && !work.to_do.empty()) require_raw_size(work.clip->frame(0).size, source.path);
     works.push_back(std::move(work));
   }
   return works;
@@ -206,20 +228,30 @@ SimulationReport simulate(const SimulationManifest& manifest, const SimulationOp
   report.folder = folder.string();
   fs::create_directories(folder);
   remove_stale_temporaries(folder);
-  std::vector<SourceWork> works = plan_work(manifest, folder, options.overwrite, report.kept);
+  std::vector<std::string> faults;
+  std::vector<SourceWork> works =
+      plan_work(manifest, folder, options.overwrite, report.kept, faults);
 
   const std::int64_t frames = frame_total(works);
   const std::unique_ptr<Progress> progress =
       options.make_progress && frames > 0 ? options.make_progress(frames) : nullptr;
-  std::mutex showing;
+  std::mutex showing, failing;
   const auto on_frame = [&] {
     if (!progress) return;
     const std::lock_guard lock(showing);
     progress->advance(/*quarantined=*/false, /*bytes=*/0);
   };
-  for_each_index(works.size(), thread_count(options.threads),
-                 [&](std::size_t i) { run(works[i], manifest, options.overwrite, on_frame); });
+  for_each_index(works.size(), thread_count(options.threads), [&](std::size_t i) {
+    try {
+      run(works[i], manifest, options.overwrite, on_frame);
+    } catch (const InputError& error) {  // the others are made
+      const std::lock_guard lock(failing);
+      faults.push_back(error.what());
+    }
+  });
   if (progress) progress->finish();
+  std::ranges::sort(faults);
+  if (!faults.empty()) throw InputError(fmt::format("{}", fmt::join(faults, "\n")));
 
   for (const SourceWork& work : works) {
     report.made.insert(report.made.end(), work.made.begin(), work.made.end());

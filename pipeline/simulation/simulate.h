@@ -64,8 +64,9 @@ struct SimulationOptions {
 /// of stills have their labels beside them, NAME.json. All random numbers come from
 /// the manifest's seed and the recording's name, so neither threads nor other sources change it.
 ///
-/// Throws UsageError if a recording on disk was made with other settings, InputError if a clip
-/// cannot be read, std::runtime_error if the disk fails; whole recordings stay.
+/// Throws UsageError if a recording on disk was made with other settings, or has other labels; when
+/// the others are made, InputError telling of each clip and still that cannot be read;
+/// std::runtime_error if the disk fails; whole recordings stay.
 SimulationReport simulate(const SimulationManifest& manifest, const SimulationOptions& options);
 
 }  // namespace eventgan

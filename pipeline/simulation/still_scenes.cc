@@ -206,6 +206,7 @@ StillScenes::StillScenes(const SimulationSource& source, const SimulationManifes
 
 std::string StillScenes::hash(std::int64_t position) const {
   const Clip& clip = this->clip(position);
+  if (!clip.frames[0]->fault.empty()) throw InputError(clip.frames[0]->fault);
   const SourceSpec& spec = job_.sources[clip.source];
   const FrameRef& image = clip.frames[0]->frame;
   const std::filesystem::path file = resolve(job_, image.path);
@@ -224,6 +225,11 @@ std::string StillScenes::hash(std::int64_t position) const {
   text +=
       text_of(found(dataset.still_annotation(clip.frames[0]->label_key)), dataset.label_schema());
   return sha256_hex(text);
+}
+
+ImageSize StillScenes::frame_size(std::int64_t position) const {
+  const Clip& clip = this->clip(position);
+  return datasets_[clip.source]->made_size(clip.frames[0]->label_key).value();
 }
 
 std::unique_ptr<Scene> StillScenes::scene(std::int64_t position) const try {

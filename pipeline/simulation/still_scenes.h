@@ -37,7 +37,11 @@ class StillScenes {
 
   /// What the scene and its labels are made of, hashed: the image's name and size, its annotation
   /// with the names of classes and joints, the manifest's settings of clips.
+  /// Throws InputError if the annotation or the frame has a fault.
   std::string hash(std::int64_t position) const;
+
+  /// Of the clip's frames, before they are scaled to the sensor; empty if it cannot be read.
+  ImageSize frame_size(std::int64_t position) const;
 
   /// What moves between two frames is the layers, not their pixels. Throws InputError if the image
   /// or its annotation cannot be read.

@@ -298,7 +298,9 @@ TEST_F(StillScenesTest, NewLabelsDoNotLieBesideAnOldRecording) {
 
 TEST_F(StillScenesTest, RefusesAJobWithoutClipsAndAPhotographThatCannotBeRead) {
   testing::write_file(folder_ / "photos/a.png", "no image");
-  EXPECT_THROW(run("out"), InputError);
+  EXPECT_THAT([&] { run("out"); }, ::testing::ThrowsMessage<InputError>(HasSubstr("a.png")));
+  EXPECT_FALSE(files("out").contains("s-000.hdf5"));
+  EXPECT_TRUE(files("out").contains("s-001.hdf5")) << "the other is made";
   write_job(R"("side": "before")");
   EXPECT_THAT([&] { run("out"); }, ::testing::ThrowsMessage<InputError>(HasSubstr("got 0 of 0")));
 }
