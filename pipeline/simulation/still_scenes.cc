@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -262,8 +263,7 @@ std::string StillScenes::labels(std::int64_t position) const {
   const Dataset& dataset = *datasets_[clip.source];
   const LabelSchema& schema = dataset.label_schema();
   nlohmann::ordered_json samples = nlohmann::json::array();
-  for (const LabelledFrame* frame : clip.frames) {
-    if (frame->frame.time_s < clip.start_s) continue;
+  for (const LabelledFrame* frame : std::span(clip.frames).subspan(1)) {
     const Annotation annotation = found(dataset.annotation(frame->label_key));
     const Placement placement =
         sensor_placement(dataset.made_size(frame->label_key).value(), size_);

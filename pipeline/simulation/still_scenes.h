@@ -47,8 +47,9 @@ class StillScenes {
   /// or its annotation cannot be read.
   std::unique_ptr<Scene> scene(std::int64_t position) const;
 
-  /// The labels of those of its frames that have some, in pixels of the sensor as JSON, as
-  /// `convert` reads them beside a recording (manifests/guides/real_events.md). Throws as above.
+  /// The labels of its frames but the first labelled one, whose pair has the still, in pixels of
+  /// the sensor as JSON, as `convert` reads them beside a recording
+  /// (manifests/guides/real_events.md). Throws as above.
   std::string labels(std::int64_t position) const;
 
  private:

@@ -293,12 +293,12 @@ class Stills(program.InFolder):
             xyxy = view["labels/boxes/xyxy"][:]
         for number, name in enumerate(sorted({one.rsplit("/", 1)[0] for one in ids})):
             labels = json.loads((self.folder / "recordings" / f"clip-{number:03}.json").read_text())["samples"]
-            self.assertEqual([round(one["time_s"], 6) for one in labels], [0.05, 0.1, 0.15, 0.2, 0.25])
+            self.assertEqual([round(one["time_s"], 6) for one in labels], [0.05, 0.1, 0.15, 0.2])
             with h5py.File(self.folder / "recordings" / f"clip-{number:03}.hdf5") as file:
-                self.assertEqual(file["davis/left/image_raw"].shape, (6, 100, 120))
+                self.assertEqual(file["davis/left/image_raw"].shape, (5, 100, 120))
                 self.assertEqual(json.loads(file.attrs["simulation"])["still"], name)
             for k, one in enumerate(labels):
-                row = list(ids).index(f"{name}/{k + 1:04}")
+                row = list(ids).index(f"{name}/{k + 2:04}")
                 np.testing.assert_allclose(
                     [[box[edge] for edge in ("left", "top", "right", "bottom")] for box in one["boxes"]],
                     xyxy[offsets[row]:offsets[row + 1]], atol=1e-6)
@@ -308,7 +308,7 @@ class Stills(program.InFolder):
         run("convert", self.write_manifest(job, "windows.json"), "--progress", "none")
         shard, = (self.folder / "windows").glob("*-of-*.h5")
         with h5py.File(shard) as file:
-            self.assertEqual(len(file["valid"]), 10)
+            self.assertEqual(len(file["valid"]), 8)
             self.assertTrue(file["valid"][:].all())
             self.assertEqual(set(file["labels/boxes/track_id"][:]), {0})
             self.assertTrue(file["events/volume"][:].any(axis=(1, 2, 3)).all())
