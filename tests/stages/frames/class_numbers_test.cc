@@ -88,7 +88,10 @@ class TellingDataset final : public Dataset {
   PairedFrame paired_frame(const LabelledFrame&, int) const override { return {}; }
   Outcome<Annotation> annotation(const std::string&) const override { return Annotation(); }
   Outcome<Annotation> still_annotation(const std::string&) const override {
-    return Annotation{.original = "still", .boxes = {Box()}};
+    Annotation still;
+    still.original = "still";
+    still.boxes = {Box()};
+    return still;
   }
   Outcome<MadePair> made_pair(const std::string&) const override { return SampleFault{"made"}; }
   std::optional<ImageSize> made_size(const std::string&) const override { return ImageSize{3, 4}; }

@@ -36,8 +36,8 @@ class EventIndexesTest : public ::testing::Test {
     std::string dat = "% Data file containing CD events.\n% Version 2\n% Height 4\n% Width 8\n";
     dat.append({0x0c, 8});
     std::string text;
-    using Numbers = std::vector<std::int64_t>;
-    Numbers x, y, t, p;
+    using Values = std::vector<std::int64_t>;
+    Values x, y, t, p;
     for (int i = 0; i < kEvents; ++i) {
       const std::array<std::uint32_t, 2> words{static_cast<std::uint32_t>(time_us(i)),
                                                static_cast<std::uint32_t>(i % 8 | i % 4 << 14)};
@@ -55,8 +55,8 @@ class EventIndexesTest : public ::testing::Test {
                                            {"events/y", {{count}, y}},
                                            {"events/t", {{count}, t}},
                                            {"events/p", {{count}, p}},
-                                           {"events/height", {{}, Numbers{4}}},
-                                           {"events/width", {{}, Numbers{8}}}});
+                                           {"events/height", {{}, Values{4}}},
+                                           {"events/width", {{}, Values{8}}}});
     testing::write_file(folder_ / "ecd/events.txt", text);
     testing::write_file(folder_ / "ecd/images.txt", "0 0.pgm\n1 0.pgm\n");
     testing::write_file(folder_ / "ecd/0.pgm", "P5 8 4 255\n" + std::string(32, 'a'));
