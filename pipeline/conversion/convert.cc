@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
+#include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -158,7 +159,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
                          const std::string& weights_hash, const ConversionOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const fs::path folder = options.output.value_or(resolve(manifest, manifest.output.directory));
-  EventIndexes indexes(folder / kEventIndexFile);
+  std::optional<EventIndexes> indexes(std::in_place, folder / kEventIndexFile);
   PlannedJob planned = make_plan(manifest, weights_hash, generator.description(),
                                  {.stop = [&] { return options.stop_requested(); },
                                   .trace = options.trace,
@@ -169,7 +170,8 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
   std::vector<std::string> notes = notes_of(planned.plan.sources);  // as the inputs are today
   const auto fingerprint = planned.plan.fingerprint;
   FrozenPlan frozen = prepare_folder(folder, manifest, std::move(planned.plan), options);
-  indexes.save();
+  indexes->save();
+  indexes.reset();  // no recording is opened for the first time from here on
   if (frozen.plan.fingerprint != fingerprint) {  // inputs were mended since
     complete_plan(manifest, planned.datasets, frozen.plan);
   }

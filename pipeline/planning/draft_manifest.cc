@@ -56,10 +56,10 @@ struct SourceDraft {
   std::string preset = {};  ///< of its dataset; empty of events
   std::vector<std::string> findings = {};
   bool is_stills = false;
-  bool has_sizes = false;   ///< the images that were looked at have several sizes
-  bool has_frames = false;  ///< recording
-  /// Recording whose files do not tell the sensor's size: what the events show.
-  std::optional<SensorGuess> guess = {};
+  bool has_sizes = false;                 ///< the images that were looked at have several sizes
+  bool has_frames = false;                ///< recording
+  bool needs_sensor = false;              ///< recording whose files do not tell the sensor's size
+  std::optional<SensorGuess> guess = {};  ///< then: what the events show, if any was seen
   bool has_samples = false;
   std::optional<ValueRange> range = {};  ///< of images of 16 bits that use little of them
 };
@@ -309,8 +309,9 @@ void note_unknown_times(const Dataset& dataset, SourceDraft& draft) {
   draft.findings.emplace_back("no times, since images have none (set \"frames_per_second\")");
 }
 
-/// The smallest sensor of a camera on which the events lie, as far as some windows tell.
-SensorGuess guess_sensor(const Dataset& recordings) {
+/// The smallest sensor of a camera on which the events lie, as far as some windows tell; none if
+/// these have no event.
+std::optional<SensorGuess> guess_sensor(const Dataset& recordings) {
   constexpr std::array kSensors{ImageSize{128, 128},  ImageSize{180, 240}, ImageSize{240, 304},
                                 ImageSize{240, 320},  ImageSize{260, 346}, ImageSize{320, 320},
                                 ImageSize{320, 480},  ImageSize{480, 640}, ImageSize{640, 768},
@@ -318,15 +319,18 @@ SensorGuess guess_sensor(const Dataset& recordings) {
   constexpr std::size_t kMostWindows = 64;
   const auto& windows = recordings.labelled_frames();
   SensorGuess guess;
+  bool any = false;
   for (const std::size_t i : spread(kMostWindows, windows.size())) {
     if (!windows[i].fault.empty()) continue;
     const Outcome<EventWindow> window = recordings.events(windows[i].label_key);
     if (is_fault(window)) continue;
+    any = any || !window->events.empty();
     for (const Event& event : window->events) {
       guess.x = std::max(guess.x, event.x);
       guess.y = std::max(guess.y, event.y);
     }
   }
+  if (!any) return std::nullopt;
   const auto known = std::ranges::find_if(
       kSensors, [&](ImageSize size) { return guess.x < size.width && guess.y < size.height; });
   guess.size = known == kSensors.end() ? ImageSize{guess.y + 1, guess.x + 1} : *known;
@@ -344,11 +348,14 @@ std::unique_ptr<Dataset> open_source(SourceSpec spec, const fs::path& folder,
   spec.recording.sensor = ImageSize{kLargest, kLargest};
   try {
     auto dataset = open_dataset(spec, folder);
+    draft.needs_sensor = true;
     draft.guess = guess_sensor(*dataset);
-    draft.findings.push_back(
-        fmt::format("no size of the sensor in the files: set \"sensor\" (the events reach x = {}, "
-                    "y = {}, as those of a camera of {})",
-                    draft.guess->x, draft.guess->y, to_string(draft.guess->size)));
+    draft.findings.emplace_back("no size of the sensor in the files: set \"sensor\"");
+    if (const auto& guess = draft.guess) {
+      draft.findings.back() +=
+          fmt::format(" (the events reach x = {}, y = {}, as those of a camera of {})", guess->x,
+                      guess->y, to_string(guess->size));
+    }
     return dataset;
   } catch (const InputError&) {  // it lacks something else
   }
@@ -539,8 +546,8 @@ class Draft {
 
   static std::string window_text(const SourceDraft& source) {
     std::string text;
-    if (source.guess) {
-      const ImageSize size = source.guess->size;
+    if (source.needs_sensor) {
+      const ImageSize size = source.guess ? source.guess->size : ImageSize{260, 346};
       text += fmt::format("      // \"sensor\": {{ \"width\": {}, \"height\": {} }},\n", size.width,
                           size.height);
     }
@@ -663,7 +670,7 @@ ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const Draf
     const Survey counted = survey(*dataset, spec);
     if (has_events(found.dataset)) {
       source.has_frames = all_have_frames(*dataset);
-      source.has_samples = counted.labelled_frames > 0 && !source.guess;
+      source.has_samples = counted.labelled_frames > 0 && !source.needs_sensor;
     } else {
       source.gaps = gaps_to_take(counted, source.gaps);
       source.range = narrow_value_range(dataset->labelled_frames(), place.folder);

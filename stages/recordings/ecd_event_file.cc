@@ -96,7 +96,8 @@ void EcdEventFile::refuse(const EventFault& fault, std::int64_t line_begin) cons
                    std::to_string(line) + ")");
 }
 
-EcdEventFile::EcdEventFile(const std::filesystem::path& path) : file_(path) {
+EcdEventFile::EcdEventFile(const std::filesystem::path& path)
+    : index_key_(event_index_key(path, "t x y p")), file_(path) {
   constexpr std::int64_t kMostComments = std::int64_t{1} << 16;
   const std::string text = file_.read_between(0, std::min(kMostComments, file_.end_byte()));
   for_each_line(text, [&](std::string_view line, std::size_t offset) {
@@ -109,8 +110,7 @@ EcdEventFile::EcdEventFile(const std::filesystem::path& path) : file_(path) {
 
 const EventOrder& EcdEventFile::order() const {
   std::call_once(order_once_, [&] {
-    order_ = known_order(event_index_key(file_.name(), "t x y p"), file_.end_byte(),
-                         [&] { return look_at_times(); });
+    order_ = known_order(index_key_, file_.end_byte(), [&] { return look_at_times(); });
   });
   return order_;
 }

@@ -318,7 +318,7 @@ StoredParts open_event_columns(const fs::path& path, const ColumnLayout& layout,
   const Hdf5Lock lock;
   StoredParts parts;
   parts.name = path.string();
-  parts.index_key = event_index_key(path, layout.column("t"));
+  parts.index_key = hdf5_index_key(path, layout.column("t"));
   std::optional<ImageSize> told = read_hdf5(parts.name, [&] {
     const Hdf5Handle file = open_recording_file(path);
     const auto size = read_size(file, layout, parts.name);

@@ -3,7 +3,7 @@
 #include <fmt/core.h>
 
 #include <cstdint>
-#include <stdexcept>
+#include <exception>
 #include <system_error>
 #include <utility>
 
@@ -68,7 +68,7 @@ void EventIndexes::save() const try {
     pack(bytes, entries_.at(key));
   }
   write_file_atomically(file_, std::string(kFirstLine) + sha256_hex(bytes) + bytes);
-} catch (const std::runtime_error&) {  // what does need the folder will say so
+} catch (const std::exception&) {  // what does need the folder will say so
 }
 
 std::string event_index_key(const fs::path& file, std::string_view how) {

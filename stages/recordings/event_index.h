@@ -46,8 +46,8 @@ class EventIndexes {
 };
 
 /// The key of a file whose events are read so (`how`: where they lie in it, and what else decides
-/// the entry); empty if this thread has no EventIndexes or there is no such
-/// file.
+/// the entry); empty if this thread has no EventIndexes or there is no such file. It is to be made
+/// before the file is opened, else one that takes its place in between has the other's entry.
 std::string event_index_key(const std::filesystem::path& file, std::string_view how);
 
 }  // namespace eventgan

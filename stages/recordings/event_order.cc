@@ -22,7 +22,7 @@ void EventOrder::add_other(double time_s, std::int64_t place) {
 
 void EventOrder::add_unreadable(std::exception_ptr error) {
   add_fall({latest_s_, kInfinity, 0, latest_s_, latest_s_, std::move(error)});
-  is_unread_ = true;
+  is_unread_ = any_unread_ = true;
 }
 
 void EventOrder::add_all(std::span<const double> times_s, std::int64_t first) {
@@ -81,9 +81,9 @@ struct PackedFall {
 }  // namespace
 
 std::optional<std::string> EventOrder::to_bytes() const {
+  if (any_unread_) return std::nullopt;
   std::vector<PackedFall> falls;
   for (const Fall& fall : falls_) {
-    if (fall.unread) return std::nullopt;
     falls.push_back({fall.from_s, fall.until_s, fall.place, fall.before_s, fall.after_s});
   }
   std::string bytes;

@@ -253,7 +253,7 @@ Hdf5Layout v2e_layout() {
 std::unique_ptr<Recording> open_hdf5_recording(const std::filesystem::path& path,
                                                const Hdf5Layout& layout,
                                                const std::optional<ImageSize>& sensor) {
-  std::string index_key = event_index_key(path, layout.events);
+  std::string index_key = hdf5_index_key(path, layout.events);
   const auto file = std::make_shared<const Hdf5RecordingFile>(path, layout);
   StoredParts parts{
       .name = path.string(), .size = {}, .events = std::make_unique<Hdf5Events>(file)};

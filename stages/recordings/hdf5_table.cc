@@ -6,9 +6,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <system_error>
 #include <vector>
+
+#include "stages/recordings/event_index.h"
 
 namespace eventgan {
 namespace {
@@ -110,6 +113,14 @@ hsize_t most_values(hid_t dataset, std::size_t width) {
   return stored > kMost / growth ? kMost : stored * growth / width;
 }
 
+/// Of the file that an object lies in, as it was opened.
+std::string file_name(hid_t object) {
+  const auto size = static_cast<std::size_t>(std::max<ssize_t>(H5Fget_name(object, nullptr, 0), 0));
+  std::string name(size + 1, '\0');  // with the end that HDF5 writes
+  H5Fget_name(object, name.data(), name.size());
+  return name;
+}
+
 constexpr H5Z_filter_t kLzfFilter = 32000;
 
 /// Filters of recordings that libhdf5 does not have itself, and Debian's packages of them.
@@ -153,6 +164,24 @@ Hdf5Handle open_recording_file(const std::filesystem::path& path) {
   } catch (const Hdf5Error&) {
     std::throw_with_nested(
         InputError("expected a whole HDF5 file, got one that does not open, in " + path.string()));
+  }
+}
+
+std::string hdf5_index_key(const std::filesystem::path& path, const std::string& dataset) {
+  std::string key = event_index_key(path, dataset);
+  if (key.empty()) return key;
+  const Hdf5Lock lock;
+  try {
+    const Hdf5Handle file = open_recording_file(path);
+    const Hdf5Handle values(H5Dopen2(file, dataset.c_str(), H5P_DEFAULT), H5Dclose, "open",
+                            dataset);
+    const Hdf5Handle creation(H5Dget_create_plist(values), H5Pclose, "read", "the layout");
+    const bool is_elsewhere = H5Pget_layout(creation) == H5D_VIRTUAL ||
+                              H5Pget_external_count(creation) > 0 ||
+                              file_name(values) != file_name(file);
+    return is_elsewhere ? "" : key;
+  } catch (const std::exception&) {  // told when it is opened
+    return "";
   }
 }
 

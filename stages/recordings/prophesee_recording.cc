@@ -331,8 +331,9 @@ struct DecodingStart {
 
 class PropheseeEvents final : public EventParts {
  public:
-  PropheseeEvents(std::unique_ptr<const RecordingFile> file, PropheseeEncoding encoding,
-                  std::int64_t first_byte, ImageSize size, bool shifts)
+  /// `index_key`: of the file, made before it was opened (event_index_key); empty: none.
+  PropheseeEvents(std::unique_ptr<const RecordingFile> file, std::string index_key,
+                  PropheseeEncoding encoding, std::int64_t first_byte, ImageSize size, bool shifts)
       : EventParts(file->name()),
         file_(std::move(file)),
         encoding_(encoding),
@@ -340,8 +341,8 @@ class PropheseeEvents final : public EventParts {
         shifts_(shifts),
         end_byte_(file_->end_byte() - (file_->end_byte() - first_byte) % word_bytes()) {
     EventIndexes* const indexes = EventIndexes::current();
-    const std::string key = event_index_key(
-        file_->name(), fmt::format("{} {} {}", to_string(size), first_byte, shifts));
+    std::string key = std::move(index_key);
+    if (!key.empty()) key += fmt::format(" {} {} {}", to_string(size), first_byte, shifts);
     if (indexes != nullptr && !key.empty() && restore(indexes->find(key).value_or(""))) return;
     DecodingStart start{first_byte, {}};
     while (start.byte < end_byte_) {
@@ -497,6 +498,7 @@ std::optional<RecordingFault> prophesee_fault(const RecordingInput& input,
 }  // namespace
 
 StoredParts open_prophesee(const std::filesystem::path& path, const RecordingOptions& options) {
+  std::string index_key = event_index_key(path, "events");
   auto file = std::make_unique<const RecordingFile>(path);
   PropheseeHeader header = read_prophesee_header(
       file->read_between(0, std::min(kMostHeaderBytes, file->end_byte())), file->name());
@@ -531,8 +533,9 @@ StoredParts open_prophesee(const std::filesystem::path& path, const RecordingOpt
   parts.size =
       sensor_size(is_told ? std::optional(ImageSize{*header.height, *header.width}) : std::nullopt,
                   options.sensor, parts);
-  auto events = std::make_unique<PropheseeEvents>(std::move(file), *header.encoding,
-                                                  header.end_byte, parts.size, options.time_shift);
+  auto events =
+      std::make_unique<PropheseeEvents>(std::move(file), std::move(index_key), *header.encoding,
+                                        header.end_byte, parts.size, options.time_shift);
   events->tell(parts);
   parts.events = std::move(events);
   return parts;

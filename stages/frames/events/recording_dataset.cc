@@ -357,7 +357,22 @@ class RecordingDataset final : public Dataset {
     recorded.span[1] = begin_s + count * length_s;
   }
 
-  /// Numbers the classes of all recordings by their names' order, whatever the order of the files.
+  /// The classes of texts beside windows, as YOLO's names or numbers order them; none where these
+  /// disagree, or some labels are others.
+  std::optional<std::vector<std::string>> window_classes() const {
+    std::vector<std::string> longest;
+    for (const auto& [name, recorded] : recordings_) {
+      if (!recorded.is_window()) return std::nullopt;
+      const auto& names = recorded.labels.class_names;
+      const auto [end, other] = std::ranges::mismatch(names, longest);
+      if (end != names.end() && other != longest.end()) return std::nullopt;
+      if (names.size() > longest.size()) longest = names;
+    }
+    return longest;
+  }
+
+  /// Numbers the classes of all recordings by their names' order, whatever the order of the files,
+  /// unless window_classes tells it.
   void number_classes() {
     std::map<std::string, int> numbers;
     const std::vector<std::string>* joints = nullptr;
@@ -372,9 +387,12 @@ class RecordingDataset final : public Dataset {
       joints = &recorded.labels.joint_names;
     }
     if (joints != nullptr) schema_.joint_names = *joints;
-    for (auto& [class_name, number] : numbers) {
-      number = static_cast<int>(schema_.class_names.size());
-      schema_.class_names.push_back(class_name);
+    schema_.class_names = window_classes().value_or(std::vector<std::string>());
+    if (schema_.class_names.empty()) {
+      for (const auto& [class_name, number] : numbers) schema_.class_names.push_back(class_name);
+    }
+    for (std::size_t i = 0; i < schema_.class_names.size(); ++i) {
+      numbers[schema_.class_names[i]] = static_cast<int>(i);
     }
     for (auto& [name, recorded] : recordings_) {
       for (auto& [time_s, annotation] : recorded.labels.annotations) {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "manifests/documents/detail/json_text.h"
@@ -132,6 +133,20 @@ class FolderSearch {
     default_labels_ = root;
   }
 
+  /// Whether a text in the folder has YOLO's boxes: beside it an empty one has none, else that may
+  /// be anything's.
+  bool has_texts(const fs::path& folder) {
+    if (has_texts_) return *has_texts_;
+    std::error_code ignored;
+    has_texts_ =
+        std::ranges::any_of(fs::directory_iterator(folder, ignored), [](const auto& entry) {
+          std::error_code unknown;
+          return is_window_label_file(entry.path()) && entry.is_regular_file(unknown) &&
+                 is_window_label_text(entry.path()).value_or(false);
+        });
+    return *has_texts_;
+  }
+
   void find_labels(const SourceSpec& spec, const fs::path& base) {
     const fs::path named = base / spec.annotations.value_or("");
     if (spec.annotations && !fs::is_directory(named)) {
@@ -141,7 +156,14 @@ class FolderSearch {
             "for " +
             std::to_string(found_.recordings.size()) + " recordings, got a file, in " + spec.root);
       }
-      found_.recordings.begin()->second.set_labels(*spec.annotations, named);
+      FoundFile& recorded = found_.recordings.begin()->second;
+      if (is_window_label_file(named) && recorded.format != RecordingFormat::kTable) {
+        throw UsageError(
+            "annotations: expected NAME.csv, NAME.json or NAME_bbox.npy, since only a table (.npy, "
+            ".npz, .csv) can be one window, got " +
+            *spec.annotations + ", in " + spec.root);
+      }
+      recorded.set_labels(*spec.annotations, named);
       return;
     }
     const fs::path folder = spec.annotations ? named : default_labels_;
@@ -153,14 +175,19 @@ class FolderSearch {
       const fs::path own = fs::absolute(base / recorded.path).lexically_normal();
       std::erase_if(files, [&](const fs::path& file) {
         return !fs::exists(file) || is_manifest(file) ||
+               (is_window_label_file(file) && !fs::is_regular_file(file)) ||
                fs::absolute(file).lexically_normal() == own;
       });
       std::erase_if(files, [&](const fs::path& file) {
-        const bool is_other = (file.extension() == ".csv" && !is_label_table(file)) ||
-                              (is_window_label_file(file) && !is_window_label_text(file));
+        const bool is_text = is_window_label_file(file);
+        const bool is_other =
+            is_text ? !is_window_label_text(file).value_or(files.size() == 1 && has_texts(folder))
+                    : file.extension() == ".csv" && !is_label_table(file);
         if (is_other) {
-          found_.notes.push_back("no labels, since its first line has none of their columns: " +
-                                 file.string());
+          found_.notes.push_back(
+              (is_text ? "no labels, since its first line is not YOLO's (class x y w h): "
+                       : "no labels, since its first line has none of their columns: ") +
+              file.string());
         }
         return is_other;
       });
@@ -200,6 +227,7 @@ class FolderSearch {
 
   RecordingOptions options_;
   RecordingFolder found_;
+  std::optional<bool> has_texts_;
   fs::path default_labels_;  ///< where labels lie unless the manifest says
 };
 

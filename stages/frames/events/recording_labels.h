@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,8 +47,9 @@ std::vector<std::filesystem::path> recording_label_companions(const std::filesys
 /// .npz or .csv, as PEDRo has them.
 bool is_window_label_file(const std::filesystem::path& file);
 
-/// Whether it is YOLO's text, or empty: a window without objects.
-bool is_window_label_text(const std::filesystem::path& file);
+/// Whether it is YOLO's text, by its beginning; none if that is blank, a window without objects or
+/// anything, or cannot be read.
+std::optional<bool> is_window_label_text(const std::filesystem::path& file);
 
 /// Boxes as shares of a sensor of that size, at that time. Their classes are named by data.yaml,
 /// classes.txt or the like beside the file or in the folder above it, else by their numbers. Throws

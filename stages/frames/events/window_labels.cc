@@ -1,5 +1,5 @@
-#include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,8 +13,8 @@ namespace eventgan {
 
 bool is_window_label_file(const std::filesystem::path& file) { return file.extension() == ".txt"; }
 
-bool is_window_label_text(const std::filesystem::path& file) {
-  return is_yolo_text(read_text_file(file)).value_or(true);
+std::optional<bool> is_window_label_text(const std::filesystem::path& file) {
+  return is_yolo_text(beginning_of(file));
 }
 
 std::vector<std::filesystem::path> window_label_companions(const std::filesystem::path& file) {
@@ -28,10 +28,11 @@ std::vector<std::filesystem::path> window_label_companions(const std::filesystem
 
 RecordingLabels read_window_labels(const std::filesystem::path& file, ImageSize sensor,
                                    double time_s) {
-  std::string text = read_text_file(file);
+  std::string text = InputFile(file).read_all();
   const std::vector<std::filesystem::path> names = window_label_companions(file);
-  const YoloSchema classes = names.empty() ? numbered_yolo_classes(highest_yolo_class(text))
-                                           : parse_yolo_names(read_text_file(names[0]), names[0]);
+  const YoloSchema classes = names.empty()
+                                 ? numbered_yolo_classes(highest_yolo_class(text))
+                                 : parse_yolo_names(InputFile(names[0]).read_all(), names[0]);
   Outcome<Annotation> read = parse_yolo_text(std::move(text), classes, sensor, file.string());
   if (is_fault(read)) throw InputError(read.fault().reason);
   return {.annotations = {{time_s, *std::move(read)}},

@@ -55,6 +55,7 @@ class EcdEventFile {
   EventOrder look_at_times() const;
   [[noreturn]] void refuse(const EventFault& fault, std::int64_t line_begin) const;
 
+  std::string index_key_;  ///< before it is opened: of no later file in its place
   RecordingFile file_;
   std::int64_t begin_ = 0;  ///< of the first line that is no comment
   mutable std::once_flag order_once_;

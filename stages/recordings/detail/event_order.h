@@ -93,7 +93,8 @@ class EventOrder {
   bool any_ = false;
   double earliest_s_ = kInfinity;
   double latest_s_ = -kInfinity;
-  bool is_unread_ = false;  ///< the last of the falls_ has no end yet
+  bool is_unread_ = false;   ///< the last of the falls_ has no end yet
+  bool any_unread_ = false;  ///< its fall may be part of another that is known
   std::vector<Fall> falls_;
   std::vector<Block> blocks_;
 };

@@ -12,6 +12,11 @@ namespace eventgan {
 /// Opens a recording's file. Throws InputError "expected an HDF5 file, got X, in PATH".
 Hdf5Handle open_recording_file(const std::filesystem::path& path);
 
+/// event_index_key of a dataset's file; empty, too, if its values lie in others (a virtual or an
+/// external dataset, or one behind a link), whose changes the key does not show. Like it to be made
+/// before the file is opened.
+std::string hdf5_index_key(const std::filesystem::path& path, const std::string& dataset);
+
 /// Runs `read` under the lock. Throws InputError "expected readable values, got damage, in PLACE"
 /// with the cause nested if HDF5 fails.
 template <class Read>

@@ -184,6 +184,23 @@ TEST_F(DraftManifest, OfARecordingTakesItsEvents) {
               ElementsAre(AllOf(HasSubstr("of 1 recording"), Not(HasSubstr("gap")))));
 }
 
+TEST_F(DraftManifest, GuessesASensorFromEventsAlone) {
+  const auto drafted = [&](const std::string& x) {
+    testing::write_file(folder_ / "camera.csv",
+                        "t,x,y,p\n0.1," + x + ",200,1\n0.11," + x + ",3,0\n");
+    return draft({found(DatasetKind::kRecording, "camera.csv")});
+  };
+  const ManifestDraft seen = drafted("300");
+  EXPECT_THAT(seen.findings, Contains("no size of the sensor in the files: set \"sensor\" (the "
+                                      "events reach x = 300, y = 200, as those of a camera of "
+                                      "304x240)"));
+  EXPECT_THAT(seen.text, HasSubstr(R"(// "sensor": { "width": 304, "height": 240 },)"));
+  const ManifestDraft unseen = drafted("9000");  // beyond any sensor: its window is a fault
+  EXPECT_THAT(unseen.findings, Contains("no size of the sensor in the files: set \"sensor\""));
+  EXPECT_THAT(unseen.text, HasSubstr(R"(// "sensor": {)"));
+  EXPECT_FALSE(unseen.has_samples);
+}
+
 TEST_F(DraftManifest, OfSeveralHasOneSizeAndAPresetWhereTheirsDiffer) {
   fs::create_directories(folder_ / "kitti/label_2");
   for (const char* name : {"kitti/image_2/000000.png", "kitti/prev_2/000000_01.png"}) {

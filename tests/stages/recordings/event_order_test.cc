@@ -93,6 +93,16 @@ TEST(EventOrder, WhatCouldNotBeReadMayBeAnyTime) {
   EXPECT_TRUE(touches_fall(order, 3, 4));
   EXPECT_FALSE(touches_fall(order, 5, 7));
   EXPECT_THAT([&] { fault_of(order, 3, 4); }, ThrowsMessage<InputError>("damage"));
+  EXPECT_EQ(order.to_bytes(), std::nullopt);
+}
+
+TEST(EventOrder, WhatCouldNotBeReadIsNotKeptEvenWithinAFall) {
+  EventOrder order;
+  order.add_all(std::vector<double>{1, 5, 3}, 0);
+  EXPECT_NE(order.to_bytes(), std::nullopt);
+  order.add_unreadable(std::make_exception_ptr(InputError("damage")));
+  order.end_block(6);
+  EXPECT_EQ(order.to_bytes(), std::nullopt);
 }
 
 TEST(EventOrder, TooManyFallsAreTakenTogether) {

@@ -496,6 +496,45 @@ TEST_F(RecordingDatasetTest, ATableBesideARecordingIsNoLabels) {
                                                   "another file: all/drive.csv")));
 }
 
+/// Tables that are a window each.
+class WindowTextsTest : public RecordingDatasetTest {
+ protected:
+  WindowTextsTest() {
+    spec_.root = "windows";
+    spec_.recording.sensor = ImageSize{100, 100};
+    for (const char* name : {"a", "b"}) {
+      testing::write_file(folder_ / "windows" / (name + std::string(".csv")),
+                          "t,x,y,p\n0.1,1,2,1\n0.2,3,4,0\n");
+    }
+  }
+
+  void write(const std::string& name, const std::string& text) {
+    testing::write_file(folder_ / "windows" / name, text);
+  }
+
+  /// Of a window's boxes.
+  static std::vector<int> classes(const Dataset& dataset, std::size_t sample) {
+    const auto read = dataset.annotation(dataset.labelled_frames().at(sample).label_key);
+    EXPECT_FALSE(is_fault(read)) << read.fault().reason;
+    std::vector<int> numbers;
+    for (const Box& box : read->boxes) numbers.push_back(box.class_id);
+    return numbers;
+  }
+};
+
+TEST_F(WindowTextsTest, NumberTheirClassesAsYoloDoes) {
+  write("a.txt", "10 0.5 0.5 0.1 0.1\n2 0.5 0.5 0.1 0.1\n");
+  write("b.txt", "1 0.5 0.5 0.1 0.1\n");
+  EXPECT_THAT(classes(*open(), 0), ElementsAre(10, 2));
+  EXPECT_THAT(classes(*open(), 1), ElementsAre(1));
+  EXPECT_THAT(open()->label_schema().class_names,
+              ElementsAre("0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10"));
+  write("a.txt", "0 0.5 0.5 0.1 0.1\n");
+  write("data.yaml", "names: [person, car]\n");
+  EXPECT_THAT(classes(*open(), 0), ElementsAre(0));
+  EXPECT_THAT(open()->label_schema().class_names, ElementsAre("person", "car"));
+}
+
 /// Windows of 50,000 events, one each microsecond, that several threads ask for.
 TEST_F(RecordingDatasetTest, AFileOfEventsIsOpenedTwiceAndReadOnce) {
   constexpr std::uint32_t kEvents = 50'000;
