@@ -18,7 +18,6 @@
 #include "stages/recordings/detail/open_files.h"
 #include "stages/recordings/detail/recording_reader.h"
 #include "stages/recordings/detail/stored_recording.h"
-#include "stages/recordings/event_index.h"
 
 namespace eventgan {
 namespace {

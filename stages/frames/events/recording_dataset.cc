@@ -100,7 +100,8 @@ Span frame_window(const std::vector<double>& frames, double time_s, LabelPlace p
 /// What lies beside a file, or near it, written as that one is.
 std::string written_beside(const fs::path& beside, const fs::path& file,
                            const std::string& written_file) {
-  const fs::path from_file = beside.lexically_relative(file.parent_path());
+  const auto normal = [](const fs::path& path) { return fs::absolute(path).lexically_normal(); };
+  const fs::path from_file = normal(beside).lexically_relative(normal(file).parent_path());
   fs::path written = fs::path(written_file).parent_path() / from_file;
   if (from_file.has_parent_path()) written = written.lexically_normal();  // left/../../images
   return written.generic_string();
@@ -265,7 +266,7 @@ class RecordingDataset final : public Dataset {
       if (recorded.label_file.empty()) continue;
       const fs::path& file = recorded.label_file_on_disk;
       annotation_files_.push_back(recorded.label_file);
-      for (const fs::path& beside : recorded.is_window() ? window_label_companions(file)
+      for (const fs::path& beside : recorded.is_window() ? window_labels_.companions(file)
                                                          : recording_label_companions(file)) {
         annotation_files_.push_back(written_beside(beside, file, recorded.label_file));
       }
@@ -323,12 +324,12 @@ class RecordingDataset final : public Dataset {
   }
 
   /// The labels' time is where the window has it.
-  void read_window(Recorded& recorded) const {
+  void read_window(Recorded& recorded) {
     const auto [first_s, last_s] = recorded.span;
     const double time_s =
         window_.label == LabelPlace::kMiddle ? first_s + (last_s - first_s) / 2 : last_s;
     recorded.labels =
-        read_window_labels(recorded.label_file_on_disk, recorded.recording->size(), time_s);
+        window_labels_.read(recorded.label_file_on_disk, recorded.recording->size(), time_s);
   }
 
   void open_without_frames(Recorded& recorded) const {
@@ -483,6 +484,7 @@ class RecordingDataset final : public Dataset {
 
   WindowSpec window_;
   RecordingOptions options_;
+  WindowLabels window_labels_;
   std::map<std::string, Recorded> recordings_;  ///< by name
   LabelSchema schema_;
   std::vector<LabelledFrame> labelled_;

@@ -8,6 +8,7 @@
 
 #include "manifests/values/frames.h"
 #include "manifests/values/labels.h"
+#include "stages/frames/own_labels/detail/yolo_text.h"
 
 namespace eventgan {
 
@@ -51,12 +52,26 @@ bool is_window_label_file(const std::filesystem::path& file);
 /// anything, or cannot be read.
 std::optional<bool> is_window_label_text(const std::filesystem::path& file);
 
-/// Boxes as shares of a sensor of that size, at that time. Their classes are named by data.yaml,
-/// classes.txt or the like beside the file or in the folder above it, else by their numbers. Throws
-/// InputError: "expected X, got Y, in FILE:3".
-RecordingLabels read_window_labels(const std::filesystem::path& file, ImageSize sensor,
-                                   double time_s);
-std::vector<std::filesystem::path> window_label_companions(const std::filesystem::path& file);
+/// Reads such texts; looks once into each folder. Their classes are named by data.yaml, classes.txt
+/// or the like beside the file or in the folder above it, else by their numbers.
+class WindowLabels {
+ public:
+  /// Boxes as shares of a sensor of that size, at that time. Throws InputError: "expected X, got Y,
+  /// in FILE:3".
+  RecordingLabels read(const std::filesystem::path& file, ImageSize sensor, double time_s);
+
+  /// Which file names the classes.
+  std::vector<std::filesystem::path> companions(const std::filesystem::path& file);
+
+ private:
+  struct Names {
+    std::filesystem::path file;  ///< absolute; empty: none
+    std::optional<YoloSchema> classes;
+  };
+  Names& names_of(const std::filesystem::path& file);
+
+  std::map<std::filesystem::path, Names> names_;  ///< by the texts' folder
+};
 
 /// Whether a NAME.csv is one of labels: its first line has one of their columns, or there is none.
 bool is_label_table(const std::filesystem::path& file);

@@ -1,5 +1,4 @@
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -7,7 +6,6 @@
 #include "stages/base/files/input_file.h"
 #include "stages/frames/events/recording_labels.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
-#include "stages/frames/own_labels/detail/yolo_text.h"
 
 namespace eventgan {
 
@@ -17,22 +15,36 @@ std::optional<bool> is_window_label_text(const std::filesystem::path& file) {
   return is_yolo_text(beginning_of(file));
 }
 
-std::vector<std::filesystem::path> window_label_companions(const std::filesystem::path& file) {
-  for (const std::filesystem::path& folder :
-       {file.parent_path(), file.parent_path().parent_path()}) {
-    const std::string name = yolo_names_file(folder);
-    if (!name.empty()) return {folder / name};
+WindowLabels::Names& WindowLabels::names_of(const std::filesystem::path& file) {
+  // Of "./a.txt" the folder above is another than ".".
+  const std::filesystem::path folder =
+      std::filesystem::absolute(file).lexically_normal().parent_path();
+  const auto [names, is_new] = names_.try_emplace(folder);
+  if (!is_new) return names->second;
+  for (const std::filesystem::path& place : {folder, folder.parent_path()}) {
+    const std::string name = yolo_names_file(place);
+    if (name.empty()) continue;
+    names->second.file = place / name;
+    break;
   }
-  return {};
+  return names->second;
 }
 
-RecordingLabels read_window_labels(const std::filesystem::path& file, ImageSize sensor,
+std::vector<std::filesystem::path> WindowLabels::companions(const std::filesystem::path& file) {
+  const Names& names = names_of(file);
+  if (names.file.empty()) return {};
+  return {names.file};
+}
+
+RecordingLabels WindowLabels::read(const std::filesystem::path& file, ImageSize sensor,
                                    double time_s) {
   std::string text = InputFile(file).read_all();
-  const std::vector<std::filesystem::path> names = window_label_companions(file);
-  const YoloSchema classes = names.empty()
-                                 ? numbered_yolo_classes(highest_yolo_class(text))
-                                 : parse_yolo_names(InputFile(names[0]).read_all(), names[0]);
+  Names& names = names_of(file);
+  if (!names.file.empty() && !names.classes) {
+    names.classes = parse_yolo_names(InputFile(names.file).read_all(), names.file);
+  }
+  const YoloSchema classes =
+      names.classes ? *names.classes : numbered_yolo_classes(highest_yolo_class(text));
   Outcome<Annotation> read = parse_yolo_text(std::move(text), classes, sensor, file.string());
   if (is_fault(read)) throw InputError(read.fault().reason);
   return {.annotations = {{time_s, *std::move(read)}},

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <thread>
 #include <tuple>
@@ -533,6 +534,50 @@ TEST_F(WindowTextsTest, NumberTheirClassesAsYoloDoes) {
   write("data.yaml", "names: [person, car]\n");
   EXPECT_THAT(classes(*open(), 0), ElementsAre(0));
   EXPECT_THAT(open()->label_schema().class_names, ElementsAre("person", "car"));
+}
+
+TEST_F(WindowTextsTest, AreLabelsOnlyIfOneSaysSo) {
+  spec_.window.duration_s = 1;
+  write("a.txt", "");  // a log that says nothing
+  EXPECT_EQ(open()->labelled_frames().size(), 2u);
+  EXPECT_THAT(open()->notes(),
+              Contains(AllOf(HasSubstr("no labels, since its first line is not YOLO's (class x y w "
+                                       "h): "),
+                             HasSubstr("a.txt"))));
+  std::filesystem::create_directory(folder_ / "windows/b.txt");
+  EXPECT_EQ(open()->labelled_frames().size(), 2u);
+  std::filesystem::remove(folder_ / "windows/b.txt");
+  write("b.txt", "0 0.5 0.5 0.1 0.1\n");
+  EXPECT_EQ(open()->labelled_frames().size(), 2u);
+  EXPECT_THAT(classes(*open(), 0), IsEmpty());
+  EXPECT_THAT(classes(*open(), 1), ElementsAre(0));
+}
+
+TEST_F(WindowTextsTest, AreOfTablesAlone) {
+  write("a.txt", "0 0.5 0.5 0.1 0.1\n");
+  spec_.root = "drive.h5";
+  spec_.recording.sensor.reset();
+  spec_.annotations = "windows/a.txt";
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<UsageError>(HasSubstr("only a table")));
+}
+
+TEST_F(WindowTextsTest, AreNamedInTheFolderAboveThatOfAnyPath) {
+  write("a.txt", "1 0.5 0.5 0.1 0.1\n");
+  testing::write_file(folder_ / "data.yaml", "names: [person, car]\n");
+  for (const char* root : {"windows", "windows/.", "./windows/"}) {
+    spec_.root = root;
+    EXPECT_THAT(open()->label_schema().class_names, ElementsAre("person", "car")) << root;
+    EXPECT_THAT(open()->annotation_files(), Contains("data.yaml")) << root;
+  }
+  const auto in_folder = open_recording_dataset(
+      [&] {
+        SourceSpec spec = spec_;
+        spec.root = ".";
+        return spec;
+      }(),
+      folder_ / "windows");
+  EXPECT_THAT(in_folder->label_schema().class_names, ElementsAre("person", "car"));
+  EXPECT_THAT(in_folder->annotation_files(), ElementsAre("../data.yaml", "a.txt"));
 }
 
 /// Windows of 50,000 events, one each microsecond, that several threads ask for.

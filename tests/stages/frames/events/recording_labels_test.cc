@@ -272,7 +272,7 @@ class WindowLabelsTest : public ::testing::Test {
  protected:
   RecordingLabels read(const std::string& text) {
     testing::write_file(file_, text);
-    return read_window_labels(file_, ImageSize{100, 200}, 1.5);
+    return WindowLabels().read(file_, ImageSize{100, 200}, 1.5);
   }
 
   testing::TemporaryFolder folder_;
@@ -292,12 +292,12 @@ TEST_F(WindowLabelsTest, AreSharesOfTheSensorAtTheWindowsTime) {
 }
 
 TEST_F(WindowLabelsTest, ClassesAreNamedBesideOrAboveThem) {
-  EXPECT_THAT(window_label_companions(file_), IsEmpty());
+  EXPECT_THAT(WindowLabels().companions(file_), IsEmpty());
   testing::write_file(folder_ / "yolo/classes.txt", "person\n");
   EXPECT_THAT(read("0 0.5 0.5 0.1 0.2").class_names, ElementsAre("person"));
   testing::write_file(folder_ / "yolo/train/data.yaml", "names: [man, dog]\n");
   EXPECT_THAT(read("0 0.5 0.5 0.1 0.2").class_names, ElementsAre("man", "dog"));
-  EXPECT_THAT(window_label_companions(file_), ElementsAre(folder_ / "yolo/train/data.yaml"));
+  EXPECT_THAT(WindowLabels().companions(file_), ElementsAre(folder_ / "yolo/train/data.yaml"));
 }
 
 TEST_F(WindowLabelsTest, MistakesAreNamedByTheirLine) {
@@ -312,10 +312,10 @@ TEST_F(WindowLabelsTest, OtherTextsAreNone) {
     testing::write_file(file_, text);
     return is_window_label_text(file_);
   };
-  EXPECT_TRUE(is_text(""));
-  EXPECT_TRUE(is_text("0 0.5 0.5 0.1 0.2\n"));
-  EXPECT_FALSE(is_text("recorded on a Monday\n"));
-  EXPECT_FALSE(is_text("0.003811 96 133 0\n"));
+  EXPECT_EQ(is_text(""), std::nullopt);
+  EXPECT_EQ(is_text("0 0.5 0.5 0.1 0.2\n"), true);
+  EXPECT_EQ(is_text("recorded on a Monday\n"), false);
+  EXPECT_EQ(is_text("0.003811 96 133 0\n"), false);
 }
 
 }  // namespace
