@@ -224,7 +224,7 @@ class Stills(program.InFolder):
         large = {}
         sizes = {image["id"]: image for image in coco["images"]}
         for one in coco["annotations"]:
-            image, (x, y, w, h) = sizes[one["image_id"]], one["bbox"]
+            image, (x, _, w, h) = sizes[one["image_id"]], one["bbox"]
             centred = abs(x + w / 2 - image["width"] / 2) < image["width"] / 8
             if not one.get("iscrowd") and w * h > 0.1 * image["width"] * image["height"] and centred:
                 large.setdefault(one["image_id"], []).append(one)
