@@ -136,7 +136,7 @@ class CommandLine(program.InFolder):
         for arguments in [["convert", "a.json", "--progress", "3"], ["realism", "a.h5", "--with", "1"],
                           ["export", "out", "--to", "0", "--out", "x"]]:
             _, err = run(*arguments, expect=64)
-            self.assertRegex(err, r"expected one of [a-z-]+(, [a-z-]+)+, got \d")
+            self.assertRegex(err, r"expected one of [a-z0-9-]+(, [a-z0-9-]+)+, got \d")
             self.assertNotRegex(err, r"->|\{")
 
     def test_after_quarantine_the_last_line_says_what_to_run(self):

@@ -15,11 +15,11 @@ namespace eventgan {
 struct ColumnLayout {
   std::string events;  ///< the group of the columns
   /// Whole numbers [ms]: the first event at or after each ms; empty or absent: there is none.
-  std::string ms_index = "";
-  std::string t_offset = "";  ///< µs, added to t; likewise
+  std::string ms_index = {};
+  std::string t_offset = {};  ///< µs, added to t; likewise
   /// Of the sensor: [width, height], or height and width; likewise.
   std::vector<std::string> size = {};
-  std::string ending = "";      ///< of the columns' names: "s" where they are xs, ys, ts, ps
+  std::string ending = {};      ///< of the columns' names: "s" where they are xs, ys, ts, ps
   bool counts_seconds = false;  ///< t is seconds, float
 
   std::string column(const std::string& name) const { return events + "/" + name + ending; }
