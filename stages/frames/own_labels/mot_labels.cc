@@ -208,6 +208,10 @@ std::map<std::int64_t, Outcome<ImageLabels>> parse_mot_labels(std::string_view t
     Outcome<ImageLabels>& outcome = frames[*frame];
     if (is_fault(outcome)) continue;
     try {
+      // Some columns are not read, but all are kept.
+      if (line->bytes.find('\0') != std::string::npos) {
+        throw BadLabel("expected text, got a NUL in it");
+      }
       auto& labels = *outcome;
       labels.original.append(line->bytes);
       add_row(line->fields, form, labels);

@@ -104,6 +104,8 @@ TEST(MotLabels, ABadLineSpoilsItsFrameAlone) {
     EXPECT_THAT(mot_fault("1,1,1,1,1,1,1," + std::string(kind) + ",1\n"),
                 HasSubstr("expected a class from 1 to 13, got '" + std::string(kind) + "'"));
   }
+  using std::string_literals::operator""s;  // in a column that is not read
+  EXPECT_EQ(mot_fault("1,7,1,1,1,1,1,1,\0\n"s), "expected text, got a NUL in it, in gt.txt:1");
   EXPECT_EQ(mot_fault("1,7,1,1,1,1,1\n1,8,1,1,1,1,1\n1,7,2,2,2,2,1\n"),
             "expected each id once in a frame, got 7 twice, in gt.txt:3");
   EXPECT_THAT(mot_fault("1,7,1,1,1,1,1\n1,8,1,1,1,x,1\n1,9,y,2,2,2,1\n"), HasSubstr(":2"));
