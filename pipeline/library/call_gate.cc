@@ -49,9 +49,9 @@ void CallGate::open() {
   changed_.notify_all();
 }
 
-/// The threads that waited here, for the lock or behind the gate, are not in the child.
+/// The threads that waited here are not in the child, and a condition would wait for them.
 void CallGate::open_in_child() {
-  new (&mutex_) std::mutex;
+  const std::lock_guard lock(mutex_, std::adopt_lock);
   new (&changed_) std::condition_variable;
   closed_ = 0;
   ended_ = false;

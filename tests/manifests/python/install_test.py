@@ -153,6 +153,19 @@ def test_it_loads_no_library_that_it_does_not_need():
     assert "numpy" in after and not after & HEAVY
 
 
+@pytest.mark.parametrize("other, code", [
+    ("matplotlib", "import matplotlib.pyplot"),
+    ("torch", """
+import torch
+traced = torch.jit.trace(torch.nn.ReLU(), torch.zeros(2))
+assert list(traced.graph.nodes())
+"""), ("cv2", "import cv2\ncv2.cvtColor(volume[0], cv2.COLOR_GRAY2BGR)"), ("scipy", "import scipy.ndimage")])
+def test_packages_that_are_loaded_behind_it_work(other, code):
+    """A compiled module once changed how those of others raise errors."""
+    pytest.importorskip(other)
+    python(VOLUME + code)
+
+
 @pytest.mark.parametrize("first", ["torch", "eventgan"])
 def test_it_lives_beside_pytorch(first):
     """Whichever comes first, both compute what they compute alone, and PyTorch keeps its threads."""

@@ -9,6 +9,7 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <cstdint>
 #include <cstdlib>
 #include <string>
@@ -188,6 +189,7 @@ TEST_F(Calls, AForkedChildComputesWhateverOtherThreadsAreAt) {
   std::vector<std::jthread> threads;
   for (int i = 0; i < 3; ++i) threads.emplace_back([&] { call_on(stop, wrong); });
   for (int i = 0; i < 30; ++i) {
+    std::fflush(nullptr);
     const pid_t child = fork();
     ASSERT_GE(child, 0);
     if (child == 0) {
@@ -211,6 +213,7 @@ TEST_F(Calls, AForkedChildComputesWhateverOtherThreadsAreAt) {
 
 TEST_F(Calls, AProcessEndsWhileItsThreadsCall) {
   for (int i = 0; i < 5; ++i) {
+    std::fflush(nullptr);
     const pid_t child = fork();
     ASSERT_GE(child, 0);
     if (child == 0) {
