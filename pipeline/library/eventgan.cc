@@ -10,6 +10,7 @@
 #include <memory>
 #include <new>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <span>
 #include <string>
 #include <utility>
@@ -20,6 +21,7 @@
 #include "pipeline/library/call_gate.h"
 #include "pipeline/library/pair_engine.h"
 #include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/memory.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/exports/sampled_events.h"
 
@@ -156,7 +158,8 @@ std::string description_of(const PairEngine& engine) {
                              {"description", engine.generator().description()},
                              {"weights_hash", engine.loaded().weights_hash},
                              {"warnings", engine.loaded().warnings},
-                             {"training_gaps", nullptr}};
+                             {"training_gaps", nullptr},
+                             {"draws", engine.draws()}};
   if (gaps) description["training_gaps"] = {gaps->first, gaps->last};
   return description.dump();
 }
@@ -216,8 +219,8 @@ int eventgan_shape(const eventgan_generator* generator, int64_t height, int64_t 
 }
 
 int eventgan_generate(const eventgan_generator* generator, const eventgan_images* previous,
-                      const eventgan_images* following, float* volumes, uint64_t size,
-                      int64_t* next, int64_t most) {
+                      const eventgan_images* following, uint64_t draw, float* volumes,
+                      uint64_t size, int64_t* next, int64_t most) {
   return result_of([&] {
     const PairEngine& engine = required(generator, "a generator")->engine;
     const ImagePairs pairs(*required(previous, "images"), *required(following, "images"));
@@ -234,7 +237,7 @@ int eventgan_generate(const eventgan_generator* generator, const eventgan_images
         const std::int64_t i = shared.fetch_add(1);
         if (i < 0 || i >= end) return;
         const auto index = static_cast<std::size_t>(i);
-        engine.make(pairs, index, nullptr, 1,
+        engine.make(pairs, index, nullptr, 1, draw,
                     values.subspan(index * shape.value_count(), shape.value_count()));
       }
     } catch (...) {
@@ -246,7 +249,7 @@ int eventgan_generate(const eventgan_generator* generator, const eventgan_images
 
 int eventgan_sample(const eventgan_generator* generator, const eventgan_images* previous,
                     const eventgan_images* following, const eventgan_labels* labels, int32_t gap,
-                    float* volume, uint64_t size, const char** json) {
+                    uint64_t draw, float* volume, uint64_t size, const char** json) {
   return result_of([&] {
     const CallGate::Pass pass;
     if (gap < 1) throw UsageError("expected a gap of at least 1, got " + std::to_string(gap));
@@ -257,7 +260,8 @@ int eventgan_sample(const eventgan_generator* generator, const eventgan_images* 
     }
     const KnownLabels known = labels_of(*required(labels, "labels"));
     const VolumeShape shape = engine.shape(pair.previous.size(), 1, 1);
-    const MadeVolume made = engine.make(pair, 0, &known, gap, volumes_of(volume, size, shape, 1));
+    const MadeVolume made =
+        engine.make(pair, 0, &known, gap, draw, volumes_of(volume, size, shape, 1));
     place_labels(made.labels, *labels);
     last_json = notes_of(made, engine.job().generator.scope.tile_px);
     if (json) *json = last_json.c_str();
@@ -309,6 +313,12 @@ int eventgan_sample_events(const float* volume, int32_t bins, int32_t height, in
     const std::size_t unsound = first_unsound_value(values);
     if (unsound < values.size()) {
       throw UsageError("expected finite values >= 0, got " + std::to_string(values[unsound]));
+    }
+    // They are gathered, sorted with as much room beside them, and copied for the caller.
+    const double count_about = std::accumulate(values.begin(), values.end(), 0.0);
+    if (count_about <= kMostSampledEvents &&
+        4 * sizeof(Event) * count_about > static_cast<double>(memory_limit_bytes())) {
+      throw std::bad_alloc();
     }
     const std::vector<Event> drawn =
         sample_events(values, shape, duration_s,

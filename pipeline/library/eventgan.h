@@ -92,6 +92,7 @@ EVENTGAN_API void eventgan_free(eventgan_generator* generator);
  *   description    engine, precision and the libraries that affect the bytes
  *   weights_hash   SHA-256 of the weights file; of a model, of its description
  *   training_gaps  [first, last] in frames, on which the network was trained, or null
+ *   draws          whether thresholds, noise, events or motion are drawn for each pair
  *   warnings       what to know before trusting the volumes, a list of strings */
 EVENTGAN_API const char* eventgan_describe(const eventgan_generator* generator);
 
@@ -104,15 +105,17 @@ EVENTGAN_API int eventgan_shape(const eventgan_generator* generator, int64_t hei
 
 /* Makes the volumes of pairs: of image i of `previous` and of `following`, which are alike in
  * count and size, the values [2 bins, H, W] at volumes + i * 2 bins * H * W: positive bins in time
- * order, then negative ones; finite, >= 0. `size`: of them all, in floats.
+ * order, then negative ones; finite, >= 0. `size`: of them all, in floats. `draw`: which of the
+ * draws for a pair, if the manifest asks for any: another number gives another volume, 0 that of
+ * shards.
  *
  * next NULL: all pairs. Else pairs *next, *next + 1, ... until there are no more, or `most` are
  * made: threads that give the same `next`, at first 0, share the work. It is added to atomically;
  * who sets it to the count stops them, as a call that fails does. */
 EVENTGAN_API int eventgan_generate(const eventgan_generator* generator,
                                    const eventgan_images* previous,
-                                   const eventgan_images* following, float* volumes, uint64_t size,
-                                   int64_t* next, int64_t most);
+                                   const eventgan_images* following, uint64_t draw, float* volumes,
+                                   uint64_t size, int64_t* next, int64_t most);
 
 /* Makes the volume of one pair as above, by its labels if the manifest's scope asks for them, and
  * what a shard has beside it. `gap`: between the images, in frames, >= 1. `json` gets an object,
@@ -122,8 +125,8 @@ EVENTGAN_API int eventgan_generate(const eventgan_generator* generator,
  *   threshold    that was drawn for the pair, if the manifest asks for that */
 EVENTGAN_API int eventgan_sample(const eventgan_generator* generator,
                                  const eventgan_images* previous, const eventgan_images* following,
-                                 const eventgan_labels* labels, int32_t gap, float* volume,
-                                 uint64_t size, const char** json);
+                                 const eventgan_labels* labels, int32_t gap, uint64_t draw,
+                                 float* volume, uint64_t size, const char** json);
 
 /* The image as the network sees it: grey, resized, blurred, at its place in the volume's height
  * and width. `size`: of `grey`, in bytes. */
@@ -132,7 +135,8 @@ EVENTGAN_API int eventgan_prepare(const eventgan_generator* generator, const eve
 
 /* Draws events that could have made a volume [2 bins, height, width] of finite values >= 0, over
  * duration_s > 0 seconds. `rounded`: each value becomes the nearest number of events, not a draw
- * of Poisson's distribution with that mean. `events` goes back with eventgan_free_events. */
+ * of Poisson's distribution with that mean; not more than 10^9 altogether, nor more than there is
+ * memory for. `events` goes back with eventgan_free_events. */
 EVENTGAN_API int eventgan_sample_events(const float* volume, int32_t bins, int32_t height,
                                         int32_t width, double duration_s, uint64_t seed,
                                         int32_t rounded, eventgan_event** events, uint64_t* count);

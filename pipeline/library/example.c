@@ -32,7 +32,7 @@ int main(int count, char** paths) {
   check(eventgan_shape(generator, previous.height, previous.width, 1, 1, shape, NULL));
   const uint64_t size = (uint64_t)shape[0] * (uint64_t)shape[1] * (uint64_t)shape[2];
   float* volume = malloc(size * sizeof(float));
-  check(eventgan_generate(generator, &previous, &following, volume, size, NULL, 0));
+  check(eventgan_generate(generator, &previous, &following, 0, volume, size, NULL, 0));
   fwrite(volume, sizeof(float), size, stdout);
   eventgan_event* events;
   uint64_t drawn;

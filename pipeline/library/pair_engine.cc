@@ -61,6 +61,12 @@ VolumeShape PairEngine::shape(ImageSize source, std::size_t count, int threads) 
   return shape;
 }
 
+bool PairEngine::draws() const {
+  const GeneratorSpec& spec = job_.generator;
+  return spec.noise || spec.threshold || !has_weights(spec.kind) ||
+         (spec.sample && generator().thresholds());
+}
+
 /// Without labels a scope of labels would give a volume that looks as if nothing had moved.
 void PairEngine::require_labels(const KnownLabels* labels) const {
   const Scope scope = job_.generator.scope.scope;
@@ -71,13 +77,12 @@ void PairEngine::require_labels(const KnownLabels* labels) const {
 }
 
 MadeVolume PairEngine::make(const ImagePairs& pairs, std::size_t index, const KnownLabels* labels,
-                            int gap, std::span<float> volume) const {
+                            int gap, std::uint64_t draw, std::span<float> volume) const {
   require_labels(labels);
   const PreparedFrame previous = pairs.previous.prepared(index, job_.image);
   const PreparedFrame following = pairs.following.prepared(index, job_.image);
-  const bool draws = job_.generator.noise || job_.generator.threshold || generator().thresholds();
-  const std::string name = draws ? content_name(previous, following) : "";
-  const PairKey key{job_.seed, to_string(DatasetKind::kFrames), name};
+  const std::string name = draws() ? content_name(previous, following) : "";
+  const PairKey key{job_.seed, to_string(DatasetKind::kFrames), name, {}, draw};
   const PreparedPair pair = prepare_pair(previous, following);
   MadeVolume made;
   made.placement = pair.placement;

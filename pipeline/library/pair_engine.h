@@ -49,11 +49,15 @@ class PairEngine {
   /// process.
   VolumeShape shape(ImageSize source, std::size_t count, int threads) const;
 
+  /// Whether thresholds, noise, events or a simulator's motion are drawn for each pair.
+  bool draws() const;
+
   /// Makes the volume [2 bins, H, W] of pair `index`. `labels` may be null, unless the manifest's
-  /// scope is theirs. `gap`: between the images in frames. Throws UsageError, std::bad_alloc, and
-  /// std::runtime_error for a volume that is not sound.
+  /// scope is theirs. `gap`: between the images in frames. `draw`: which of the draws for them; 0
+  /// is that of shards. Throws UsageError, std::bad_alloc, and std::runtime_error for a volume that
+  /// is not sound.
   MadeVolume make(const ImagePairs& pairs, std::size_t index, const KnownLabels* labels, int gap,
-                  std::span<float> volume) const;
+                  std::uint64_t draw, std::span<float> volume) const;
 
  private:
   void require_labels(const KnownLabels* labels) const;

@@ -46,7 +46,8 @@ for _name, _result, _arguments in [
         ("version", ctypes.c_char_p, ()), ("error", ctypes.c_char_p, ()), ("load", _I32, (ctypes.c_char_p, _P)),
         ("free", None, (_P,)), ("describe", ctypes.c_char_p, (_P,)),
         ("shape", _I32, (_P, _I64, _I64, _I64, _I32, _P, _P)),
-        ("generate", _I32, (_P, _P, _P, _P, _U64, _P, _I64)), ("sample", _I32, (_P, _P, _P, _P, _I32, _P, _U64, _P)),
+        ("generate", _I32, (_P, _P, _P, _U64, _P, _U64, _P, _I64)),
+        ("sample", _I32, (_P, _P, _P, _P, _I32, _U64, _P, _U64, _P)),
         ("prepare", _I32, (_P, _P, _P, _U64)),
         ("sample_events", _I32, (_P, _I32, _I32, _I32, _F64, _U64, _I32, _P, _P)), ("free_events", None, (_P,)),
         ("end", None, ())]:

@@ -155,13 +155,21 @@ class Generator:
         gaps = self._told["training_gaps"]
         return gaps and (gaps[0], gaps[1])
 
-    def __call__(self, previous: npt.ArrayLike, following: npt.ArrayLike) -> np.ndarray:
+    @property
+    def draws(self) -> bool:
+        """Whether thresholds, noise, events or a simulator's motion are drawn for each pair."""
+        return self._told["draws"]
+
+    def __call__(self, previous: npt.ArrayLike, following: npt.ArrayLike, *, draw: int = 0) -> np.ndarray:
         """The volume of two images of one size.
 
         Parameters
         ----------
         previous, following : array_like, [H, W] or [H, W, 3]
             uint8, or floating-point numbers from 0 to 1.
+        draw : int, default 0
+            Which of the draws for these images, where anything is drawn (`draws`): another number gives another
+            volume. 0 is that of shards.
 
         Returns
         -------
@@ -176,8 +184,9 @@ class Generator:
         """
         before, after = _engine.pair(_array(previous, "previous"), _array(following, "following"))
         volume = np.empty(self._shape(before)[0], np.float32)
-        _engine.check(_engine.lib.eventgan_generate(self._handle, before.pointer, after.pointer,
-                                                    _engine.address(volume), volume.size, None, 0))
+        _engine.check(_engine.lib.eventgan_generate(
+            self._handle, before.pointer, after.pointer, _whole(draw, "draw", 0, 2**64 - 1), _engine.address(volume),
+            volume.size, None, 0))
         return volume
 
     def _shape(self, images: _engine.Images, threads: int = 1) -> tuple[tuple[int, ...], np.ndarray]:
@@ -201,7 +210,7 @@ class Generator:
         def make(most: int) -> None:
             try:
                 _engine.check(_engine.lib.eventgan_generate(
-                    self._handle, before.pointer, after.pointer, _engine.address(volumes), volumes.size,
+                    self._handle, before.pointer, after.pointer, 0, _engine.address(volumes), volumes.size,
                     ctypes.byref(next_pair), most))
             except Exception as error:
                 faults.append(error)
@@ -223,7 +232,7 @@ class Generator:
         return volumes
 
     def sample(self, previous: npt.ArrayLike, following: npt.ArrayLike, *, boxes: npt.ArrayLike | None = None,
-               joints: npt.ArrayLike | None = None, gap: int = 1) -> dict[str, Any]:
+               joints: npt.ArrayLike | None = None, gap: int = 1, draw: int = 0) -> dict[str, Any]:
         """The volume with what a shard has beside it.
 
         Parameters
@@ -236,6 +245,8 @@ class Generator:
             x, y in pixels of the image, whose centres are whole numbers; NaN: not annotated.
         gap : int, default 1
             The gap between the images in frames; only for the flag that the network was not trained on such a gap.
+        draw : int, default 0
+            As of a call.
 
         Returns
         -------
@@ -271,7 +282,7 @@ class Generator:
             labels.person_count, labels.joint_count = joints.shape[:2]
         _engine.check(_engine.lib.eventgan_sample(
             self._handle, before.pointer, after.pointer, ctypes.byref(labels), _whole(gap, "gap"),
-            _engine.address(volume), volume.size, ctypes.byref(notes)))
+            _whole(draw, "draw", 0, 2**64 - 1), _engine.address(volume), volume.size, ctypes.byref(notes)))
         sample.update(json.loads(notes.value or b""))
         if "tiles" in sample["statistics"]:
             sample["statistics"]["tiles"] = np.array(sample["statistics"]["tiles"], np.uint8)

@@ -6,6 +6,7 @@ import json
 import os
 import pathlib
 import pickle
+import re
 import subprocess
 import sys
 import warnings
@@ -413,9 +414,22 @@ def test_sampled_events():
                 np.full((2, 1, 1), np.inf), "volume"):
         with pytest.raises(ValueError, match="expected"):
             eventgan.sample_events(bad)
-    for settings in ({"duration_s": 0}, {"duration_s": np.nan}, {"seed": -1}, {"seed": 1.5}, {"counts": "exact"}):
+    for settings in ({"duration_s": 0}, {"duration_s": np.nan}, {"seed": -1}, {"seed": 1.5}, {"seed": 2**63},
+                     {"counts": "exact"}):
         with pytest.raises(ValueError, match="expected"):
             eventgan.sample_events(volume, **settings)
+    assert len(eventgan.sample_events(volume, seed=2**63 - 1)) > 0  # as far as the manifest's go
+
+
+@pytest.mark.parametrize("counts", ["poisson", "rounded"])
+def test_more_events_than_can_be_made_are_refused(counts):
+    for value in (1e30, 8.6e9, 2.0**31, 1.1e9):
+        with pytest.raises(ValueError, match=r"expected values of at most 1e\+09 events altogether, got"):
+            eventgan.sample_events(np.full((2, 1, 1), [[[0]], [[value]]]), counts=counts)
+    memory = 1000 * int(re.search(r"MemTotal: *(\d+) kB", pathlib.Path("/proc/meminfo").read_text())[1])
+    if 9e8 * 96 > memory:
+        with pytest.raises(MemoryError):
+            eventgan.sample_events(np.full((2, 1, 1), 4.5e8), counts=counts)
 
 
 # ---- What is refused

@@ -9,8 +9,8 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
-#include <cstdio>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <string>
 #include <thread>
@@ -55,7 +55,7 @@ class Calls : public ::testing::Test {
   void TearDown() override { eventgan_free(generator_); }
 
   int generate(std::vector<float>& volumes, std::int64_t* next = nullptr, std::int64_t most = 0) {
-    return eventgan_generate(generator_, &previous_, &following_, volumes.data(), volumes.size(),
+    return eventgan_generate(generator_, &previous_, &following_, 0, volumes.data(), volumes.size(),
                              next, most);
   }
 
@@ -133,10 +133,10 @@ TEST_F(Calls, RefuseWhatDoesNotFit) {
   made.resize(made.size() - 1);
   refused("volumes of 154224 values");
   EXPECT_EQ(
-      eventgan_generate(nullptr, &previous_, &following_, made.data(), made.size(), nullptr, 0),
+      eventgan_generate(nullptr, &previous_, &following_, 0, made.data(), made.size(), nullptr, 0),
       EVENTGAN_USAGE);
   EXPECT_EQ(
-      eventgan_generate(generator_, nullptr, &following_, made.data(), made.size(), nullptr, 0),
+      eventgan_generate(generator_, nullptr, &following_, 0, made.data(), made.size(), nullptr, 0),
       EVENTGAN_USAGE);
 }
 
