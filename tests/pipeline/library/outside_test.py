@@ -75,8 +75,8 @@ def test_ctypes_without_the_package():
     previous, following = (Images(image.ctypes.data, 1, 37, 53, (0, 53, 1, 0), 1, 0) for image in IMAGES)
     volume = np.empty((18, 37, 53), np.float32)
     assert library.eventgan_generate(generator, ctypes.byref(previous), ctypes.byref(following),
-                                     ctypes.c_uint64(0), ctypes.c_void_p(volume.ctypes.data), ctypes.c_uint64(volume.size), None,
-                                     ctypes.c_int64(0)) == 0
+                                     ctypes.c_uint64(0), ctypes.c_void_p(volume.ctypes.data),
+                                     ctypes.c_uint64(volume.size), None, ctypes.c_int64(0)) == 0
     np.testing.assert_array_equal(volume, eventgan.Generator("shipped:8", precision="float32")(*IMAGES))
     library.eventgan_free(generator)
 
