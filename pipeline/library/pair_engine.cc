@@ -11,6 +11,7 @@
 #include "pipeline/runtime/memory.h"
 #include "stages/base/files/sha256.h"
 #include "stages/events/volume_statistics.h"
+#include "stages/generator/onednn/buffers.h"
 #include "stages/labels/label_mapping.h"
 
 namespace eventgan {
@@ -58,6 +59,10 @@ VolumeShape PairEngine::shape(ImageSize source, std::size_t count, int threads) 
           (static_cast<double>(count) + threads) +
       static_cast<double>(generator().working_bytes(shape.size)) * static_cast<double>(threads);
   if (bytes > static_cast<double>(memory_bytes_)) throw std::bad_alloc();
+  // Asked for and given back untouched: what is not there (ulimit -v) is an error here, and the end
+  // of the process inside oneDNN, which does not look.
+  constexpr double kAThread = 16 << 20;  // its stack, and what oneDNN takes for itself
+  const PageBuffer trial(static_cast<std::size_t>(bytes + kAThread * (threads + 1)));
   return shape;
 }
 

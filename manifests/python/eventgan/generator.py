@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import errno
 import json
@@ -198,10 +199,8 @@ class Generator:
 
     def many(self, previous: npt.ArrayLike, following: npt.ArrayLike, threads: int = 1) -> np.ndarray:
         """Volumes of N pairs: images [N, H, W] or [N, H, W, 3] -> float32 [N, 2B, H, W], by this many threads,
-        which end with the call."""
-        threads = _whole(threads, "threads")
-        if threads > 1024:
-            raise ValueError(f"expected 1 to 1024 threads, got {threads}")
+        which end with the call; by no more than there are cores."""
+        threads = min(_whole(threads, "threads"), len(os.sched_getaffinity(0)))
         before, after = _engine.pair(_array(previous, "previous"), _array(following, "following"), True)
         volumes = np.empty((before.count, *self._shape(before, threads)[0]), np.float32)
         next_pair = ctypes.c_int64(0)  # which the threads count up
@@ -218,8 +217,9 @@ class Generator:
         others = [threading.Thread(target=make, args=(before.count,), daemon=True)
                   for _ in range(min(threads, before.count) - 1)]
         try:
-            for other in others:
-                other.start()
+            with contextlib.suppress(RuntimeError):  # no room for another thread: those that are there do it
+                for other in others:
+                    other.start()
             while next_pair.value < before.count:
                 make(1)  # one at a time: Ctrl-C is heard between them
         finally:

@@ -1,6 +1,7 @@
 """eventgan.Generator under what a process can do to it: forks while other threads compute, an end while they do,
 signals, threads of all kinds. Each in a process of its own."""
 
+import os
 import subprocess
 import sys
 
@@ -89,8 +90,26 @@ print("done")
 """
 
 
-def run(script, *arguments):
-    done = subprocess.run([sys.executable, "-c", SET_UP + script, *map(str, arguments)], capture_output=True, text=True,
+LITTLE_MEMORY = """
+import resource, sys, warnings
+import numpy as np
+import eventgan
+warnings.simplefilter("ignore")
+generator = eventgan.Generator("untrained:8")
+images = np.random.default_rng(5).integers(0, 256, (9, 200, 300), np.uint8)
+generator(*images[:2])
+used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (used + int(float(sys.argv[1]) * 2**20), -1))
+try:
+    generator.many(images[:-1], images[1:], threads=64)
+except MemoryError:
+    pass
+print("done")
+"""
+
+
+def run(script, *arguments, set_up=SET_UP):
+    done = subprocess.run([sys.executable, "-c", set_up + script, *map(str, arguments)], capture_output=True, text=True,
                           timeout=TIMEOUT_S)
     assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
 
@@ -107,3 +126,9 @@ def test_python_ends_while_daemon_threads_compute(after_s):
 @pytest.mark.parametrize("threads", [1, 3])
 def test_ctrl_c_is_heard_between_the_pairs(threads):
     run(INTERRUPT, threads)
+
+
+@pytest.mark.skipif("LD_PRELOAD" in os.environ, reason="sanitizers take more address space than there is")
+@pytest.mark.parametrize("megabytes", [0, 8, 20, 40, 60, 80, 120, 160, 240, 400])
+def test_many_threads_in_little_memory(megabytes):
+    run(LITTLE_MEMORY, megabytes, set_up="")
