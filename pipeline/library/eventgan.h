@@ -80,8 +80,8 @@ EVENTGAN_API const char* eventgan_version(void);
 EVENTGAN_API const char* eventgan_error(void);
 
 /* Makes a generator of those parts of a manifest that make a volume of two images: the keys seed,
- * image, generator and volume of `manifest`, a JSON object; "{}" is the shipped network. No other
- * key may be there; paths in it are absolute. */
+ * image, generator and volume of `manifest`, a JSON object; "{}" is the shipped network in float32.
+ * No other key may be there; paths in it are absolute. */
 EVENTGAN_API int eventgan_load(const char* manifest, eventgan_generator** generator);
 
 /* A generator that no call uses any more, or NULL. */

@@ -2,7 +2,7 @@
 
     import eventgan
 
-    generator = eventgan.Generator("shipped:8", precision="bfloat16")
+    generator = eventgan.Generator("shipped:8")
     volume = generator(previous, following)               # float32 [2B, H, W], >= 0, of images [H, W] or [H, W, 3]
     events = eventgan.sample_events(volume, seed=0)       # structured array t, x, y, p
 

@@ -51,8 +51,10 @@ class Generator:
         "untrained:WIDTH".
     kind : {"network", "esim", "difference"}
         The EventGAN network, or a sensor model to compare it with, which needs no weights.
-    precision : {"float32", "bfloat16", "int8"}
-        The numbers that the network computes with. int8 needs calibrated weights (`eventgan calibrate`).
+    precision : {"auto", "float32", "bfloat16", "int8"}
+        The numbers that the network computes with. "auto": bfloat16 on processors with instructions for it, else
+        float32, which is the default of `eventgan convert`; `description` says which. int8 needs calibrated weights
+        (`eventgan calibrate`).
     size : (int, int), optional
         Height and width of the volumes. None: those of the images.
     fit : {"stretch", "letterbox", "crop"}
@@ -85,7 +87,7 @@ class Generator:
 
     Examples
     --------
-    >>> generator = eventgan.Generator("shipped:8", precision="bfloat16", size=(256, 320), fit="letterbox")
+    >>> generator = eventgan.Generator("shipped:8", size=(256, 320), fit="letterbox")
     >>> volume = generator(previous, following)
     >>> volume.shape
     (18, 256, 320)
@@ -95,6 +97,8 @@ class Generator:
                  size: tuple[int, int] | None = None, fit: str | None = None, preset: str | None = None,
                  grey: str | None = None, blur: int | None = None, scope: str | None = None,
                  normalize: str | None = None, seed: int = 0, **settings: Any) -> None:
+        if precision is None and kind in (None, "network"):
+            precision = "auto"
         given = dict(kind=kind, weights=_weights(weights), precision=precision, fit=fit, preset=preset, grey=grey,
                      blur=blur, scope=scope, normalize=normalize, **settings)
         known = [key for keys in _PLACES.values() for key in keys]

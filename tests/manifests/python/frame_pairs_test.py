@@ -506,8 +506,8 @@ def test_items_are_those_of_shards(tmp_path, monkeypatch):
         source.append((pair["prev_path"], pair["next_path"],
                        {"boxes": boxes["xyxy_source"], "labels": labels, "ignore": boxes["ignore"],
                         "id": pair["sample_id"]}))
-    pairs = FramePairs(Generator("untrained:4", size=(50, 130), fit="crop", preset="kitti", seed=7), source,
-                       classes=expected.classes)
+    generator = Generator("untrained:4", precision="float32", size=(50, 130), fit="crop", preset="kitti", seed=7)
+    pairs = FramePairs(generator, source, classes=expected.classes)
     assert len(pairs) == 12 and sum(len(item["boxes"]) for item in map(expected.__getitem__, range(12))) > 50
     for i in range(12):
         made, stored = pairs[i], expected[i]

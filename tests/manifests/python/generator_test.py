@@ -104,6 +104,8 @@ MODELS = {
 def check_same(folder, size, image, generator, volume, colour, seed=3):
     """Every volume, statistic and label of a shard, made again from its images."""
     images = scene(*size, colour)
+    if "kind" not in generator:
+        generator = {"precision": "auto", **generator}  # what Python takes, and the program does not
     keys = dict(image)
     if "size" in keys:
         keys["height"], keys["width"] = keys.pop("size")
@@ -326,6 +328,27 @@ def test_prepare(images):
     np.testing.assert_array_equal(cropped, grey[:, 11:42])
 
 
+def test_the_default_precision_is_what_the_processor_does_well(images):
+    flags = set(re.search(r"flags\s*: (.*)", pathlib.Path("/proc/cpuinfo").read_text())[1].split())
+    if "ONEDNN_MAX_CPU_ISA" in os.environ or "onednn" not in eventgan.Generator("shipped:8").description:
+        pytest.skip("not what the processor says")
+    best = "bfloat16" if flags & {"avx512_bf16", "amx_bf16"} and "avx512bw" in flags else "float32"
+    for given in ({}, {"precision": "auto"}):
+        generator = eventgan.Generator("shipped:8", **given)
+        assert best in generator.description and f" {best}" in repr(generator)
+        np.testing.assert_array_equal(generator(*images[:2]),
+                                      eventgan.Generator("shipped:8", precision=best)(*images[:2]))
+
+
+def test_processors_without_avx_512_take_float32():
+    """Those of most laptops."""
+    code = ("import eventgan, numpy as np\ngenerator = eventgan.Generator('shipped:8')\n"
+            "print(generator.description, generator(*np.random.default_rng(1).random((2, 20, 30))).any())")
+    done = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True,
+                          env={**os.environ, "ONEDNN_MAX_CPU_ISA": "AVX2"})
+    assert done.returncode == 0 and "float32" in done.stdout and done.stdout.endswith("True\n"), done
+
+
 # ---- Threads and workers
 
 
@@ -471,7 +494,7 @@ def test_too_large_for_the_memory(generator):
 
 
 @pytest.mark.parametrize("settings, got", [
-    ({"precision": "int9"}, 'precision: expected "float32".*"int9"'),
+    ({"precision": "int9"}, 'precision: expected "float32".*"auto".*"int9"'),
     ({"precision": "int8", "weights": "untrained:8"}, "calibrat"),
     ({"weights": "shipped:7"}, "weights"),
     ({"weights": __file__}, "generator_test.py"),
