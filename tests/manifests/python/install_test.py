@@ -151,6 +151,9 @@ def test_it_loads_no_library_that_it_does_not_need():
     assert not loaded("import eventgan") & {*HEAVY, "numpy"}
     after = loaded("import eventgan\neventgan.Generator, eventgan.sample_events")
     assert "numpy" in after and not after & HEAVY
+    seconds = min(float(python("import numpy, time\nbefore = time.process_time()\nimport eventgan\neventgan.Generator\n"
+                               "print(time.process_time() - before)")) for _ in range(3))
+    assert seconds < 0.15  # behind NumPy's own import
 
 
 @pytest.mark.parametrize("other, code", [

@@ -17,6 +17,7 @@ SOURCE = pathlib.Path(__file__).resolve().parents[3] / "pipeline" / "library"
 BUILD = pathlib.Path(os.environ["EVENTGAN_BUILD"])
 LIBRARY = BUILD / "libeventgan.so.1"
 IMAGES = np.random.default_rng(4).integers(0, 256, (2, 37, 53), np.uint8)
+pytestmark = pytest.mark.filterwarnings("ignore:shipped.*stand-in")
 MANIFEST = '{"generator": {"weights": "shipped:8"}}'
 
 
