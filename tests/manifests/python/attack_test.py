@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-TIMEOUT_S = 300  # a process that waits for a lock which its fork has copied waits for ever
+TIMEOUT_S = 600  # a process that waits for a lock which its fork has copied waits for ever
 
 SET_UP = """
 import os, signal, sys, threading, time, warnings
@@ -115,7 +115,7 @@ def run(script, *arguments, set_up=SET_UP):
 
 
 def test_forks_while_other_threads_compute():
-    run(FORKS, 40)
+    run(FORKS, 25)
 
 
 @pytest.mark.parametrize("after_s", [0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5])
