@@ -3,7 +3,7 @@
 #   docker/bootstrap.sh demo [DIR]   a small demo dataset in DIR (default: ./demo), converted, checked and drawn
 #   docker/bootstrap.sh test         the whole test suite
 #   docker/bootstrap.sh build        only the program, build/release/eventgan
-#   docker/bootstrap.sh package      Debian packages, build/release/*.deb: eventgan, eventgan-torch adds LibTorch, python3-eventgan
+#   docker/bootstrap.sh package      Debian packages, build/release/*.deb: eventgan, eventgan-torch adds LibTorch, libeventgan1, its -dev, python3-eventgan
 #   docker/bootstrap.sh packages [LIST...]   only installs what is missing of docker/packages/LIST.txt (default: build test)
 # Run again, it does only what is left to do. JOBS sets the number of compilers at a time (default: all cores).
 set -euo pipefail

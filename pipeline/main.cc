@@ -1,13 +1,16 @@
+#include <sys/auxv.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <opencv2/core/utility.hpp>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "pipeline/command_line/detail/usage.h"
 #include "pipeline/command_line/standard_streams.h"
@@ -22,7 +25,24 @@ namespace {
 /// Returns, and tells why, only if it cannot.
 void become(const eventgan::HandOver& other, char** argv) {
   namespace fs = std::filesystem;
-  const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
+  std::error_code fault;
+  fs::path self = fs::read_symlink("/proc/self/exe", fault);
+  if (fault) {  // no /proc
+    self = fs::canonical(reinterpret_cast<const char*>(getauxval(AT_EXECFN)), fault);
+  }
+  // One that hands over to itself, as a copy of this program under the other's name would, for
+  // ever.
+  constexpr const char* kBecome = "EVENTGAN_BECOME";
+  const char* before = std::getenv(kBecome);
+  if (fault || (before != nullptr && std::string_view(before) == other.program)) {
+    eventgan::tell_error(std::string("expected ") + other.program + ", got " +
+                         (fault ? "no place where to look for it"
+                                : "another program of its name, " + self.string()) +
+                         ": " + other.advice);
+    return;
+  }
+  setenv(kBecome, other.program, 1);
+  const fs::path folder = self.parent_path();
   const fs::path installed = (folder / EVENTGAN_LIBEXEC_FROM_PROGRAM).lexically_normal();
   for (const fs::path& program : {folder / other.program, installed / other.program}) {
     execv(program.c_str(), argv);

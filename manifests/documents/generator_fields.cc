@@ -125,10 +125,11 @@ void list_generator(Fields& fields, GeneratorSpec& spec) {
   some.find("device", spec.device, words(kDeviceWords),
             "where it is computed. cuda: the first GPU that CUDA_VISIBLE_DEVICES leaves, by the "
             "engine torch in float32 or bfloat16, with a LibTorch that has CUDA.");
-  some.find("precision", spec.precision, words(kPrecisionWords),
+  some.find("precision", spec.precision, words(kPrecisionChoiceWords),
             "the numbers of its convolutions. bfloat16 is worth its error only on processors with "
-            "AVX512-BF16 or AMX. int8 needs weights with a calibration, as `eventgan calibrate` "
-            "makes them. Volumes are float32 before they are stored, whatever this is.");
+            "AVX512-BF16 or AMX; auto takes it there, else float32, and convert says which. int8 "
+            "needs weights with a calibration, as `eventgan calibrate` makes them. Volumes are "
+            "float32 before they are stored, whatever this is.");
   some.find("sample", spec.sample, booleans(),
             "of weights that know their sensor, whose values are numbers of events to be expected: "
             "draws events of them, repeatably for each pair. false: volumes hold those numbers. Of "

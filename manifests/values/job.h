@@ -205,9 +205,10 @@ struct GeneratorSpec {
   std::string weights = "shipped";
   /// kNetwork: none ("auto") means the fastest one for the precision on the processor that runs it.
   std::optional<Engine> engine;
-  Device device = Device::kCpu;               ///< kNetwork
-  Precision precision = Precision::kFloat32;  ///< kNetwork
-  ScopeSpec scope;                            ///< kNetwork
+  Device device = Device::kCpu;  ///< kNetwork
+  /// kNetwork: none ("auto") means what the processor that runs it does well.
+  std::optional<Precision> precision = Precision::kFloat32;
+  ScopeSpec scope;     ///< kNetwork
   bool sample = true;  ///< kNetwork: events are drawn of rates, if the weights give rates
   SensorSpec sensor;   ///< kEsim, kDifference; at the middle of `threshold`
   std::string camera;  ///< name of the document that `threshold` and `noise` are of; empty: none

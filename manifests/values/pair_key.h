@@ -21,11 +21,14 @@ struct PairKey {
   std::string_view dataset;
   std::string_view sample_id;
   std::string_view source = {};  ///< source_key of the sample's source
+  std::uint64_t draw = 0;        ///< which of the draws for the pair; 0 is that of shards
 
   /// The pair's own; keyed on by a word for each thing that is drawn.
   CounterRandom pair() const {
     const CounterRandom of_kind = CounterRandom(seed).keyed(dataset);
-    return (source.empty() ? of_kind : of_kind.keyed(source)).keyed(sample_id);
+    const CounterRandom of_pair =
+        (source.empty() ? of_kind : of_kind.keyed(source)).keyed(sample_id);
+    return draw == 0 ? of_pair : of_pair.keyed(std::to_string(draw));
   }
 
   /// Those of the camera, which all pairs of a kind of dataset share.

@@ -89,6 +89,11 @@ inline constexpr std::array kScopeWords{
 inline constexpr std::array kPrecisionWords{Word<Precision>{"float32", Precision::kFloat32},
                                             Word<Precision>{"bfloat16", Precision::kBfloat16},
                                             Word<Precision>{"int8", Precision::kInt8}};
+inline constexpr std::array kPrecisionChoiceWords{
+    Word<std::optional<Precision>>{"float32", Precision::kFloat32},
+    Word<std::optional<Precision>>{"bfloat16", Precision::kBfloat16},
+    Word<std::optional<Precision>>{"int8", Precision::kInt8},
+    Word<std::optional<Precision>>{"auto", std::nullopt}};
 
 inline constexpr std::array kNormalizationWords{
     Word<Normalization>{"none", Normalization::kNone},

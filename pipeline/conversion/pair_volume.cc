@@ -15,7 +15,7 @@ GeneratedPart generate_volume(const Generator& generator, const GeneratorSpec& s
   GeneratedPart part;
   part.threshold = pair_threshold(spec, key);
   const GeneratorInput input{pair.input, pair.content, part.threshold,
-                             pair.between.at ? &pair.between : nullptr};
+                             pair.between.at ? &pair.between : nullptr, key.draw};
   if (spec.scope.scope == Scope::kWhole) {
     part.notes = generator.generate(input, volume);
   } else {

@@ -118,6 +118,17 @@ std::string advice(Precision precision, const EngineSupport& support) {
 
 }  // namespace
 
+Precision choose_precision(std::optional<Engine> engine, Device device,
+                           const EngineSupport& support) {
+  const auto able = [&](Engine one) { return lack(one, Precision::kBfloat16, support).empty(); };
+  const bool is_good =
+      device == Device::kCuda
+          ? !support.cuda.empty() && support.cuda_lack.empty()
+          : support.native &&
+                (engine ? able(*engine) : able(Engine::kOnednn) || able(Engine::kTorch));
+  return is_good ? Precision::kBfloat16 : Precision::kFloat32;
+}
+
 EngineChoice choose_engine(const EngineRequest& request, const EngineSupport& support) {
   if (request.device == Device::kCuda) return on_cuda(request, support);
   EngineChoice choice = request.engine ? asked(*request.engine, request.precision, support)

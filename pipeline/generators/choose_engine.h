@@ -40,6 +40,11 @@ struct EngineChoice {
 /// processor or the device lack, and what would work. Pure.
 EngineChoice choose_engine(const EngineRequest& request, const EngineSupport& support);
 
+/// The precision of "auto": bfloat16 where `support`, of bfloat16, has instructions made for it and
+/// the engine that is asked for computes it, else float32. Pure.
+Precision choose_precision(std::optional<Engine> engine, Device device,
+                           const EngineSupport& support);
+
 /// What runs a precision on the processor that runs this, as oneDNN sees it
 /// (ONEDNN_MAX_CPU_ISA minded), and, only for Device::kCuda, on the CUDA device (cuda_support).
 EngineSupport engine_support(Precision precision, Device device = Device::kCpu);

@@ -150,10 +150,10 @@ void check_threshold(const Weights& weights, const GeneratorSpec& spec) {
       ratio == 1 ? "" : fmt::format(" with threshold_ratio {:.3g}", ratio)));
 }
 
-std::string choice_text(const EngineChoice& choice, const GeneratorSpec& spec,
+std::string choice_text(const EngineChoice& choice, const GeneratorSpec& spec, Precision precision,
                         const EngineSupport& support, const std::optional<GapRange>& gaps) {
   std::string text = "generator: ";
-  text.append(to_string(choice.engine)).append(" ").append(to_string(spec.precision));
+  text.append(to_string(choice.engine)).append(" ").append(to_string(precision));
   text += " on " + (spec.device == Device::kCuda ? support.cuda : support.processor);
   if (!choice.reason.empty()) text += " (" + choice.reason + ")";
   return text + ", " + describe_training_gaps(gaps);
@@ -161,15 +161,15 @@ std::string choice_text(const EngineChoice& choice, const GeneratorSpec& spec,
 
 /// Weights that the engine refuses are an input that cannot be used.
 std::unique_ptr<Generator> make_engine(Engine engine, const Weights& weights,
-                                       const GeneratorSpec& spec) try {
+                                       const GeneratorSpec& spec, Precision precision) try {
   if (spec.device == Device::kCuda) {
-    return make_batched_generator(weights, spec.precision, spec.device);
+    return make_batched_generator(weights, precision, spec.device);
   }
-  return engine == Engine::kOnednn ? make_onednn_generator(weights, spec.precision)
-                                   : make_torch_generator(weights, spec.precision);
+  return engine == Engine::kOnednn ? make_onednn_generator(weights, precision)
+                                   : make_torch_generator(weights, precision);
 } catch (const std::invalid_argument&) {
   std::throw_with_nested(InputError("cannot use the weights " + spec.weights + " in " +
-                                    std::string(to_string(spec.precision))));
+                                    std::string(to_string(precision))));
 }
 
 }  // namespace
@@ -179,15 +179,18 @@ LoadedGenerator load_generator(const JobManifest& manifest) {
   if (!has_weights(spec.kind)) return load_without_weights(manifest);
   LoadedWeights loaded = load_weights(manifest);
   check_threshold(loaded.weights, spec);
-  const EngineSupport support = engine_support(spec.precision, spec.device);
-  const EngineChoice choice =
-      choose_engine({spec.engine, spec.precision, loaded.weights.calibration != nullptr,
-                     spec.weights, spec.device},
-                    support);
+  const Precision precision =
+      spec.precision ? *spec.precision
+                     : choose_precision(spec.engine, spec.device,
+                                        engine_support(Precision::kBfloat16, spec.device));
+  const EngineSupport support = engine_support(precision, spec.device);
+  const EngineChoice choice = choose_engine(
+      {spec.engine, precision, loaded.weights.calibration != nullptr, spec.weights, spec.device},
+      support);
   LoadedGenerator result;
-  result.generator = make_engine(choice.engine, loaded.weights, spec);
+  result.generator = make_engine(choice.engine, loaded.weights, spec, precision);
   result.weights_hash = std::move(loaded.hash);
-  result.choice = choice_text(choice, spec, support, loaded.weights.training_gaps);
+  result.choice = choice_text(choice, spec, precision, support, loaded.weights.training_gaps);
   for (const std::string& warning : {loaded.warning, choice.warning}) {
     if (!warning.empty()) result.warnings.push_back(warning);
   }

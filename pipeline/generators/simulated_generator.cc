@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "manifests/documents/manifest_fields.h"
@@ -132,7 +133,8 @@ class SimulatedGenerator final : public Generator {
     const std::size_t pixels = pair.size.pixel_count();
     const GreyImage previous = grey_image(pair.frames.first(pixels), pair.size);
     const GreyImage next = grey_image(pair.frames.last(pixels), pair.size);
-    const CounterRandom random = random_.keyed(content_key(previous, next));
+    CounterRandom random = random_.keyed(content_key(previous, next));
+    if (pair.draw != 0) random = random.keyed(std::to_string(pair.draw));
     pixel_event_volume(
         model_.events({previous, next, spec_, sensor_of(pair), random, pair.between}),
         {bins_, pair.size}, volume);

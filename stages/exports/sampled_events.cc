@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <iterator>
 
+#include "manifests/values/faults.h"
 #include "manifests/values/poisson_random.h"
 
 namespace eventgan {
@@ -87,6 +88,12 @@ class Sampling {
 std::vector<Event> sample_events(std::span<const float> volume, const VolumeShape& shape,
                                  double duration_s, EventCounts counts,
                                  const CounterRandom& random) {
+  double sum = 0;
+  for (const float value : volume) sum += value;
+  if (!(sum <= kMostSampledEvents)) {
+    throw UsageError(fmt::format("expected values of at most {:g} events altogether, got {:g}",
+                                 kMostSampledEvents, sum));
+  }
   const CounterRandom draws = random.keyed("counts");
   std::vector<int> drawn(volume.size());
   for (std::size_t i = 0; i < volume.size(); ++i) {

@@ -9,6 +9,10 @@
 
 namespace eventgan {
 
+/// Of one volume: 10^9, some 50 GB. Generated volumes and those of a second of any camera are far
+/// below.
+inline constexpr double kMostSampledEvents = 1e9;
+
 /// How many events a value of a volume becomes.
 enum class EventCounts {
   kPoisson,  ///< a draw from Poisson's distribution, the value its mean
@@ -28,7 +32,7 @@ enum class EventCounts {
 /// to the last, one pixel's events each of the first and of the last bin stay where they are; if
 /// a volume has no events in one of these bins, event_volume stretches what is left.
 ///
-/// Thread safe.
+/// Throws UsageError for values that make more than kMostSampledEvents altogether. Thread safe.
 std::vector<Event> sample_events(std::span<const float> volume, const VolumeShape& shape,
                                  double duration_s, EventCounts counts,
                                  const CounterRandom& random);

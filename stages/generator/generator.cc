@@ -36,15 +36,15 @@ void clear_unwanted(const TileMask& wanted, std::span<float> volume) {
 }
 
 void check_generator_spans(const GeneratorInput& pair, std::span<const float> volume, int bins) {
-  const auto& [frames, size, threshold, between] = pair;
+  const ImageSize size = pair.size;
   const std::size_t plane = size.pixel_count();
-  if (size.height >= 1 && size.width >= 1 && frames.size() == 2 * plane &&
+  if (size.height >= 1 && size.width >= 1 && pair.frames.size() == 2 * plane &&
       volume.size() == 2 * bins * plane) {
     return;
   }
   throw std::invalid_argument("expected frames [2, H, W] and a volume [" +
                               std::to_string(2 * bins) + ", H, W] of " + to_string(size) +
-                              ", got " + std::to_string(frames.size()) + " and " +
+                              ", got " + std::to_string(pair.frames.size()) + " and " +
                               std::to_string(volume.size()) + " values");
 }
 

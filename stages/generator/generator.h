@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -28,6 +29,8 @@ struct GeneratorInput {
   std::optional<ContrastThreshold> threshold = std::nullopt;
   /// For a simulator of what is seen between the frames; null: nobody knows that.
   const FramesBetween* between = nullptr;
+  /// Which of a simulator's draws for these frames; 0 is that of shards.
+  std::uint64_t draw = 0;
 };
 
 /// What an engine noticed while it made a volume.

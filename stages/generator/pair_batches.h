@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
@@ -33,7 +34,7 @@ class PairBatches {
       : most_(std::move(most)), compute_(std::move(compute)) {}
 
   /// The pair's result. What `compute` throws reaches every caller whose pair was in that batch,
-  /// and no other.
+  /// and no other; what `most` throws the caller that asked for it.
   Result compute(std::span<const float> frames, ImageSize size) {
     Call own{frames, size, false, {}, {}};
     std::unique_lock lock(mutex_);
@@ -43,8 +44,15 @@ class PairBatches {
         changed_.wait(lock);
         continue;
       }
+      std::vector<Call*> batch;
+      try {
+        batch = take_batch();
+      } catch (...) {
+        std::erase(waiting_, &own);
+        changed_.notify_all();  // another takes the batch
+        throw;
+      }
       is_computing_ = true;
-      const std::vector<Call*> batch = take_batch();
       lock.unlock();
       compute_batch(batch);
       lock.lock();
@@ -71,11 +79,13 @@ class PairBatches {
     std::exception_ptr failure;
   };
 
-  /// The pair that has waited longest, and those of its size behind it.
+  /// The pair that has waited longest, and those of its size behind it. Changes nothing if it
+  /// throws.
   std::vector<Call*> take_batch() {
     const ImageSize size = waiting_.front()->size;
     const auto most = static_cast<std::size_t>(most_(size));
     std::vector<Call*> batch;
+    batch.reserve(std::min(most, waiting_.size()));
     std::erase_if(waiting_, [&](Call* call) {
       if (call->size != size || batch.size() == most) return false;
       batch.push_back(call);

@@ -144,8 +144,6 @@ def rate_table(bench, settings, precision):
 def measure(bench):
     settings = SETTINGS[bench.effort]
     title = "The call in Python"
-    if not list((bench.build / "python" / "eventgan").glob("_engine.*")):
-        return Section(title, "Skipped: no compiled module (python3-pybind11).", [])
     refused = {}
     tables = [call_table(bench, settings, refused)]
     precision = LOADED[1] if LOADED[1] in native_precisions() else "float32"

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """eventgan.Generator as a server for python_call.py, which alternates it with the engine alone: it reads requests from
-stdin, a line each, and answers with a line of JSON. The compiled module must be on PYTHONPATH.
+stdin, a line each, and answers with a line of JSON. The package must be on PYTHONPATH.
 
     input HEIGHT WIDTH FILE   the images as the engine gets them: [2, y, x], float32 in [-1, 1], raw; warms up
     run                       one call: {"wall_ms": ..., "cpu_ms": ...}

@@ -189,7 +189,10 @@ def call_of(job):
         return None
     manifest = job.manifest()
     with warnings.catch_warnings(action="ignore"):  # of stand-in weights
-        return Generator(**manifest["generator"], preset=job.preset, seed=manifest["seed"])
+        settings = manifest["generator"]
+        if settings.get("kind", "network") == "network":
+            settings = {"precision": "float32", **settings}  # the program's default, not Python's
+        return Generator(**settings, preset=job.preset, seed=manifest["seed"])
 
 
 def cost_of_call(settings, folders, generator, job):

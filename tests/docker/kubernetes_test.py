@@ -144,8 +144,8 @@ class Kubernetes(unittest.TestCase):
     def test_the_image_is_the_dockerfiles_and_has_no_rights(self):
         user, group = re.search(r"^USER (\d+):(\d+)$",
                                 (SOURCE / "docker" / "Dockerfile").read_text(), re.MULTILINE).groups()
-        version = re.search(r'(?m)^version = "([\d.]+)"',
-                            (SOURCE / "manifests" / "python" / "pyproject.toml").read_text())[1]
+        version = re.search(r'(?m)^__version__ = "([\d.]+)"',
+                            (SOURCE / "manifests" / "python" / "eventgan" / "__init__.py").read_text())[1]
         for job in self.jobs:
             security = pod(job)["securityContext"]
             self.assertEqual((security["runAsUser"], security["runAsGroup"]), (int(user), int(group)))

@@ -47,8 +47,6 @@ class Benchmarks(program.InFolder):
                                           "Against the number of pairs", "Against threads", "Storage", "Reading",
                                           "On the fly", "The call in Python", "Slow disk", "Scope", "Beside v2e"])
         self.assertEqual(sections.pop("Beside v2e"), [])
-        if "Skipped: no compiled module" in page:
-            self.assertEqual(sections.pop("The call in Python"), [])
         if "python3-fusepy and /dev/fuse" in page:
             self.assertEqual(sections.pop("Slow disk"), [])
         self.assertIn("Skipped: no --v2e", page)

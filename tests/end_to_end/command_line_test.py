@@ -2,6 +2,7 @@
 
 import collections
 import json
+import os
 import pathlib
 import re
 import shlex
@@ -113,6 +114,18 @@ class CommandLine(program.InFolder):
         done = subprocess.run([alone, "plan", self.folder / "m.json"], capture_output=True, text=True)
         self.assertEqual(done.returncode, 1)
         self.assertIn("error: expected eventgan-video, got none in ", done.stderr)
+        for put in (shutil.copy, os.symlink, os.link):  # a program that would hand over to itself for ever
+            other = self.folder / "eventgan-video"
+            put(alone, other)
+            done = subprocess.run([alone, "plan", self.folder / "m.json"], capture_output=True, text=True, timeout=60)
+            self.assertEqual(done.returncode, 1)
+            self.assertRegex(done.stderr, r"\Aerror: expected eventgan-video, got another program of its name, /.*\n\Z")
+            other.unlink()
+        without = ["unshare", "--mount", "sh", "-c", 'umount -l /proc && exec "$@"', "sh"]
+        if subprocess.run([*without, "true"], capture_output=True).returncode == 0:
+            done = subprocess.run([*without, alone, "plan", self.folder / "m.json"], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("error: expected eventgan-video, got none in ", done.stderr)
 
     def test_mistyped_words_get_the_nearest(self):
         for arguments, got, meant in [

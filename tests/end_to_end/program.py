@@ -11,7 +11,7 @@ import unittest
 
 PROGRAM = os.environ["EVENTGAN_PROGRAM"]
 SOURCE = pathlib.Path(os.environ["EVENTGAN_SOURCE_DIR"])
-PACKAGE = pathlib.Path(PROGRAM).parent / "python"  # the Python package, with the compiled module where there is one
+PACKAGE = pathlib.Path(PROGRAM).parent / "python"  # the Python package, with libeventgan
 SHARED = pathlib.Path(os.environ.get("EVENTGAN_TEST_DATA", SOURCE.parent / "shared" / "data"))
 SKIPPED = 77  # what ctest knows as skipped
 

@@ -27,7 +27,7 @@ FLOORS = [
     ["pipeline/simulation", "pipeline/training", "pipeline/realism", "pipeline/exports", "pipeline/report"],
     ["pipeline/tradeoff"],
     ["pipeline/command_line"],
-    ["pipeline/commands", "pipeline/python"],
+    ["pipeline/commands", "pipeline/library"],
     ["pipeline/main.cc", "pipeline/without_torch.cc", "pipeline/without_videos.cc"],
 ]
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
@@ -59,8 +59,8 @@ class Layers(unittest.TestCase):
         for room in FLOOR:
             if (SOURCE / room).is_dir():
                 text = (SOURCE / room / "CMakeLists.txt").read_text()
-                self.assertEqual(len(re.findall(r"^(?:eventgan_library|pybind11_add_module)\(", text, re.MULTILINE)), 1,
-                                 room)
+                libraries = re.findall(r"^(?:eventgan_library\(|add_library\(\w+ SHARED)", text, re.MULTILINE)
+                self.assertEqual(len(libraries), 1, room)
 
 
 if __name__ == "__main__":

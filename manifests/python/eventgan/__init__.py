@@ -2,7 +2,7 @@
 
     import eventgan
 
-    generator = eventgan.Generator("shipped:8", precision="bfloat16")
+    generator = eventgan.Generator("shipped:8")
     volume = generator(previous, following)               # float32 [2B, H, W], >= 0, of images [H, W] or [H, W, 3]
     events = eventgan.sample_events(volume, seed=0)       # structured array t, x, y, p
 
@@ -10,7 +10,7 @@
         sample["volume"], sample["boxes"]["xyxy"], sample["persons"]["joints"]
 
 `eventgan.torch` has PyTorch's datasets, `eventgan.evaluate` scores what a network finds. Each name is loaded when it is
-first used: `Shards` needs h5py, `Generator` the compiled module, `show` matplotlib. manifests/guides/python.md shows
+first used: `Shards` needs h5py, `Generator` libeventgan, `show` matplotlib. manifests/guides/python.md shows
 all of it at work.
 """
 
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from .program import ProgramError, convert, init, open
     from .representations import signed_channel
     from .shards import FIELDS, InvalidSample, Sample, Shards, open_shard, read_description
+
+__version__ = "0.2.0"
 
 _MODULE_OF = {
     "Generator": "generator", "sample_events": "generator",

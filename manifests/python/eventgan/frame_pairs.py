@@ -55,6 +55,7 @@ class Drawn(NamedTuple):
     gain: float
     gamma: float
     generator: int            # its place among the generators
+    draw: int                 # of its thresholds, noise and events (`Generator.draws`); 0 where it draws nothing
     augmentation_seed: int    # of EventAugmentation's numbers
 
 
@@ -69,8 +70,8 @@ class CacheInfo(NamedTuple):
 class FramePairs(Dataset):
     """Volumes made from pairs of images when they are asked for: no shards on disk, and other volumes in each epoch.
 
-    What is drawn for an item depends on (seed, epoch, index) alone, not on the worker, the order or the batch. Call
-    `set_epoch` before each epoch.
+    What is drawn for an item, thresholds, noise and events of the generator's sensor too, depends on (seed, epoch,
+    index) alone, not on the worker, the order or the batch. Call `set_epoch` before each epoch.
 
     If the target has boxes, an item is one of `DetectionDataset`, so `collate_yolo` and `collate_torchvision` take it;
     its `label_position` is 1 if the target belongs to the image at the end of time, 0 for the one at the start. With
@@ -112,9 +113,9 @@ class FramePairs(Dataset):
     seed : int, default 0
     cache_bytes : int, default 0
         How many bytes of the volumes last used are kept, before `augmentation`. Another gap, gain, gamma, direction or
-        generator is another volume: one drawn from a continuous range never comes again. Each worker has its own cache,
-        which ends with it: it is of use between epochs with persistent_workers=True, if an item comes to the same
-        worker again.
+        generator is another volume: one drawn from a continuous range never comes again, nor does one of a generator
+        that draws (`Generator.draws`). Each worker has its own cache, which ends with it: it is of use between epochs
+        with persistent_workers=True, if an item comes to the same worker again.
     length : int, optional
         The number of items, if `source` is a callable.
 
@@ -177,12 +178,14 @@ class FramePairs(Dataset):
     def drawn(self, index: int) -> Drawn:
         """What item `index` is made with in this epoch."""
         philox = np.random.Philox(counter=[0, 0, self._number(index), int(self._epoch)], key=self._seed)
-        raw = philox.random_raw(6)
+        raw = philox.random_raw(7)
         gap, reverse, gain, gamma, generator = ((raw[:5] >> np.uint64(11)) * 2.0**-53).tolist()
         first, last = self._gaps or (1, 1)
         may = self._frame_augmentation
+        place = int(generator * len(self._generators))
         return Drawn(first + int(gap * (last - first + 1)), reverse < may.reverse, _between(may.gain, gain),
-                     _between(may.gamma, gamma), int(generator * len(self._generators)), int(raw[5] >> np.uint64(1)))
+                     _between(may.gamma, gamma), place, int(raw[6]) if self._generators[place].draws else 0,
+                     int(raw[5] >> np.uint64(1)))
 
     def cache_info(self) -> CacheInfo:
         """Of this process's cache, since it was made."""
@@ -211,9 +214,9 @@ class FramePairs(Dataset):
             images = [_exposed(_image(image), drawn.gain, drawn.gamma) for image in (previous, following)]
             generator = self._generators[drawn.generator]
             if not isinstance(target, Mapping) or "boxes" not in target:
-                return _Made(generator(*images), target, None, label_position)
+                return _Made(generator(*images, draw=drawn.draw), target, None, label_position)
             boxes, labels, ignore = self._boxes(target)
-            sample = generator.sample(*images, boxes=boxes, gap=drawn.gap)
+            sample = generator.sample(*images, boxes=boxes, gap=drawn.gap, draw=drawn.draw)
             return _Made(sample["volume"], target,
                          (sample["boxes"]["xyxy"], sample["boxes"]["xyxy_unclipped"], labels, ignore), label_position)
         except FileNotFoundError as error:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
+import errno
 import json
 import operator
 import os
 import re
+import threading
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, Union
@@ -16,9 +20,9 @@ import numpy.typing as npt
 try:
     from . import _engine
 except ImportError as error:
-    raise ImportError(f"expected the compiled module eventgan._engine, got none ({error}): install the Debian package "
-                      "python3-eventgan, or run `pip install -v ./manifests/python` in a checkout, which builds it or "
-                      "says what is missing") from error
+    raise ImportError(f"expected the library libeventgan, got none ({error}): install the Debian packages "
+                      "libeventgan1 and python3-eventgan, or run `pip install -v ./manifests/python` in a checkout, "
+                      "which builds it or says what is missing") from error
 
 PathLike = Union[str, os.PathLike]
 _PLACES = {  # of settings in a manifest
@@ -47,8 +51,10 @@ class Generator:
         "untrained:WIDTH".
     kind : {"network", "esim", "difference"}
         The EventGAN network, or a sensor model to compare it with, which needs no weights.
-    precision : {"float32", "bfloat16", "int8"}
-        The numbers that the network computes with. int8 needs calibrated weights (`eventgan calibrate`).
+    precision : {"auto", "float32", "bfloat16", "int8"}
+        The numbers that the network computes with. "auto": bfloat16 on processors with instructions for it, else
+        float32, which is the default of `eventgan convert`; `description` says which. int8 needs calibrated weights
+        (`eventgan calibrate`).
     size : (int, int), optional
         Height and width of the volumes. None: those of the images.
     fit : {"stretch", "letterbox", "crop"}
@@ -81,7 +87,7 @@ class Generator:
 
     Examples
     --------
-    >>> generator = eventgan.Generator("shipped:8", precision="bfloat16", size=(256, 320), fit="letterbox")
+    >>> generator = eventgan.Generator("shipped:8", size=(256, 320), fit="letterbox")
     >>> volume = generator(previous, following)
     >>> volume.shape
     (18, 256, 320)
@@ -91,6 +97,8 @@ class Generator:
                  size: tuple[int, int] | None = None, fit: str | None = None, preset: str | None = None,
                  grey: str | None = None, blur: int | None = None, scope: str | None = None,
                  normalize: str | None = None, seed: int = 0, **settings: Any) -> None:
+        if precision is None and kind in (None, "network"):
+            precision = "auto"
         given = dict(kind=kind, weights=_weights(weights), precision=precision, fit=fit, preset=preset, grey=grey,
                      blur=blur, scope=scope, normalize=normalize, **settings)
         known = [key for keys in _PLACES.values() for key in keys]
@@ -105,12 +113,22 @@ class Generator:
             manifest["image"].update(zip(("height", "width"), size))
         manifest["seed"] = seed
         self._set_up(_json(manifest))
-        for text in self._engine.warnings:
+        for text in self._told["warnings"]:
             warnings.warn(text, stacklevel=2)
 
     def _set_up(self, settings: str) -> None:
         self._settings = settings
-        self._engine = _engine.Generator(settings)
+        self._handle = ctypes.c_void_p()
+        code = _engine.lib.eventgan_load(settings.encode(), ctypes.byref(self._handle))
+        weights = json.loads(settings).get("generator", {}).get("weights", "")
+        if code == _engine.INPUT_MISSING and weights.startswith("/") and not os.path.exists(weights):
+            raise FileNotFoundError(errno.ENOENT, "expected a file of weights, got none", weights)
+        _engine.check(code)
+        self._told: dict[str, Any] = json.loads(_engine.lib.eventgan_describe(self._handle))
+
+    def __del__(self, _free: Any = _engine.lib.eventgan_free) -> None:
+        if handle := self.__dict__.get("_handle"):
+            _free(handle)
 
     def __getstate__(self) -> str:
         return self._settings
@@ -124,30 +142,39 @@ class Generator:
     @property
     def bins(self) -> int:
         """Bins per polarity: a volume has twice as many channels."""
-        return self._engine.bins
+        return self._told["bins"]
 
     @property
     def description(self) -> str:
         """Engine, precision and the libraries that affect the bytes, as in a plan's fingerprint."""
-        return self._engine.description
+        return self._told["description"]
 
     @property
     def weights_hash(self) -> str:
         """SHA-256 of the weights file, hexadecimal; of a model, of its description."""
-        return self._engine.weights_hash
+        return self._told["weights_hash"]
 
     @property
     def training_gaps(self) -> tuple[int, int] | None:
         """The smallest and the largest gap, in frames, that the network was trained on; None: unknown."""
-        return self._engine.training_gaps
+        gaps = self._told["training_gaps"]
+        return gaps and (gaps[0], gaps[1])
 
-    def __call__(self, previous: npt.ArrayLike, following: npt.ArrayLike) -> np.ndarray:
+    @property
+    def draws(self) -> bool:
+        """Whether thresholds, noise, events or a simulator's motion are drawn for each pair."""
+        return self._told["draws"]
+
+    def __call__(self, previous: npt.ArrayLike, following: npt.ArrayLike, *, draw: int = 0) -> np.ndarray:
         """The volume of two images of one size.
 
         Parameters
         ----------
         previous, following : array_like, [H, W] or [H, W, 3]
             uint8, or floating-point numbers from 0 to 1.
+        draw : int, default 0
+            Which of the draws for these images, where anything is drawn (`draws`): another number gives another
+            volume. 0 is that of shards.
 
         Returns
         -------
@@ -160,16 +187,56 @@ class Generator:
         ValueError
             An image is not one, or the two differ in size.
         """
-        return self._engine.call(_array(previous, "previous"), _array(following, "following"))
+        before, after = _engine.pair(_array(previous, "previous"), _array(following, "following"))
+        volume = np.empty(self._shape(before)[0], np.float32)
+        _engine.check(_engine.lib.eventgan_generate(
+            self._handle, before.pointer, after.pointer, _whole(draw, "draw", 0, 2**64 - 1), _engine.address(volume),
+            volume.size, None, 0))
+        return volume
+
+    def _shape(self, images: _engine.Images, threads: int = 1) -> tuple[tuple[int, ...], np.ndarray]:
+        """Shape of the volume of such an image, and the map [2, 3] of its points to it."""
+        shape, to_volume = (ctypes.c_int32 * 3)(), (ctypes.c_double * 6)()
+        _engine.check(_engine.lib.eventgan_shape(self._handle, images.height, images.width, images.count, threads,
+                                                 shape, to_volume))
+        return tuple(shape), np.array(to_volume).reshape(2, 3)
 
     def many(self, previous: npt.ArrayLike, following: npt.ArrayLike, threads: int = 1) -> np.ndarray:
         """Volumes of N pairs: images [N, H, W] or [N, H, W, 3] -> float32 [N, 2B, H, W], by this many threads,
-        which end with the call."""
-        return self._engine.many(_array(previous, "previous"), _array(following, "following"),
-                                 _whole(threads, "threads"))
+        which end with the call; by no more than there are cores."""
+        threads = min(_whole(threads, "threads"), len(os.sched_getaffinity(0)))
+        before, after = _engine.pair(_array(previous, "previous"), _array(following, "following"), True)
+        volumes = np.empty((before.count, *self._shape(before, threads)[0]), np.float32)
+        next_pair = ctypes.c_int64(0)  # which the threads count up
+        faults: list[Exception] = []
+
+        def make(most: int) -> None:
+            try:
+                _engine.check(_engine.lib.eventgan_generate(
+                    self._handle, before.pointer, after.pointer, 0, _engine.address(volumes), volumes.size,
+                    ctypes.byref(next_pair), most))
+            except Exception as error:
+                faults.append(error)
+
+        others = [threading.Thread(target=make, args=(before.count,), daemon=True)
+                  for _ in range(min(threads, before.count) - 1)]
+        try:
+            with contextlib.suppress(RuntimeError):  # no room for another thread: those that are there do it
+                for other in others:
+                    other.start()
+            while next_pair.value < before.count:
+                make(1)  # one at a time: Ctrl-C is heard between them
+        finally:
+            next_pair.value = before.count
+            for other in others:
+                if other.ident:
+                    other.join()
+        if faults:
+            raise faults[0]
+        return volumes
 
     def sample(self, previous: npt.ArrayLike, following: npt.ArrayLike, *, boxes: npt.ArrayLike | None = None,
-               joints: npt.ArrayLike | None = None, gap: int = 1) -> dict[str, Any]:
+               joints: npt.ArrayLike | None = None, gap: int = 1, draw: int = 0) -> dict[str, Any]:
         """The volume with what a shard has beside it.
 
         Parameters
@@ -182,6 +249,8 @@ class Generator:
             x, y in pixels of the image, whose centres are whole numbers; NaN: not annotated.
         gap : int, default 1
             The gap between the images in frames; only for the flag that the network was not trained on such a gap.
+        draw : int, default 0
+            As of a call.
 
         Returns
         -------
@@ -195,16 +264,47 @@ class Generator:
                 given; row for row
             joints : float64 [P, J, 2] in volume pixels, if joints were given
         """
-        return self._engine.sample(_array(previous, "previous"), _array(following, "following"),
-                                   _numbers(boxes, "boxes"), _numbers(joints, "joints"), _whole(gap, "gap"))
+        before, after = _engine.pair(_array(previous, "previous"), _array(following, "following"))
+        volume_shape, to_volume = self._shape(before)
+        volume, notes = np.empty(volume_shape, np.float32), ctypes.c_char_p()
+        sample: dict[str, Any] = {"volume": volume, "statistics": None, "source_to_volume": to_volume}
+        labels = _engine.Labels(box_count=-1, person_count=-1)
+        if boxes is not None:
+            boxes = _numbers(boxes, "boxes")
+            if boxes.ndim != 2 or boxes.shape[1] != 4:
+                raise ValueError(f"expected boxes [n, 4], got shape {_engine.shape_text(boxes)}")
+            clipped, unclipped = np.empty(boxes.shape), np.empty(boxes.shape)
+            labels.boxes, labels.box_count = _engine.address(boxes), len(boxes)
+            labels.clipped, labels.unclipped = _engine.address(clipped), _engine.address(unclipped)
+            sample["boxes"] = {"xyxy": clipped, "xyxy_unclipped": unclipped}
+        if joints is not None:
+            joints = _numbers(joints, "joints")
+            if joints.ndim != 3 or joints.shape[2] != 2:
+                raise ValueError(f"expected joints [P, J, 2], got shape {_engine.shape_text(joints)}")
+            sample["joints"] = np.empty(joints.shape)
+            labels.joints, labels.placed = _engine.address(joints), _engine.address(sample["joints"])
+            labels.person_count, labels.joint_count = joints.shape[:2]
+        _engine.check(_engine.lib.eventgan_sample(
+            self._handle, before.pointer, after.pointer, ctypes.byref(labels), _whole(gap, "gap"),
+            _whole(draw, "draw", 0, 2**64 - 1), _engine.address(volume), volume.size, ctypes.byref(notes)))
+        sample.update(json.loads(notes.value or b""))
+        if "tiles" in sample["statistics"]:
+            sample["statistics"]["tiles"] = np.array(sample["statistics"]["tiles"], np.uint8)
+        return sample
 
     def prepare(self, image: npt.ArrayLike) -> np.ndarray:
         """uint8 [H, W]: an image as the network sees it: grey, resized, blurred, at its place in the volume."""
-        return self._engine.prepare(_array(image, "image"))
+        images = _engine.Images(_array(image, "image"), "image")
+        grey = np.empty(self._shape(images)[0][1:], np.uint8)
+        _engine.check(_engine.lib.eventgan_prepare(self._handle, images.pointer, _engine.address(grey), grey.size))
+        return grey
 
     def source_to_volume(self, height: int, width: int) -> np.ndarray:
         """float64 [2, 3]: the map of points of an image of that size to those of the volume."""
-        return self._engine.source_to_volume(_whole(height, "height"), _whole(width, "width"))
+        to_volume = (ctypes.c_double * 6)()
+        _engine.check(_engine.lib.eventgan_shape(self._handle, _whole(height, "height"), _whole(width, "width"), 0, 1,
+                                                 None, to_volume))
+        return np.array(to_volume).reshape(2, 3)
 
 
 def sample_events(volume: npt.ArrayLike, *, duration_s: float = 1.0, seed: int = 0,
@@ -228,8 +328,20 @@ def sample_events(volume: npt.ArrayLike, *, duration_s: float = 1.0, seed: int =
     """
     if counts not in ("poisson", "rounded"):
         raise ValueError(f"expected counts to be of poisson, rounded, got {counts!r}")
-    return _engine.sample_events(_numbers(volume, "volume", np.float32), float(duration_s),
-                                 _whole(seed, "seed", least=0), counts == "rounded")
+    volume = _numbers(volume, "volume", np.float32)
+    if volume.ndim != 3 or volume.shape[0] < 2 or volume.shape[0] % 2 != 0:
+        raise ValueError(f"expected a volume [2B, H, W], got shape {_engine.shape_text(volume)}")
+    channels, height, width = volume.shape
+    events, count = ctypes.c_void_p(), ctypes.c_uint64()
+    _engine.check(_engine.lib.eventgan_sample_events(
+        _engine.address(volume), channels // 2, height, width, float(duration_s),
+        _whole(seed, "seed", 0, 2**63 - 1), counts == "rounded", ctypes.byref(events), ctypes.byref(count)))
+    try:
+        rows = np.empty(count.value, _engine.EVENT)
+        ctypes.memmove(_engine.address(rows), events, rows.nbytes)
+        return rows
+    finally:
+        _engine.lib.eventgan_free_events(events)
 
 
 def _weights(given: PathLike | None) -> str | None:
@@ -248,13 +360,13 @@ def _json(manifest: Mapping[str, Any]) -> str:
         raise ValueError(f"expected settings that JSON can hold, got {error}") from error
 
 
-def _whole(value: Any, name: str, least: int = 1) -> int:
+def _whole(value: Any, name: str, least: int = 1, most: int = 2**31 - 1) -> int:
     try:
         number = operator.index(value)
     except TypeError:
         number = None
-    if number is None or not least <= number < 2**31:
-        raise ValueError(f"expected {name} to be a whole number from {least} on, got {value!r}")
+    if number is None or not least <= number <= most:
+        raise ValueError(f"expected {name} to be a whole number from {least} to {most}, got {value!r}")
     return number
 
 
@@ -265,9 +377,7 @@ def _array(image: npt.ArrayLike, name: str) -> np.ndarray:
         raise ValueError(f"expected an image as an array, got {type(image).__name__} for {name}: {error}") from error
 
 
-def _numbers(values: npt.ArrayLike | None, name: str, dtype: npt.DTypeLike = np.float64) -> np.ndarray | None:
-    if values is None:
-        return None
+def _numbers(values: npt.ArrayLike, name: str, dtype: npt.DTypeLike = np.float64) -> np.ndarray:
     try:
         return np.require(values, dtype, ("C_CONTIGUOUS", "ALIGNED"))
     except (TypeError, ValueError, RuntimeError) as error:

@@ -114,8 +114,13 @@ def convert(manifest: PathLike | Mapping[str, Any], output: PathLike | None = No
     with contextlib.closing(shown), _manifest_file(manifest) as file:
         # All shards, even in a cluster's job: the whole folder is returned.
         report = _follow(on_event, "convert", "--progress", "json", "--shards", "all", *given, "--", file)
-        _follow(on_event, "finalize", "--progress", "json", "--", report["folder"])
-    return Shards(report["folder"])
+        if "folder" not in report:
+            raise ProgramError(f"expected a report of the program eventgan, got {json.dumps(report)[:1000]}, from "
+                               f"{find_program()}", 1)
+        # JSON is UTF-8, which the name of a folder need not be.
+        folder = report["folder"] if output is None else output
+        _follow(on_event, "finalize", "--progress", "json", "--", folder)
+    return Shards(folder)
 
 
 def open(folder: PathLike, **options: Any) -> Shards:
@@ -170,26 +175,41 @@ def find_program() -> str:
                             "EVENTGAN_PROGRAM (install the Debian package eventgan, or build it)")
 
 
+@contextlib.contextmanager
+def _running(*arguments: PathLike, **how: Any) -> Iterator[subprocess.Popen[str]]:
+    """The program with these arguments."""
+    if signal.getsignal(signal.SIGCHLD) is signal.SIG_IGN:
+        raise ProgramError("expected a process that learns how its programs end, got one that ignores SIGCHLD "
+                           "(signal.signal(signal.SIGCHLD, signal.SIG_DFL) mends that)", 1)
+    program = find_program()
+    try:
+        process = subprocess.Popen([program, *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                   encoding="utf-8", errors="replace", **how)
+    except OSError as error:
+        raise ProgramError(f"expected the program eventgan, got what cannot be run ({error.strerror}), in {program}",
+                           1) from error
+    with process:
+        yield process
+
+
 def _output(*arguments: PathLike) -> str:
     """The program's standard output."""
-    done = subprocess.run([find_program(), *arguments], stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8",
-                          errors="replace")
-    if done.returncode:
-        raise ProgramError(done.stderr.strip().removeprefix("error: ") or _ended(arguments[0], done.returncode),
-                           done.returncode)
-    return done.stdout
+    with _running(*arguments, stderr=subprocess.PIPE) as process:
+        output, errors = process.communicate()
+    if process.returncode:
+        raise ProgramError(errors.strip().removeprefix("error: ") or _ended(arguments[0], process.returncode),
+                           process.returncode)
+    return output
 
 
 def _follow(on_event: Callable[[Event], object], *arguments: PathLike) -> Event:
     """Runs a command with --progress json, calls `on_event` with each event, and returns the report at its end."""
     # In a session of its own: a terminal or a notebook interrupts the whole session, and a second interrupt would drop
     # the current shard.
-    process = subprocess.Popen([find_program(), *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                               stderr=subprocess.STDOUT, encoding="utf-8", errors="replace", start_new_session=True)
-    assert process.stdout
     event: Event = {}
     told: list[str] = []
-    with process.stdout:
+    with _running(*arguments, stderr=subprocess.STDOUT, start_new_session=True) as process:
+        assert process.stdout
         try:
             for line in process.stdout:
                 event = _event_of(line.rstrip("\n"))
@@ -239,7 +259,13 @@ def _manifest_file(manifest: PathLike | Mapping[str, Any]) -> Iterator[PathLike]
     if not isinstance(manifest, Mapping):
         yield manifest
         return
-    with tempfile.NamedTemporaryFile("w", dir=".", prefix="manifest-", suffix=".json", encoding="utf-8") as file:
+    try:
+        temporary = tempfile.NamedTemporaryFile("w", dir=".", prefix="manifest-", suffix=".json", encoding="utf-8")
+    except OSError as error:
+        raise ProgramError(f"expected a current folder that can be written, since the manifest's relative paths start "
+                           f"there, got {os.getcwd()} ({error.strerror}); write the manifest elsewhere and pass its "
+                           "path", 1) from error
+    with temporary as file:
         json.dump(dict(manifest), file, indent=1, default=os.fspath)
         file.flush()
         try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import copy
+import errno
 import html
 import json
 import os
@@ -389,8 +390,10 @@ class Shards(Sequence):
             raise ValueError(f"expected a fraction between 0 and 1, got {fraction}")
         names, group, counts = np.unique(self.groups(by), return_inverse=True, return_counts=True)
         if len(names) < 2:
-            raise ValueError(f"expected at least two values of {by} to divide by, got {len(names)}, in "
-                             f"{self._described_as}")
+            there = f"{len(self)} of {names[0]} alone" if len(names) else "none"
+            frames = "" if by == "sample_id" else '; by="sample_id" divides by labelled frame'
+            raise ValueError(f"expected samples of two or more groups by {by}, one for each part, got {there}, in "
+                             f"{self._described_as}{frames}")
         order = np.random.default_rng(seed).permutation(len(names))
         ends = np.cumsum(counts[order])[:-1]
         cut = 1 + int(np.abs(ends - fraction * len(self)).argmin())
@@ -439,8 +442,24 @@ class Shards(Sequence):
         others are a ValueError."""
         return self._files[self._place(index)[0]].joint_places(names)
 
+    def __repr__(self) -> str:
+        return (f"<eventgan.Shards {self._described_as}: {len(self):,} samples of {len(np.unique(self._shard)):,} "
+                "shards>")
+
+    def __str__(self) -> str:
+        rows = self._summary()
+        wide = max(map(len, rows))
+        return "\n".join([self._described_as, *(f"  {what:<{wide}}  {text}" for what, text in rows.items())])
+
     def _repr_html_(self) -> str:
-        """A table for notebooks, counted without reading a volume."""
+        """A table for notebooks."""
+        cells = "".join(f'<tr><th style="text-align:left">{what}</th><td '
+                        f'style="text-align:left">{html.escape(text)}</td></tr>'
+                        for what, text in self._summary().items())
+        return f"<table><caption>{html.escape(self._described_as)}</caption>{cells}</table>"
+
+    def _summary(self) -> dict[str, str]:
+        """What there is, counted without reading a volume."""
         counts: dict[str, collections.Counter] = collections.defaultdict(collections.Counter)
         for number in np.unique(self._shard):
             here, file = self[np.flatnonzero(self._shard == number)], self._files[self.paths[number]]
@@ -453,10 +472,7 @@ class Shards(Sequence):
         for what, found in counts.items():
             rows[what] = ", ".join(f"{value}: {count:,}" for value, count in sorted(found.items()) if count) or "none"
         rows["quarantined"] = f"{self._quarantined:,} in these shards"
-        cells = "".join(f'<tr><th style="text-align:left">{what}</th><td '
-                        f'style="text-align:left">{html.escape(text)}</td></tr>'
-                        for what, text in rows.items())
-        return f"<table><caption>{html.escape(self._described_as)}</caption>{cells}</table>"
+        return rows
 
     def _place(self, index: int) -> tuple[pathlib.Path, int]:
         if not -len(self) <= index < len(self):
@@ -666,10 +682,20 @@ def open_shard(path: PathLike) -> h5py.File:
 
     Raises
     ------
+    FileNotFoundError
+        There is no such file.
+    OSError
+        It is none.
     ValueError
-        It is none, or of another major version.
+        It is of another kind or major version.
     """
-    file = h5py.File(path, "r", rdcc_nbytes=0)  # each volume is one chunk: a cache is of no use
+    if not os.path.exists(path):
+        raise FileNotFoundError(errno.ENOENT, "expected a folder of shards, or a shard, got no such file",
+                                os.fspath(path))
+    try:
+        file = h5py.File(path, "r", rdcc_nbytes=0)  # each volume is one chunk: a cache is of no use
+    except OSError as error:
+        raise OSError(f"expected a shard, got what HDF5 does not open ({error}), in {path}") from error
     try:
         _check_version(file.attrs, "format_version", FORMAT, FORMAT_VERSION, path)
     except ValueError:

@@ -305,7 +305,7 @@ def spread(values: list[float]) -> str:
 def main() -> None:
     args = read_args()
     if args.what == "real":
-        import real_cameras  # it needs the compiled module of the package
+        import real_cameras  # it needs libeventgan
 
         real_cameras.run(args)
         return

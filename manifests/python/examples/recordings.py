@@ -240,7 +240,7 @@ def fitted(model: Callable[[float], Method], frames: np.ndarray, event_counts: n
 
 def told(threshold: float) -> Method:
     """The network that knows its sensor."""
-    return Generator("shipped:sensor", sensor={"threshold": threshold}, bins=BINS)
+    return Generator("shipped:sensor", precision="float32", sensor={"threshold": threshold}, bins=BINS)
 
 
 def difference(threshold: float) -> Method:
@@ -265,8 +265,8 @@ def _fitted_v2e(frames: np.ndarray, event_counts: np.ndarray, peers: PathLike) -
 # By name a function of the recording's frames, of how many events its camera had in each interval, [F - 1], and of the
 # folder with v2e. It returns the method; only those that are fitted look at the recording.
 METHODS: dict[str, Callable[[np.ndarray, np.ndarray, PathLike], Method]] = {
-    "EventGAN 16": lambda frames, event_counts, peers: Generator("shipped:16", bins=BINS),
-    "EventGAN 8": lambda frames, event_counts, peers: Generator("shipped:8", bins=BINS),
+    "EventGAN 16": lambda frames, event_counts, peers: Generator("shipped:16", precision="float32", bins=BINS),
+    "EventGAN 8": lambda frames, event_counts, peers: Generator("shipped:8", precision="float32", bins=BINS),
     "EventGAN sensor, fitted": lambda frames, event_counts, peers: told(fitted(told, frames, event_counts,
                                                                                LEARNT_THRESHOLDS)),
     "difference": lambda frames, event_counts, peers: difference(THRESHOLD),

@@ -74,10 +74,15 @@ class JpegFile {
     errors_.error_exit = leave_with_message;
     errors_.emit_message = refuse_corrupt_data;
     codec_.client_data = &escape_;
-    run_guarded(escape_, [&] {
-      jpeg_create_decompress(&codec_);
-      jpeg_stdio_src(&codec_, file);
-    });
+    try {
+      run_guarded(escape_, [&] {
+        jpeg_create_decompress(&codec_);
+        jpeg_stdio_src(&codec_, file);
+      });
+    } catch (...) {
+      jpeg_destroy_decompress(&codec_);
+      throw;
+    }
   }
   ~JpegFile() { jpeg_destroy_decompress(&codec_); }
   JpegFile(const JpegFile&) = delete;

@@ -81,7 +81,8 @@ TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
   const GeneratorSpec& generator = manifest.generator;
   EXPECT_EQ(stated("/properties/generator/properties/kind"), to_string(generator.kind));
   EXPECT_EQ(stated("/properties/generator/properties/weights"), generator.weights);
-  EXPECT_EQ(stated("/properties/generator/properties/precision"), to_string(generator.precision));
+  EXPECT_EQ(stated("/properties/generator/properties/precision"),
+            word_of(kPrecisionChoiceWords, generator.precision));
   EXPECT_EQ(stated("/properties/generator/properties/engine"),
             word_of(kEngineWords, generator.engine));
   EXPECT_EQ(stated("/properties/generator/properties/device"), to_string(generator.device));

@@ -20,12 +20,13 @@ class StandIn:
     """In place of a Generator: one bin, what became brighter, then what became darker, in grey levels; laid with a
     border of (left, top) into zeros of `size`, or as large as the images. Counts its calls."""
 
-    bins = 1
+    bins, draws = 1, False
 
     def __init__(self, size=None, border=(0, 0), factor=1.0):
         self.size, self.border, self.factor, self.calls, self.gaps = size, border, factor, 0, []
 
-    def __call__(self, previous, following):
+    def __call__(self, previous, following, *, draw=0):
+        assert draw == 0
         self.calls += 1
         images = [np.asarray(image) for image in (previous, following)]
         if images[0].shape != images[1].shape:
@@ -38,7 +39,7 @@ class StandIn:
         volume[:, top:top + made.shape[1], left:left + made.shape[2]] = made
         return volume
 
-    def sample(self, previous, following, *, boxes, gap):
+    def sample(self, previous, following, *, boxes, gap, draw=0):
         self.gaps.append(gap)
         volume = self(previous, following)
         unclipped = np.asarray(boxes, float) + np.tile(self.border, 2)
@@ -505,13 +506,44 @@ def test_items_are_those_of_shards(tmp_path, monkeypatch):
         source.append((pair["prev_path"], pair["next_path"],
                        {"boxes": boxes["xyxy_source"], "labels": labels, "ignore": boxes["ignore"],
                         "id": pair["sample_id"]}))
-    pairs = FramePairs(Generator("untrained:4", size=(50, 130), fit="crop", preset="kitti", seed=7), source,
-                       classes=expected.classes)
+    generator = Generator("untrained:4", precision="float32", size=(50, 130), fit="crop", preset="kitti", seed=7)
+    pairs = FramePairs(generator, source, classes=expected.classes)
     assert len(pairs) == 12 and sum(len(item["boxes"]) for item in map(expected.__getitem__, range(12))) > 50
     for i in range(12):
         made, stored = pairs[i], expected[i]
         assert made["id"] == stored["id"]
         assert all(torch.equal(made[name], stored[name]) for name in ("volume", "boxes", "labels", "ignore"))
+
+
+@pytest.mark.parametrize("settings", [
+    {"weights": "shipped:sensor"}, {"kind": "difference", "sensor": {"threshold": [0.1, 0.9]}}, {"kind": "difference"},
+    {"weights": "untrained:2", "sensor": {"noise": {"shot_hz": 20}}}, {"kind": "esim"}], ids=str)
+@pytest.mark.parametrize("boxes", [False, True])
+@pytest.mark.filterwarnings("ignore")
+def test_each_epoch_draws_anew(settings, boxes):
+    pytest.importorskip("eventgan._engine")
+    from eventgan import Generator
+
+    images = np.random.default_rng(1).integers(0, 256, (3, 24, 30), np.uint8)
+    target = {"boxes": [[1, 2, 20, 20]], "labels": [0]} if boxes else 0
+    generator = Generator(**settings)
+    pairs = FramePairs(generator, [(*images[:2], target), (*images[1:], target), (*images[:2], target)],
+                       cache_bytes=1 << 24)
+
+    def made():
+        return [(each["volume"] if boxes else each[0]).numpy() for each in pairs]
+
+    first = made()
+    pairs.set_epoch(1)
+    second = made()
+    assert all((one != other).any() for one, other in zip(first, second))
+    assert (first[0] != first[2]).any()  # another item of the same images
+    pairs.set_epoch(0)
+    assert all((one == other).all() for one, other in zip(first, made()))
+    assert pairs.cache_info().hits == 3  # the last epoch's
+    assert all((generator(*images[:2]) == generator(*images[:2], draw=0)).all() for _ in range(2))
+    plain = Generator("untrained:2")
+    assert not plain.draws and (plain(*images[:2]) == plain(*images[:2], draw=9)).all()
 
 
 def test_the_generator_s_volumes_in_workers():

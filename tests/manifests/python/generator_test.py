@@ -6,6 +6,7 @@ import json
 import os
 import pathlib
 import pickle
+import re
 import subprocess
 import sys
 import warnings
@@ -103,6 +104,8 @@ MODELS = {
 def check_same(folder, size, image, generator, volume, colour, seed=3):
     """Every volume, statistic and label of a shard, made again from its images."""
     images = scene(*size, colour)
+    if "kind" not in generator:
+        generator = {"precision": "auto", **generator}  # what Python takes, and the program does not
     keys = dict(image)
     if "size" in keys:
         keys["height"], keys["width"] = keys.pop("size")
@@ -325,6 +328,27 @@ def test_prepare(images):
     np.testing.assert_array_equal(cropped, grey[:, 11:42])
 
 
+def test_the_default_precision_is_what_the_processor_does_well(images):
+    flags = set(re.search(r"flags\s*: (.*)", pathlib.Path("/proc/cpuinfo").read_text())[1].split())
+    if "ONEDNN_MAX_CPU_ISA" in os.environ or "onednn" not in eventgan.Generator("shipped:8").description:
+        pytest.skip("not what the processor says")
+    best = "bfloat16" if flags & {"avx512_bf16", "amx_bf16"} and "avx512bw" in flags else "float32"
+    for given in ({}, {"precision": "auto"}):
+        generator = eventgan.Generator("shipped:8", **given)
+        assert best in generator.description and f" {best}" in repr(generator)
+        np.testing.assert_array_equal(generator(*images[:2]),
+                                      eventgan.Generator("shipped:8", precision=best)(*images[:2]))
+
+
+def test_processors_without_avx_512_take_float32():
+    """Those of most laptops."""
+    code = ("import eventgan, numpy as np\ngenerator = eventgan.Generator('shipped:8')\n"
+            "print(generator.description, generator(*np.random.default_rng(1).random((2, 20, 30))).any())")
+    done = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True,
+                          env={**os.environ, "ONEDNN_MAX_CPU_ISA": "AVX2"})
+    assert done.returncode == 0 and "float32" in done.stdout and done.stdout.endswith("True\n"), done
+
+
 # ---- Threads and workers
 
 
@@ -416,9 +440,22 @@ def test_sampled_events():
                 np.full((2, 1, 1), np.inf), "volume"):
         with pytest.raises(ValueError, match="expected"):
             eventgan.sample_events(bad)
-    for settings in ({"duration_s": 0}, {"duration_s": np.nan}, {"seed": -1}, {"seed": 1.5}, {"counts": "exact"}):
+    for settings in ({"duration_s": 0}, {"duration_s": np.nan}, {"seed": -1}, {"seed": 1.5}, {"seed": 2**63},
+                     {"counts": "exact"}):
         with pytest.raises(ValueError, match="expected"):
             eventgan.sample_events(volume, **settings)
+    assert len(eventgan.sample_events(volume, seed=2**63 - 1)) > 0  # as far as the manifest's go
+
+
+@pytest.mark.parametrize("counts", ["poisson", "rounded"])
+def test_more_events_than_can_be_made_are_refused(counts):
+    for value in (1e30, 8.6e9, 2.0**31, 1.1e9):
+        with pytest.raises(ValueError, match=r"expected values of at most 1e\+09 events altogether, got"):
+            eventgan.sample_events(np.full((2, 1, 1), [[[0]], [[value]]]), counts=counts)
+    memory = 1000 * int(re.search(r"MemTotal: *(\d+) kB", pathlib.Path("/proc/meminfo").read_text())[1])
+    if 9e8 * 96 > memory:
+        with pytest.raises(MemoryError):
+            eventgan.sample_events(np.full((2, 1, 1), 4.5e8), counts=counts)
 
 
 # ---- What is refused
@@ -460,7 +497,7 @@ def test_too_large_for_the_memory(generator):
 
 
 @pytest.mark.parametrize("settings, got", [
-    ({"precision": "int9"}, 'precision: expected "float32".*"int9"'),
+    ({"precision": "int9"}, 'precision: expected "float32".*"auto".*"int9"'),
     ({"precision": "int8", "weights": "untrained:8"}, "calibrat"),
     ({"weights": "shipped:7"}, "weights"),
     ({"weights": __file__}, "generator_test.py"),

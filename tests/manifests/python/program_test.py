@@ -327,3 +327,43 @@ def test_open(job, monkeypatch):
     monkeypatch.setenv("EVENTGAN_PROGRAM", "nowhere")
     with pytest.raises(ValueError, match=r"got 1 unfinished .* uses the others\)$"):
         eventgan.open("out")
+
+
+def test_an_output_whose_name_is_not_utf_8(job):
+    folder = os.fsdecode(b"out-\xff")
+    assert len(eventgan.convert(job, folder, progress=False)) == PAIRS
+    assert (pathlib.Path(folder) / "dataset.json").exists()
+
+
+@pytest.mark.parametrize("lines", [["print('hello')"], ["pass"], ["print(json.dumps({'done': 1}))"]])
+def test_a_program_that_is_another(job, in_the_programs_place, lines):
+    in_the_programs_place(*lines)
+    with pytest.raises(eventgan.ProgramError, match="expected a report of the program eventgan, got .*, from .*inst"):
+        eventgan.convert(job, progress=False)
+
+
+def test_what_is_no_program(job, tmp_path, monkeypatch):
+    (tmp_path / "nothing").write_bytes(b"\x7fELF")
+    (tmp_path / "nothing").chmod(0o755)
+    monkeypatch.setenv("EVENTGAN_PROGRAM", str(tmp_path / "nothing"))
+    for call in (lambda: eventgan.convert(job, progress=False), lambda: eventgan.init("demo")):
+        with pytest.raises(eventgan.ProgramError, match="got what cannot be run .*, in .*nothing"):
+            call()
+
+
+def test_a_process_that_ignores_how_its_programs_end(job):
+    before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    try:
+        for call in (lambda: eventgan.convert(job, progress=False), lambda: eventgan.init("nowhere")):
+            with pytest.raises(eventgan.ProgramError, match="got one that ignores SIGCHLD"):
+                call()
+    finally:
+        signal.signal(signal.SIGCHLD, before)
+
+
+def test_a_current_folder_that_cannot_be_written(job, monkeypatch):
+    def refused(*_, **__):
+        raise PermissionError(13, "Permission denied", "./manifest-x.json")
+    monkeypatch.setattr(program.tempfile, "NamedTemporaryFile", refused)  # root may write everywhere
+    with pytest.raises(eventgan.ProgramError, match="a current folder that can be written, .*Permission denied"):
+        eventgan.convert(job, progress=False)

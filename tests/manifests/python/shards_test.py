@@ -150,6 +150,24 @@ def table(shards):
     return {row[0].text: row[1].text for row in rows.iter("tr")}
 
 
+def test_what_is_printed(two_shards):
+    shards = Shards(two_shards, split="train")
+    assert repr(shards) == f"<eventgan.Shards {two_shards}, split train: 8 samples of 2 shards>"
+    first, *rows = str(shards).splitlines()
+    assert first == f"{two_shards}, split train"
+    assert dict(row.split(maxsplit=1) for row in rows if "gaps" not in row) == {
+        what: text for what, text in table(shards).items() if "gaps" not in what}
+    assert str(shards[:0]).splitlines()[1].split() == ["samples", "0"]
+
+
+def test_where_there_are_no_shards(tmp_path):
+    with pytest.raises(FileNotFoundError, match="expected a folder of shards, or a shard, got no such file: .*nothing"):
+        Shards(tmp_path / "nothing")
+    (tmp_path / "text.h5").write_text("text")
+    with pytest.raises(OSError, match="expected a shard, got what HDF5 does not open .*text.h5"):
+        Shards(tmp_path / "text.h5")
+
+
 def test_what_a_notebook_shows(two_shards, monkeypatch):
     monkeypatch.setattr(shards_module._OpenShard, "volume", None)  # is not touched
     shards = Shards(two_shards)
@@ -335,8 +353,12 @@ def test_divided_parts_share_no_sequence(two_shards):
         assert all(sequences) and not sequences[0] & sequences[1]
         assert ids_of(first) == ids_of(shards.divide(0.5, seed=seed)[0])
     assert {ids_of(shards.divide(0.4, seed=seed)[0])[0] for seed in range(8)} == {"000000", "000003", "000004"}
-    with pytest.raises(ValueError, match="at least two values of sequence"):
+    name = first[:1].groups()[0]
+    with pytest.raises(ValueError, match=f"expected samples of two or more groups by sequence, one for each part, got "
+                                         f'1 of {name} alone, in .*; by="sample_id" divides by labelled frame'):
         first[:1].divide(0.5)
+    with pytest.raises(ValueError, match="by sample_id, .* alone, in [^;]*$"):
+        first[:1].divide(0.5, by="sample_id")
     with pytest.raises(ValueError, match="between 0 and 1"):
         shards.divide(1)
 

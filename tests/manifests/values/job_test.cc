@@ -42,6 +42,7 @@ TEST(JobWords, GoThereAndBack) {
 
 TEST(JobWords, NameTheEnginesAndTheProgramsChoice) {
   EXPECT_EQ(word_of(kEngineWords, std::optional<Engine>()), "auto");
+  EXPECT_EQ(word_of(kPrecisionChoiceWords, std::optional<Precision>()), "auto");
   EXPECT_EQ(to_string(Engine::kTorch), "torch");
   EXPECT_EQ(to_string(Engine::kOnednn), "onednn");
 }

@@ -113,6 +113,27 @@ TEST(ChooseEngine, Int8IsOnednnsAlone) {
   }
 }
 
+TEST(ChooseEngine, AutomaticPrecisionIsWhatTheProcessorDoesWell) {
+  const EngineSupport able = all_of("avx512_core_bf16");
+  EXPECT_EQ(choose_precision({}, Device::kCpu, able), kBfloat16);
+  EXPECT_EQ(choose_precision(kOnednn, Device::kCpu, able), kBfloat16);
+  EngineSupport support = able;
+  support.onednn_able = false;
+  EXPECT_EQ(choose_precision({}, Device::kCpu, support), kBfloat16);
+  EXPECT_EQ(choose_precision(kOnednn, Device::kCpu, support), kFloat32);
+  support.torch_able = false;
+  EXPECT_EQ(choose_precision({}, Device::kCpu, support), kFloat32);
+  support = able;
+  support.native = false;  // computed, but slower than float32
+  EXPECT_EQ(choose_precision({}, Device::kCpu, support), kFloat32);
+  EXPECT_EQ(choose_precision({}, Device::kCuda, support), kFloat32);  // there is none
+  support.cuda = "Tesla T4";
+  support.cuda_lack = "Tesla T4 has no bfloat16";
+  EXPECT_EQ(choose_precision({}, Device::kCuda, support), kFloat32);
+  support.cuda_lack = "";
+  EXPECT_EQ(choose_precision({}, Device::kCuda, support), kBfloat16);
+}
+
 TEST(ChooseEngine, Int8NeedsACalibration) {
   EXPECT_EQ(refusal(request({}, kInt8), all_of()),
             "$.generator.weights: expected weights with a calibration for int8, got w.safetensors "

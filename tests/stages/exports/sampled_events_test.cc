@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "manifests/values/faults.h"
 #include "stages/events/event_volume.h"
 
 namespace eventgan {
@@ -105,6 +107,16 @@ TEST(SampleEvents, OneBinAndNoEvents) {
   EXPECT_TRUE(
       sample_events(std::vector<float>{0, 0}, shape, 1, EventCounts::kPoisson, CounterRandom(1))
           .empty());
+}
+
+TEST(SampleEvents, RefuseMoreThanCanBeMade) {
+  const VolumeShape shape{1, {1, 1}};
+  for (const std::vector<float>& volume : std::vector<std::vector<float>>{
+           {1e30f, 0}, {8.6e9f, 0}, {6e8f, 6e8f}, {0, std::numeric_limits<float>::max()}}) {
+    for (const EventCounts counts : {EventCounts::kPoisson, EventCounts::kRounded}) {
+      EXPECT_THROW(sample_events(volume, shape, 1, counts, CounterRandom(1)), UsageError);
+    }
+  }
 }
 
 TEST(EventsText, IsALineEach) {

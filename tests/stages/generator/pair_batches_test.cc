@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <new>
 #include <semaphore>
 #include <stdexcept>
 #include <thread>
@@ -118,6 +119,35 @@ TEST_F(PairBatchesTest, AnErrorReachesEveryCallerOfItsBatchAndNoOther) {
   others.clear();
   EXPECT_EQ(failed, 2);
   EXPECT_EQ(ask(5), 50);  // and the next batch is computed
+}
+
+TEST(PairBatches, AnErrorOfTheMostReachesItsCallerAndBlocksNobody) {
+  std::atomic<int> asked = 0;
+  TenTimes compute;
+  PairBatches<float> batches(
+      [&](ImageSize) -> int {
+        if (asked++ % 2 == 0) throw std::bad_alloc();
+        return 3;
+      },
+      std::ref(compute));
+  std::atomic<int> failed = 0;
+  std::vector<std::jthread> threads;
+  for (int thread = 0; thread < 4; ++thread) {
+    threads.emplace_back([&] {
+      for (int i = 1; i <= 100; ++i) {
+        const float value = float(i);
+        try {
+          EXPECT_EQ(batches.compute({&value, 1}, {1, 1}), 10 * value);
+        } catch (const std::bad_alloc&) {
+          ++failed;
+        }
+      }
+    });
+  }
+  threads.clear();
+  EXPECT_GT(failed, 0);
+  EXPECT_LT(failed, 400);
+  EXPECT_EQ(batches.waiting(), 0u);
 }
 
 TEST_F(PairBatchesTest, LoseNothingUnderManyThreads) {

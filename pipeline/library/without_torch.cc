@@ -1,4 +1,4 @@
-// In place of LibTorch's engine in the Python module, which must live beside any PyTorch.
+// In place of LibTorch's engine in the library, which must live beside any PyTorch.
 
 #include "manifests/values/faults.h"
 #include "stages/generator/torch/torch_generator.h"
@@ -8,9 +8,8 @@ namespace {
 
 [[noreturn]] void refuse() {
   throw UsageError(
-      "expected a processor on which oneDNN computes this precision, got one that LibTorch would "
-      "be "
-      "needed for: use the program eventgan");
+      "expected a processor on which oneDNN computes this precision, got one that LibTorch "
+      "would be needed for: use the program eventgan");
 }
 
 }  // namespace

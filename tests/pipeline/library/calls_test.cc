@@ -1,0 +1,236 @@
+// The library's functions as C calls them: what they refuse, how threads share a batch, forks under
+// load, the end of a process whose threads still call.
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "pipeline/library/eventgan.h"
+
+namespace {
+
+constexpr int kHeight = 21;
+constexpr int kWidth = 34;
+constexpr std::int64_t kPixels = std::int64_t{kHeight} * kWidth;
+constexpr std::uint64_t kVolume = std::uint64_t{18} * kPixels;
+
+/// Images that differ from each other.
+std::vector<std::uint8_t> levels(std::int64_t count, unsigned seed) {
+  std::vector<std::uint8_t> values(static_cast<std::size_t>(count * kPixels));
+  std::uint32_t state = seed;
+  for (std::uint8_t& value : values) {
+    state = state * 1664525u + 1013904223u;
+    value = static_cast<std::uint8_t>(state >> 24);
+  }
+  return values;
+}
+
+eventgan_images images_at(const std::vector<std::uint8_t>& values, std::int64_t count) {
+  return {values.data(), count, kHeight, kWidth, {kPixels, kWidth, 1, 0}, 1, EVENTGAN_UINT8};
+}
+
+class Calls : public ::testing::Test {
+ protected:
+  static constexpr std::int64_t kCount = 12;
+
+  void SetUp() override {
+    ASSERT_EQ(eventgan_load(R"({"generator": {"weights": "untrained:4"}})", &generator_),
+              EVENTGAN_COMPLETE)
+        << eventgan_error();
+    expected_.resize(kVolume * kCount);
+    ASSERT_EQ(generate(expected_), EVENTGAN_COMPLETE) << eventgan_error();
+    ASSERT_GT(*std::max_element(expected_.begin(), expected_.end()), 0);
+  }
+  void TearDown() override { eventgan_free(generator_); }
+
+  int generate(std::vector<float>& volumes, std::int64_t* next = nullptr, std::int64_t most = 0) {
+    return eventgan_generate(generator_, &previous_, &following_, 0, volumes.data(), volumes.size(),
+                             next, most);
+  }
+
+  /// Calls until it is told to stop; counts the volumes that are not as they should be.
+  void call_on(std::atomic<bool>& stop, std::atomic<int>& wrong) {
+    std::vector<float> made(expected_.size());
+    while (!stop) {
+      const int result = generate(made);
+      if (result != EVENTGAN_COMPLETE || made != expected_) ++wrong;
+    }
+  }
+
+  std::vector<std::uint8_t> first_ = levels(kCount, 1);
+  std::vector<std::uint8_t> second_ = levels(kCount, 2);
+  eventgan_images previous_ = images_at(first_, kCount);
+  eventgan_images following_ = images_at(second_, kCount);
+  eventgan_generator* generator_ = nullptr;
+  std::vector<float> expected_;
+};
+
+TEST(Loading, RefusesWhatIsNoManifest) {
+  eventgan_generator* generator = nullptr;
+  EXPECT_EQ(eventgan_load("{", &generator), EVENTGAN_USAGE);
+  EXPECT_EQ(eventgan_load("[]", &generator), EVENTGAN_USAGE);
+  EXPECT_EQ(eventgan_load(nullptr, &generator), EVENTGAN_USAGE);
+  EXPECT_EQ(eventgan_load("{}", nullptr), EVENTGAN_USAGE);
+  EXPECT_EQ(eventgan_load(R"({"generator": {"kind": "x", "scope": "y"}})", &generator),
+            EVENTGAN_USAGE);
+  const std::string text = eventgan_error();
+  EXPECT_NE(text.find("$.generator.kind: expected"), text.npos) << text;
+  EXPECT_NE(text.find("$.generator.scope: expected"), text.npos) << text;
+  EXPECT_EQ(eventgan_load(R"({"generator": {"weights": "/nowhere.safetensors"}})", &generator),
+            EVENTGAN_INPUT_MISSING);
+  EXPECT_NE(std::string(eventgan_error()).find("/nowhere.safetensors"), std::string::npos);
+  EXPECT_EQ(generator, nullptr);
+  eventgan_free(nullptr);
+}
+
+TEST_F(Calls, DescribeThemselves) {
+  const std::string text = eventgan_describe(generator_);
+  EXPECT_NE(text.find("\"bins\":9"), text.npos) << text;
+  EXPECT_NE(text.find("UNTRAINED"), text.npos) << text;
+  std::int32_t shape[3];
+  double map[6];
+  ASSERT_EQ(eventgan_shape(generator_, kHeight, kWidth, 1, 1, shape, map), EVENTGAN_COMPLETE);
+  EXPECT_EQ(std::vector(shape, shape + 3), (std::vector{18, kHeight, kWidth}));
+  EXPECT_EQ(std::vector(map, map + 6), (std::vector<double>{1, 0, 0, 0, 1, 0}));
+  EXPECT_EQ(eventgan_shape(generator_, 0, 5, 1, 1, shape, map), EVENTGAN_USAGE);
+  EXPECT_EQ(eventgan_shape(generator_, 5, 5, -1, 1, shape, map), EVENTGAN_USAGE);
+  EXPECT_EQ(eventgan_shape(generator_, 5, 5, 1, 0, shape, map), EVENTGAN_USAGE);
+  EXPECT_EQ(eventgan_shape(generator_, 8192, 8192, 100'000, 1, shape, map), EVENTGAN_OUT_OF_MEMORY);
+  EXPECT_EQ(eventgan_shape(nullptr, 5, 5, 1, 1, shape, map), EVENTGAN_USAGE);
+}
+
+TEST_F(Calls, RefuseWhatDoesNotFit) {
+  std::vector<float> made(kVolume * kCount);
+  const eventgan_images whole = following_;
+  const auto refused = [&](const char* why) {
+    EXPECT_EQ(generate(made), EVENTGAN_USAGE);
+    EXPECT_NE(std::string(eventgan_error()).find(why), std::string::npos) << eventgan_error();
+    following_ = whole;
+  };
+  following_.count = 3;
+  refused("got 12 of (21, 34) and 3 of (21, 34)");
+  following_.width = 33;
+  refused("and 12 of (21, 33)");
+  following_.channels = 2;
+  refused("1 or 3 channels");
+  following_.number = 3;
+  refused("got 3 for following");
+  following_.data = nullptr;
+  refused("nowhere for following");
+  following_.height = -4;
+  refused("pixels");
+  made.resize(made.size() - 1);
+  refused("volumes of 154224 values");
+  EXPECT_EQ(
+      eventgan_generate(nullptr, &previous_, &following_, 0, made.data(), made.size(), nullptr, 0),
+      EVENTGAN_USAGE);
+  EXPECT_EQ(
+      eventgan_generate(generator_, nullptr, &following_, 0, made.data(), made.size(), nullptr, 0),
+      EVENTGAN_USAGE);
+}
+
+TEST_F(Calls, MakeNoMoreThanTheyAreAskedFor) {
+  std::vector<float> made(expected_.size(), -1);
+  std::int64_t next = 0;
+  ASSERT_EQ(generate(made, &next, 2), EVENTGAN_COMPLETE);
+  EXPECT_EQ(next, 2);
+  const auto second = static_cast<std::ptrdiff_t>(2 * kVolume);
+  EXPECT_TRUE(std::equal(made.begin(), made.begin() + second, expected_.begin()));
+  EXPECT_TRUE(std::all_of(made.begin() + second, made.end(), [](float v) { return v == -1; }));
+  ASSERT_EQ(generate(made, &next, kCount), EVENTGAN_COMPLETE);
+  EXPECT_EQ(made, expected_);
+  next = kCount;
+  std::fill(made.begin(), made.end(), -1.0f);
+  ASSERT_EQ(generate(made, &next, kCount), EVENTGAN_COMPLETE);
+  EXPECT_EQ(made, std::vector<float>(made.size(), -1));
+}
+
+TEST_F(Calls, ShareABatchAmongThreads) {
+  std::vector<float> made(expected_.size());
+  std::int64_t next = 0;
+  {
+    std::vector<std::jthread> threads;
+    for (int i = 0; i < 5; ++i) {
+      threads.emplace_back(
+          [&] { EXPECT_EQ(generate(made, &next, kCount), EVENTGAN_COMPLETE) << eventgan_error(); });
+    }
+  }
+  EXPECT_EQ(made, expected_);
+}
+
+TEST_F(Calls, OneThatFailsStopsTheOthers) {
+  std::vector<double> numbers(static_cast<std::size_t>(kCount * kPixels), 0.5);
+  numbers[static_cast<std::size_t>(3 * kPixels + kWidth + 2)] = -1;
+  following_ = {numbers.data(),  kCount, kHeight, kWidth, {8 * kPixels, 8 * kWidth, 8, 0}, 1,
+                EVENTGAN_FLOAT64};
+  std::vector<float> made(expected_.size());
+  std::int64_t next = 0;
+  EXPECT_EQ(generate(made, &next, kCount), EVENTGAN_USAGE);
+  EXPECT_NE(std::string(eventgan_error()).find("got -1.000000 at row 1, column 2 of following"),
+            std::string::npos)
+      << eventgan_error();
+  EXPECT_EQ(next, kCount);
+}
+
+TEST_F(Calls, AForkedChildComputesWhateverOtherThreadsAreAt) {
+  std::atomic<bool> stop = false;
+  std::atomic<int> wrong = 0;
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < 3; ++i) threads.emplace_back([&] { call_on(stop, wrong); });
+  for (int i = 0; i < 30; ++i) {
+    std::fflush(nullptr);
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      alarm(60);  // one that waits for a lock of its parent's would do so for ever
+      std::vector<float> made(expected_.size());
+      const bool same = generate(made) == EVENTGAN_COMPLETE && made == expected_;
+      eventgan_generator* own = nullptr;
+      const bool loads =
+          eventgan_load(R"({"generator": {"weights": "untrained:2"}})", &own) == EVENTGAN_COMPLETE;
+      eventgan_free(own);
+      _exit(same && loads ? 0 : 1);
+    }
+    int status = -1;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    ASSERT_EQ(status, 0) << "fork " << i;
+  }
+  stop = true;
+  threads.clear();
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST_F(Calls, AProcessEndsWhileItsThreadsCall) {
+  for (int i = 0; i < 5; ++i) {
+    std::fflush(nullptr);
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      alarm(60);
+      std::atomic<bool> stop = false;
+      std::atomic<int> wrong = 0;
+      for (int k = 0; k < 3; ++k) std::thread([&] { call_on(stop, wrong); }).detach();
+      std::this_thread::sleep_for(std::chrono::milliseconds(20 * (i + 1)));
+      eventgan_end();
+      std::vector<float> made(expected_.size());
+      if (generate(made) != EVENTGAN_COMPLETE || made != expected_ || wrong > 0) _exit(1);
+      std::exit(0);
+    }
+    int status = -1;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    ASSERT_EQ(status, 0) << "end " << i;
+  }
+}
+
+}  // namespace
