@@ -141,6 +141,24 @@ class DiskFailure(program.InFolder):
         failing_files.for_each(lambda rule: self.fails_then_again("finalize", self.expected, after, rule, "finalize"),
                                self.rules_for(calls))
 
+    def test_finalize_when_a_shard_that_is_read_does_not_close(self):
+        """Nothing is lost by it, so that it is no failure; nor may HDF5's end find a file half closed."""
+        after = self.folder / "after"
+        shutil.copytree(self.expected, after)
+        calls = [call for call in failing_files.run(after, "", "finalize", after).calls if call.kind == "shut"]
+        self.assertIn(".h5", {call.path.suffix for call in calls})
+
+        def fails(number):
+            out = self.folder / f"shut-{number}"
+            shutil.copytree(self.expected, out)
+            outcome = failing_files.run(out, f"EIO shut {number}", "finalize", out)
+            self.assertTrue(outcome.struck)
+            self.assertEqual(outcome.code, 0, outcome.err)
+            same_content(content(out), content(after), out)
+            shutil.rmtree(out)
+
+        failing_files.for_each(fails, range(1, len(calls) + 1))
+
     def test_retry_at_every_step(self):
         before = self.folder / "before"
         with broken_cars(self.folder / "job", [1]):

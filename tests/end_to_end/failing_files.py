@@ -35,7 +35,7 @@ def run(folder, rule, *arguments):
 
 def changes(calls):
     """Those that a rule for "any" counts: all but reading."""
-    return [call for call in calls if call.kind != "open"]
+    return [call for call in calls if call.kind not in ("open", "shut")]
 
 
 def for_each(work, items):

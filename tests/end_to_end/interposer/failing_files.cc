@@ -7,8 +7,9 @@
 //                          KIND, PATH and, if the rule struck, its ACTION
 // EVENTGAN_FAILING_RULE    "ACTION KIND NUMBER": what to do at which call of a kind, counted from 1
 //
-//   KIND    open (for reading), create, write, sync, close (of a writable file), truncate, rename,
-//           link, unlink, mkdir, or any (all but open)
+//   KIND    open and shut (of a file that is read), create, write, sync, close (of a writable
+//   file),
+//           truncate, rename, link, unlink, mkdir, or any (all but open and shut)
 //   NUMBER  "7": the seventh; "7+": it and all after it, like a disk that stays full
 //   ACTION  kill-before, kill-after   SIGKILL, the call not made or just made
 //           kill-within               SIGKILL after half of the bytes of a write
@@ -107,10 +108,10 @@ int obey_close(int descriptor, int failure, Close&& close) {
   const int error_before = errno;
   const int flags = ::fcntl(descriptor, F_GETFL);
   const bool writable = flags >= 0 && (flags & O_ACCMODE) != O_RDONLY;
-  const std::string path = writable ? path_of(descriptor) : "";
+  const std::string path = path_of(descriptor);
   errno = error_before;
   if (!is_watched(path)) return close();
-  const Order order = announce(CallKind::kClose, path);
+  const Order order = announce(writable ? CallKind::kClose : CallKind::kShut, path);
   const int result = close();
   if (order.kill) kill_process();
   if (order.error == 0) return result;

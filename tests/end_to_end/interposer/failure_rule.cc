@@ -19,8 +19,8 @@
 namespace eventgan::interposer {
 namespace {
 
-constexpr std::array kKindNames = {"open",     "create", "write", "sync",   "close",
-                                   "truncate", "rename", "link",  "unlink", "mkdir"};
+constexpr std::array kKindNames = {"open",     "shut",   "create", "write",  "sync", "close",
+                                   "truncate", "rename", "link",   "unlink", "mkdir"};
 
 std::string environment(const char* name) {
   const char* value = std::getenv(name);
@@ -69,8 +69,9 @@ class Watch {
     const std::string name = kKindNames.at(static_cast<std::size_t>(kind));
     std::unique_lock lock(mutex_);
     ++counts_[name];
-    if (kind != CallKind::kOpen) ++counts_["any"];
-    const bool counts = kind_ == name || (kind_ == "any" && kind != CallKind::kOpen);
+    const bool changes = kind != CallKind::kOpen && kind != CallKind::kShut;
+    if (changes) ++counts_["any"];
+    const bool counts = kind_ == name || (kind_ == "any" && changes);
     const bool spared = error_ != 0 && kind_ == "any" && kind == CallKind::kUnlink;
     const bool meant =
         counts && !spared && (onwards_ ? counts_[kind_] >= number_ : counts_[kind_] == number_);

@@ -7,6 +7,7 @@ namespace eventgan::interposer {
 /// Ways to change a folder, or (kOpen) to read in it.
 enum class CallKind {
   kOpen,    ///< an existing file or folder, for reading
+  kShut,    ///< of a descriptor that can only read
   kCreate,  ///< a file, or one opened for writing
   kWrite,
   kSync,
