@@ -1,5 +1,6 @@
 #pragma once
 
+#include <exception>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -58,6 +59,18 @@ class TooManyFaults : public std::runtime_error {
 class Stopped : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+};
+
+/// The process has come to a limit of its own, of open files or of memory, where a sample was read.
+/// That is no fault of the sample, and another run may have more: so it is no std::runtime_error,
+/// which is what readers make faults of, and ends the run. Exit code 1.
+class LimitReached : public std::exception {
+ public:
+  explicit LimitReached(std::string what) : what_(std::move(what)) {}
+  const char* what() const noexcept override { return what_.c_str(); }
+
+ private:
+  std::string what_;
 };
 
 }  // namespace eventgan

@@ -1,13 +1,33 @@
 #include "pipeline/runtime/errors.h"
 
+#include <cerrno>
+#include <new>
 #include <sstream>
+#include <system_error>
 
 #include "manifests/values/faults.h"
 
 namespace eventgan {
+namespace {
+
+/// The library's own words for a limit of the process say neither what it is nor what helps.
+std::string words_of(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) {
+    return "expected enough memory, got none (fewer --threads need less; ulimit -v sets a limit)";
+  }
+  const auto* of_system = dynamic_cast<const std::system_error*>(&error);
+  if (of_system != nullptr && of_system->code().value() == EAGAIN &&
+      of_system->what() == of_system->code().message()) {
+    return "expected to begin a thread, got '" + of_system->code().message() +
+           "' (fewer --threads; ulimit -u sets a limit)";
+  }
+  return error.what();
+}
+
+}  // namespace
 
 std::string error_text(const std::exception& error) {
-  std::string text = error.what();
+  std::string text = words_of(error);
   try {
     std::rethrow_if_nested(error);
   } catch (const std::exception& nested) {

@@ -1,21 +1,12 @@
 #include "stages/recordings/detail/open_files.h"
 
-#include <sys/resource.h>
-
-#include <algorithm>
-
 #include "manifests/values/faults.h"
 
 namespace eventgan {
 
 RecentlyUsed& open_files() {
-  static RecentlyUsed files([] {
-    constexpr std::int64_t kFewest = 8, kMost = 1024;
-    rlimit limit{};
-    if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return kFewest;
-    const auto open = static_cast<std::int64_t>(std::min<rlim_t>(limit.rlim_cur, 4 * kMost));
-    return std::max(kFewest, open / 4);
-  }());
+  constexpr std::size_t kMost = 1024;
+  static RecentlyUsed files(static_cast<std::int64_t>(files_to_keep_open(kMost)));
   return files;
 }
 

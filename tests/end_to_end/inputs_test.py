@@ -5,6 +5,7 @@ import json
 import os
 import pathlib
 import re
+import resource
 import shutil
 import subprocess
 import zipfile
@@ -83,6 +84,23 @@ class Labels(program.InFolder):
                 label.write_bytes(text)
                 run("retry", out)
                 self.assertEqual(self.quarantined(out), {})
+
+    def test_too_few_open_files_are_a_fault_of_the_run(self):
+        """Whatever the job may quarantine: a run with a higher limit makes all samples."""
+        manifest = small_job(self.folder / "job", people=0, errors=LENIENT)
+        refused = 0
+        for limit in range(5, 25):
+            done = subprocess.run([program.PROGRAM, "convert", manifest, "--threads", "2"], capture_output=True,
+                                  text=True, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE,
+                                                                                   (limit, limit)))
+            self.assertEqual(self.quarantined(self.folder / "job" / "out"), {}, f"with {limit} open files")
+            if done.returncode != 0:
+                self.assertEqual(done.returncode, 1, done.stderr)
+                self.assertIn("Too many open files", done.stderr)
+                refused += 1
+        self.assertGreater(refused, 0)
+        run("convert", manifest)
+        self.assertEqual(self.quarantined(self.folder / "job" / "out"), {})
 
     def test_one_without_permission_is_quarantined(self):
         manifest = small_job(self.folder / "job", people=0, errors=LENIENT)
@@ -191,6 +209,22 @@ class Files(program.InFolder):
 
 
 class Names(program.InFolder):
+    def test_two_that_differ_by_the_case_of_letters_are_not_exported_as_one(self):
+        """On Windows and macOS, where an export may go, both are one file."""
+        photos = self.folder / "photos"
+        for name in ("sun.png", "Sun.png"):
+            save_image(photos / name, np.random.default_rng(3))
+        job = self.write_manifest(program.manifest(
+            [{"dataset": "frames", "root": "photos", "pairs": {"from": "stills", "side": "before"}}],
+            generator={"kind": "difference"}, image={"width": 32, "height": 24}))
+        run("convert", job)
+        run("finalize", self.folder / "out")
+        export = ("export", self.folder / "out", "--to", "webdataset", "--out", self.folder / "tar")
+        run(*export)  # names within one file
+        for again in range(2):  # begun or not
+            _, err = run("export", self.folder / "out", "--to", "events", "--out", self.folder / "export", expect=66)
+            self.assertRegex(err, "expected names of files that differ in more than the case of letters, got .*[sS]un")
+
     def test_control_characters_in_them_reach_no_terminal(self):
         evil = "a\x1b]0;owned\x07\x9b31m\nsound: 9 shards"
         clip = self.folder / "clip" / evil

@@ -1,6 +1,7 @@
 #include "stages/base/files/input_file.h"
 
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -23,11 +24,22 @@ std::span<char> characters(std::vector<std::byte>& bytes) {
   return {reinterpret_cast<char*>(bytes.data()), bytes.size()};
 }
 
+template <class Bytes>
+Bytes zeros(std::size_t count, const std::string& name) try {
+  return Bytes(count, typename Bytes::value_type{});
+} catch (const std::bad_alloc&) {
+  throw LimitReached("cannot read " + name + ": no memory for " + std::to_string(count) + " bytes");
+}
+
 }  // namespace
 
 std::optional<InputFile> InputFile::open(const std::filesystem::path& file, std::string& reason) {
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) {
+    if (errno == EMFILE || errno == ENFILE) {
+      throw LimitReached("cannot open " + file.string() + ": " + std::strerror(errno) +
+                         " (ulimit -n sets how many the process may have)");
+    }
     reason = std::strerror(errno);
     return std::nullopt;
   }
@@ -97,20 +109,21 @@ void InputFile::read_exactly(std::uint64_t offset, std::span<char> to) const {
 
 std::string InputFile::read(std::uint64_t offset, std::uint64_t count) const {
   require(offset, count);
-  std::string bytes(count, '\0');
+  auto bytes = zeros<std::string>(count, name_);
   read_exactly(offset, bytes);
   return bytes;
 }
 
 std::vector<std::byte> InputFile::read_bytes(std::uint64_t offset, std::uint64_t count) const {
   require(offset, count);
-  std::vector<std::byte> bytes(count);
+  auto bytes = zeros<std::vector<std::byte>>(count, name_);
   read_exactly(offset, characters(bytes));
   return bytes;
 }
 
 std::optional<std::string> InputFile::try_read_all() const {
-  std::string bytes(std::max<std::size_t>(size_bytes_ + 1, 4096), '\0');  // one more tells the end
+  // One more tells the end.
+  auto bytes = zeros<std::string>(std::max<std::size_t>(size_bytes_ + 1, 4096), name_);
   std::size_t have = 0;
   for (;;) {
     const auto got = try_read(have, std::span(bytes).subspan(have));
@@ -203,6 +216,13 @@ std::string read_text_file(const std::filesystem::path& file) {
   std::string reason;
   if (auto bytes = try_read_file(file, reason)) return *std::move(bytes);
   throw std::runtime_error("cannot read " + file.string() + ": " + reason);
+}
+
+std::size_t files_to_keep_open(std::size_t most) {
+  constexpr rlim_t kFewest = 8;
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return kFewest;
+  return std::min<rlim_t>(most, std::max(kFewest, limit.rlim_cur / 4));
 }
 
 void require_regular_file(const std::filesystem::path& file) { InputFile{file}; }

@@ -23,7 +23,8 @@ namespace eventgan {
 ///
 /// Errors are InputError "expected a readable file, got 'REASON', in NAME", or of a file that is
 /// shorter than what is asked for, or than it was, "expected 7 bytes from byte 0 on, got a file of
-/// 6 bytes, in NAME". Thread safe.
+/// 6 bytes, in NAME"; and LimitReached, naming the file, if the process has too many files open or
+/// no memory for what is asked for. Thread safe.
 ///
 /// Why it is not mapped into memory: a read error or a file that shrinks would end the process.
 class InputFile {
@@ -103,6 +104,10 @@ std::string read_text_file(const std::filesystem::path& file);
 
 /// Throws InputError unless it can be opened as an InputFile. Thread safe.
 void require_regular_file(const std::filesystem::path& file);
+
+/// How many files may be kept open for later: a quarter of those that the process may have open, at
+/// least 8, and no more than `most`. Thread safe.
+std::size_t files_to_keep_open(std::size_t most);
 
 /// Counts, while it lives, how often each file is opened as an InputFile, and how many bytes are
 /// read of it. For tests; without one nothing is counted. One at a time, made and destroyed while

@@ -17,15 +17,21 @@ void FilesAhead::expect(const std::filesystem::path& file) {
     const std::lock_guard lock(mutex_);
     if (by_path_.contains(file.native())) return;
   }
-  std::string nobody_asks;
-  auto opened = InputFile::open(file, nobody_asks);
+  auto opened = [&]() -> std::optional<InputFile> {
+    try {
+      std::string nobody_asks;
+      return InputFile::open(file, nobody_asks);
+    } catch (const LimitReached&) {  // it can wait
+      return std::nullopt;
+    }
+  }();
   if (!opened) return;
   opened->load_ahead();
   const std::lock_guard lock(mutex_);
   if (by_path_.contains(file.native())) return;
   files_.emplace_front(file.native(), *std::move(opened));
   by_path_[files_.front().first] = files_.begin();
-  if (files_.size() <= kMost) return;
+  if (files_.size() <= most_) return;
   by_path_.erase(files_.back().first);
   files_.pop_back();
 }

@@ -29,17 +29,18 @@ namespace eventgan {
 class FilesAhead {
  public:
   /// Opens the file, unless it is open here already. Of one that cannot be opened nothing is kept,
-  /// nor reported: reading it says why. Beyond kMost, the one that has waited longest is closed.
+  /// nor reported: reading it says why. Beyond what may be kept open (files_to_keep_open) and
+  /// kMost, the one that has waited longest is closed.
   void expect(const std::filesystem::path& file);
 
   /// The file, which is forgotten here; opened now if it was not expected. Throws as
   /// open_image_file.
   InputFile take(const std::filesystem::path& file);
 
-  /// Of the 1024 files that a process may have open unless its user asks for more.
   static constexpr std::size_t kMost = 256;
 
  private:
+  const std::size_t most_ = files_to_keep_open(kMost);
   std::mutex mutex_;
   std::list<std::pair<std::string, InputFile>> files_;  ///< by path; the latest first
   std::unordered_map<std::string_view, std::list<std::pair<std::string, InputFile>>::iterator>

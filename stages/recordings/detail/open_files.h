@@ -12,7 +12,7 @@
 
 namespace eventgan {
 
-/// As many files as this process keeps open: a quarter of those that it may have open.
+/// As many files as this process keeps open (files_to_keep_open).
 RecentlyUsed& open_files();
 
 /// A file, or what is read of an open one, that is open while it is used: those used last stay open

@@ -1,5 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <new>
+#include <stdexcept>
+#include <system_error>
+
 #include "manifests/values/faults.h"
 #include "pipeline/runtime/errors.h"
 
@@ -35,6 +39,17 @@ TEST(ErrorLine, IsOneLineHoweverDeepTheCause) {
   } catch (const std::runtime_error& error) {
     EXPECT_EQ(error_line(error), "cannot read x: because: no such file");
   }
+}
+
+TEST(ErrorText, TellsOfTheLimitsThatTheLibraryHasNoWordsFor) {
+  EXPECT_EQ(error_text(std::bad_alloc()),
+            "expected enough memory, got none (fewer --threads need less; ulimit -v sets a limit)");
+  const auto again = std::make_error_code(std::errc::resource_unavailable_try_again);
+  EXPECT_EQ(error_text(std::system_error(again)),
+            "expected to begin a thread, got 'Resource temporarily unavailable' (fewer --threads; "
+            "ulimit -u sets a limit)");
+  EXPECT_EQ(error_text(std::system_error(again, "cannot lock a")),
+            "cannot lock a: Resource temporarily unavailable");
 }
 
 TEST(ExitCodeOf, KnowsTheKindsOfErrors) {
