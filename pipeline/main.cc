@@ -96,6 +96,7 @@ int main(int argc, char** argv) {
   eventgan::add_train_command(app, exit_code);
   eventgan::add_tradeoff_command(app, exit_code);
   eventgan::add_help_command(app, exit_code);
+  eventgan::refuse_empty_values(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

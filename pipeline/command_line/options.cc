@@ -81,12 +81,6 @@ ShowPhase show_phases(ProgressStyle style) {
   };
 }
 
-std::optional<std::filesystem::path> JobOptions::output_folder() const {
-  if (!output) return std::nullopt;
-  if (output->empty()) throw UsageError("--output: expected a folder, got nothing");
-  return *output;
-}
-
 void add_job_options(CLI::App& command, JobOptions& options, const std::string& what,
                      const std::string& what_text, const std::string& overwrite_text) {
   command.add_option(what, options.manifest, what_text)->required();

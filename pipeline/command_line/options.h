@@ -50,16 +50,12 @@ ShowPhase show_phases(ProgressStyle style);
 /// What every command takes that makes a folder of files by a manifest.
 struct JobOptions {
   std::string manifest;
-  std::optional<std::string> output;
+  std::optional<std::filesystem::path> output;  ///< to write to instead of the manifest's
   int threads = 0;
   bool overwrite = false;
   ProgressStyle progress = ProgressStyle::kAuto;
 
   bool as_json() const { return progress == ProgressStyle::kJson; }
-
-  /// The folder to write to instead of the manifest's. Throws UsageError if it was given empty: a
-  /// script's unset variable, which did not mean the manifest's folder.
-  std::optional<std::filesystem::path> output_folder() const;
 };
 
 /// Adds the manifest under the name `what`, --output, --threads, --overwrite and --progress; the

@@ -70,6 +70,7 @@ std::string usage_text(const CLI::App& app, const CLI::ParseError& error) {
   const std::string name = chosen.empty() ? "eventgan" : "eventgan " + command.get_name();
   const std::string help = " (" + name + " --help)";
   for (const std::string& unknown : command.remaining()) {
+    if (unknown == "--") continue;  // behind which nothing is an option
     if (unknown.starts_with("-")) {
       const std::string option = unknown.substr(0, unknown.find('='));
       return "expected options of " + name + ", got " + option +
@@ -81,6 +82,17 @@ std::string usage_text(const CLI::App& app, const CLI::ParseError& error) {
     }
   }
   return error.what() + help;
+}
+
+void refuse_empty_values(CLI::App& app) {
+  const CLI::Validator is_text(
+      [](const std::string& value) {
+        return std::string(value.empty() ? "expected a value, got nothing" : "");
+      },
+      "");
+  for (CLI::App* command : app.get_subcommands({})) {
+    for (CLI::Option* option : command->get_options({})) option->check(is_text);
+  }
 }
 
 namespace {

@@ -80,7 +80,7 @@ fs::path trial_folder(fs::path output, std::int64_t limit) {
 int run(const ConvertArguments& arguments) {
   const JobOptions& job = arguments.job;
   const StopSignal signal(shard_stopping_line(arguments.grace_s));
-  const GivenJob given = read_given_job(job.manifest, job.output_folder(), arguments.sensor);
+  const GivenJob given = read_given_job(job.manifest, job.output, arguments.sensor);
   ConversionOptions options;
   options.part = choose_part(arguments.shards, [](const char* name) { return std::getenv(name); });
   options.grace_s = arguments.grace_s;

@@ -66,7 +66,6 @@ int run(const CLI::App& command, const ExportArguments& arguments) {
       }
     }
   }
-  if (arguments.out.empty()) throw UsageError("--out: expected a folder, got nothing");
   options.out = arguments.out;
   if (command.count("--classes") > 0) options.classes = arguments.classes;
   if (command.count("--ignored") > 0) options.keep_ignored = arguments.keep_ignored;

@@ -43,7 +43,6 @@ std::vector<FoundSource> find_all(const std::vector<std::string>& where) {
   const auto dataset = named == nullptr ? std::nullopt : std::optional(named->value);
   std::vector<FoundSource> found;
   for (std::size_t i = dataset ? 1 : 0; i < where.size(); ++i) {
-    if (where[i].empty()) throw UsageError("PATH: expected a folder or a video, got nothing");
     if (i == 0 && where.size() > 1 && !fs::exists(where[i])) {  // it may have been meant as a word
       throw UsageError(fmt::format("DATASET or PATH: expected one of {}, or what exists, got {}",
                                    fmt::join(words, ", "), where[i]));

@@ -24,7 +24,6 @@ struct OutlineArguments {
 };
 
 int run(const OutlineArguments& arguments) {
-  if (arguments.out.empty()) throw UsageError("--out: expected a folder, got nothing");
   const StopSignal signal(stopping_line("finishing the current images"));
   const JobManifest manifest = read_job_manifest(arguments.manifest);
   OutlineMasksOptions options;

@@ -14,7 +14,7 @@ namespace {
 int run_simulation(const JobOptions& arguments) {
   const SimulationManifest manifest = read_simulation_manifest(arguments.manifest);
   SimulationOptions options;
-  options.output = arguments.output_folder();
+  options.output = arguments.output;
   options.threads = arguments.threads;
   options.overwrite = arguments.overwrite;
   options.make_progress = [&](std::int64_t total) {

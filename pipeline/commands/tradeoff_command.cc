@@ -124,9 +124,6 @@ int run(TradeoffArguments& arguments) {
   options.axes = axes_of(arguments, manifest);
   options.only_native = arguments.precisions.empty();
   if (!arguments.reference.empty()) options.reference = reference_of(arguments.reference);
-  if (arguments.out && arguments.out->empty()) {  // a script's unset variable
-    throw UsageError("--out: expected a folder, got nothing");
-  }
   const std::filesystem::path out = arguments.out
                                         ? std::filesystem::path(*arguments.out)
                                         : manifest.directory / (manifest.name + "-tradeoff");

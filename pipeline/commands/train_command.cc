@@ -22,7 +22,7 @@ int run(const TrainArguments& arguments) {
   const TrainingManifest manifest = read_training_manifest(arguments.job.manifest);
   const StopSignal signal(stopping_line("saving the state after this step"));
   TrainingOptions options;
-  options.output = arguments.job.output_folder();
+  options.output = arguments.job.output;
   options.threads = arguments.job.threads;
   options.device = arguments.device;
   options.overwrite = arguments.job.overwrite;

@@ -218,6 +218,18 @@ class CommandLine(program.InFolder):
         run("make-demo", self.folder / "demo")
         run("convert", self.folder / "demo" / "manifest.json", "--output", "", expect=64)
 
+    def test_a_value_that_is_empty_is_one_that_is_missing(self):
+        """A script's unset variable, which meant neither the current folder nor the manifest's."""
+        for arguments in [("convert", ""), ("finalize", ""), ("export", "a", "--to", "yolo", "--out", ""),
+                          ("plan", "a.json", "--output", ""), ("outline", "a.json", "--out", "")]:
+            _, err = run(*arguments, expect=64)
+            self.assertIn(": expected a value, got nothing (", err)
+
+    def test_behind_two_dashes_nothing_is_an_option(self):
+        _, err = run("convert", "a.json", "--", "--threads", expect=64)
+        self.assertIn("--threads", err)
+        self.assertNotIn("got --\n", err)
+
     def test_missing_inputs_are_66(self):
         run("convert", self.folder / "none.json", expect=66)
         for command in ["verify", "status", "retry", "finalize"]:

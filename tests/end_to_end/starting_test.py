@@ -271,9 +271,9 @@ class Init(program.InFolder):
                           "as a list of people, recording of an event camera, images or videos, got none of these, "
                           f"in {path}", self.init(path, expect=66))
         self.assertIn("expected a folder or a video", self.init(self.folder / "absent", expect=66))
-        self.assertIn("expected a folder or a video, got nothing", self.init("", expect=64))
+        self.assertIn("PATH: expected a value, got nothing", self.init("", expect=64))
         write_cars(self.folder / "k", 1, np.random.default_rng(7))
-        self.assertIn("expected a folder or a video, got nothing", self.init(self.folder / "k", "", expect=64))
+        self.assertIn("PATH: expected a value, got nothing", self.init(self.folder / "k", "", expect=64))
         self.assertIn("DATASET or PATH: expected one of kitti_object, ", self.init("kitti", empty, expect=64))
         self.assertIn("manifests/examples has a manifest", self.init("dhp19", empty, expect=64))
         self.assertIn("expected mpii, got kitti_object, in ", self.init("mpii", self.folder / "k", expect=66))

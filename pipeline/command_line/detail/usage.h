@@ -21,6 +21,10 @@ std::string did_you_mean(const std::string& word, const std::vector<std::string>
 /// else what CLI11 says of it. One line. `error` is what parsing with `app` threw.
 std::string usage_text(const CLI::App& app, const CLI::ParseError& error);
 
+/// Makes every option of the commands of `app` refuse an empty text as its value, where an unset
+/// variable of a script has been.
+void refuse_empty_values(CLI::App& app);
+
 /// Makes the help of `app`, and of the commands that are added to it from then on, break its lines
 /// between words at 80 columns. The first line of a command's description stands in the list of
 /// commands, all of it in the command's own help.
