@@ -25,7 +25,11 @@ std::optional<SensorText> find_document(const std::string& path_or_name,
                                         const std::filesystem::path& directory) {
   if (path_or_name.ends_with(".json")) {
     const std::filesystem::path file = directory / path_or_name;
-    return SensorText{read_manifest_text(file, "a sensor's document"), file.string()};
+    constexpr std::size_t kMostBytes = 1 << 16;  // every shard has it
+    SensorText document{read_manifest_text(file, "a sensor's document"), file.string()};
+    if (document.text.size() <= kMostBytes) return document;
+    throw UsageError(fmt::format("expected a sensor's document of at most {} bytes, got {}, in {}",
+                                 kMostBytes, document.text.size(), document.name));
   }
   const auto shipped = shipped_sensor_documents().find(path_or_name);
   if (shipped == shipped_sensor_documents().end()) return std::nullopt;

@@ -203,6 +203,7 @@ bool ExportFolder::Step::is_done() const {
     if (relative.parent_path() != folder) {
       require_no_link(folder_.folder_, folder = relative.parent_path());
     }
+    folder_.require_own_name(file.key());
     std::error_code missing;
     const fs::path path = folder_.folder_ / relative;
     if (!fs::is_regular_file(fs::symlink_status(path, missing))) return false;
@@ -218,8 +219,22 @@ void ExportFolder::begin(const std::string& step) {
   if (fs::remove(folder_ / kExportDescription)) sync_to_disk(folder_);
 }
 
+void ExportFolder::require_own_name(const std::string& relative) {
+  std::string small = relative;
+  std::ranges::transform(small, small.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  const std::size_t exact = std::hash<std::string>()(relative);
+  const std::lock_guard lock(mutex_);
+  if (names_.try_emplace(std::hash<std::string>()(small), exact).first->second == exact) return;
+  throw InputError("expected names of files that differ in more than the case of letters, got " +
+                   relative + " beside another, in " + folder_.string() +
+                   " (Windows and macOS take both for one: rename the image or sequence)");
+}
+
 fs::path ExportFolder::Step::file(const std::string& relative) {
   require_export_name(relative, folder_.folder_);
+  folder_.require_own_name(relative);
   require_no_link(folder_.folder_, fs::path(relative).parent_path());
   folder_.begin(name_);
   const fs::path path = folder_.folder_ / relative;

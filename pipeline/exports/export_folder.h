@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
 
 namespace eventgan {
@@ -44,7 +45,9 @@ class ExportFolder {
 
     /// Where to write the file `relative`, whose folder is there afterwards. The file counts as
     /// this step's, and must be under its name at `finish`. Throws std::runtime_error for a name
-    /// that would not be believed. Thread safe, as is `write`.
+    /// that would not be believed, and InputError for one that differs from an earlier one by the
+    /// case of letters alone: on Windows and macOS the folder would hold one of both. Thread safe,
+    /// as is `write`.
     std::filesystem::path file(const std::string& relative);
     void write(const std::string& relative, std::string_view bytes);
 
@@ -67,10 +70,13 @@ class ExportFolder {
   void make_folder(const std::filesystem::path& folder);
   void discard();
   void begin(const std::string& step);
+  void require_own_name(const std::string& relative);
 
   std::filesystem::path folder_;
   std::mutex mutex_;
   std::set<std::filesystem::path> made_;
+  /// Hashes, since there may be millions: of each name in small letters, of the name as it is.
+  std::unordered_map<std::size_t, std::size_t> names_;
   bool has_begun_ = false;
 };
 

@@ -4,6 +4,7 @@
 #include <zip.h>
 
 #include <algorithm>
+#include <memory>
 #include <stdexcept>
 #include <string_view>
 
@@ -35,6 +36,10 @@ std::size_t count_signatures(const InputFile& file) {
   return count;
 }
 
+struct DiscardArchive {
+  void operator()(zip_t* archive) const { zip_discard(archive); }
+};
+
 struct CloseMember {
   void operator()(zip_file_t* member) const { zip_fclose(member); }
 };
@@ -59,23 +64,26 @@ struct ZipArchive::State {
     }
     int code = 0;
     const int descriptor = ::dup(bytes.descriptor());  // libzip's, unless it fails
-    archive = zip_fdopen(descriptor, 0, &code);
-    if (archive == nullptr) {
+    archive.reset(zip_fdopen(descriptor, 0, &code));
+    if (!archive) {
       ::close(descriptor);
       throw std::runtime_error("expected a zip file, got \"" + text_of(code) + "\", in " + path);
     }
-    const zip_int64_t count = zip_get_num_entries(archive, 0);
+    const zip_int64_t count = zip_get_num_entries(archive.get(), 0);
     for (zip_int64_t i = 0; i < count; ++i) {
-      const char* name = zip_get_name(archive, static_cast<zip_uint64_t>(i), 0);
-      if (name == nullptr) fail("readable member names", zip_strerror(archive), std::to_string(i));
+      const char* name = zip_get_name(archive.get(), static_cast<zip_uint64_t>(i), 0);
+      if (name == nullptr)
+        fail("readable member names", zip_strerror(archive.get()), std::to_string(i));
       names.emplace_back(name);
     }
+    auto sorted = names;
+    std::ranges::sort(sorted);
+    const auto twice = std::ranges::adjacent_find(sorted);  // readers differ in which one they take
+    if (twice != sorted.end()) {
+      throw std::runtime_error("expected each member once, got one twice, in " + path +
+                               " (member " + *twice + ")");
+    }
   }
-  ~State() {
-    if (archive != nullptr) zip_discard(archive);
-  }
-  State(const State&) = delete;
-  State& operator=(const State&) = delete;
 
   [[noreturn]] void fail(const std::string& expected, const std::string& got,
                          const std::string& member) const {
@@ -85,7 +93,7 @@ struct ZipArchive::State {
 
   std::string path;
   std::uintmax_t size_bytes = 0;
-  zip_t* archive = nullptr;
+  std::unique_ptr<zip_t, DiscardArchive> archive;
   std::vector<std::string> names;
 };
 
@@ -96,19 +104,19 @@ ZipArchive::~ZipArchive() = default;
 const std::vector<std::string>& ZipArchive::names() const { return state_->names; }
 
 bool ZipArchive::contains(const std::string& name) const {
-  return zip_name_locate(state_->archive, name.c_str(), 0) >= 0;
+  return zip_name_locate(state_->archive.get(), name.c_str(), 0) >= 0;
 }
 
 std::vector<std::byte> ZipArchive::read(const std::string& name, std::uint64_t most_bytes) const {
   const State& state = *state_;
-  const zip_int64_t index = zip_name_locate(state.archive, name.c_str(), 0);
+  const zip_int64_t index = zip_name_locate(state.archive.get(), name.c_str(), 0);
   if (index < 0) state.fail("a member of that name", "none", name);
 
   zip_stat_t about;
   constexpr zip_uint64_t kNeeded = ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE | ZIP_STAT_COMP_METHOD;
-  if (zip_stat_index(state.archive, static_cast<zip_uint64_t>(index), 0, &about) != 0 ||
+  if (zip_stat_index(state.archive.get(), static_cast<zip_uint64_t>(index), 0, &about) != 0 ||
       (about.valid & kNeeded) != kNeeded) {
-    state.fail("a member with a size", zip_strerror(state.archive), name);
+    state.fail("a member with a size", zip_strerror(state.archive.get()), name);
   }
   if (about.comp_method != ZIP_CM_STORE && about.comp_method != ZIP_CM_DEFLATE) {
     state.fail("a stored or deflated member", "method " + std::to_string(about.comp_method), name);
@@ -128,8 +136,8 @@ std::vector<std::byte> ZipArchive::read(const std::string& name, std::uint64_t m
   }
 
   const std::unique_ptr<zip_file_t, CloseMember> member(
-      zip_fopen_index(state.archive, static_cast<zip_uint64_t>(index), 0));
-  if (!member) state.fail("a readable member", zip_strerror(state.archive), name);
+      zip_fopen_index(state.archive.get(), static_cast<zip_uint64_t>(index), 0));
+  if (!member) state.fail("a readable member", zip_strerror(state.archive.get()), name);
   std::vector<std::byte> bytes(about.size);
   std::size_t filled = 0;
   while (filled < bytes.size()) {

@@ -323,6 +323,7 @@ std::optional<std::unordered_map<int, std::string>> read_class_map(
     const std::filesystem::path& file) {
   if (!std::filesystem::exists(file)) return std::nullopt;
   std::unordered_map<int, std::string> names;
+  std::unordered_set<std::string> known;
   const nlohmann::ordered_json document =
       parse_json_data(read_text_file(file), file.string(), JsonComments::kRefused);
   const auto refuse = [&](const std::string& got) {
@@ -339,7 +340,9 @@ std::optional<std::unordered_map<int, std::string>> read_class_map(
     if (!name.is_string() || !is_label_name(name.get_ref<const std::string&>())) {
       refuse(fmt::format("another value of \"{}\"", escape_controls(key)));
     }
-    names[number] = name.get<std::string>();
+    const bool is_one = known.insert(name.get<std::string>()).second &&
+                        names.try_emplace(number, name.get<std::string>()).second;
+    if (!is_one) refuse(fmt::format(R"("{}": {} beside another)", key, dump_json(name)));
   }
   return names;
 }

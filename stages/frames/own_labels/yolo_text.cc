@@ -134,8 +134,13 @@ class YoloYaml {
     const bool by_class = names->second.IsMap() && names->second.size() > 0 &&
                           names->second.begin()->second.IsSequence();
     if (!by_class) return read_names("kpt_names", names->second);
+    // An alias may stand for the same long list in each of many classes.
+    constexpr std::size_t kMostNames = 1'000'000;
+    std::size_t read = 0;
     std::optional<std::vector<std::string>> first;
     for (const auto& entry : names->second) {
+      read += entry.second.size();
+      if (read > kMostNames) refuse("at most 1,000,000 names in kpt_names", "more");
       auto of_class = read_names("kpt_names", entry.second);
       if (first && *first != of_class) refuse("the same kpt_names of all classes", "others");
       first = std::move(of_class);

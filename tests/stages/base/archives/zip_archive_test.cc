@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "tests/testing/shared_data.h"
@@ -122,6 +123,17 @@ TEST_F(ZipArchiveTest, DoesNotTrustTheDeclaredSize) {
     EXPECT_THAT([&] { ZipArchive(file_).read("a"); },
                 ThrowsMessage<std::runtime_error>(HasSubstr("some.zip")));
   }
+}
+
+TEST_F(ZipArchiveTest, RefusesAMemberTwice) {
+  testing::write_zip(file_, {{"a", "1", false}, {"b", "2", false}, {"x", "3", false}});
+  std::string whole = testing::read_file(file_);
+  std::ranges::replace(whole, 'x', 'a');  // libzip writes no name twice
+  testing::write_file(file_, whole);
+  EXPECT_THAT([&] { ZipArchive{file_}; },
+              ThrowsMessage<std::runtime_error>(
+                  "expected each member once, got one twice, in " + file_.string() +
+                  " (member a)"));
 }
 
 TEST_F(ZipArchiveTest, ReadsPyTorchCheckpoint) {

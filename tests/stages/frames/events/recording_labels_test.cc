@@ -266,6 +266,10 @@ TEST_F(RecordingLabelsTest, NpyIsStrict) {
           {"expected a class of label_map_dictionary.json, got class_id 1"});
   testing::write_file(folder_ / "label_map_dictionary.json", R"({"car": 0})");
   refuses("g.npy", boxes({}), {"expected {\"0\": \"car\", ...}, got \"car\""});
+  testing::write_file(folder_ / "label_map_dictionary.json", R"({"0": "car", "1": "car"})");
+  refuses("h.npy", boxes({}), {R"(got "1": "car" beside another)"});
+  testing::write_file(folder_ / "label_map_dictionary.json", R"({"0": "car", "00": "van"})");
+  refuses("i.npy", boxes({}), {R"(got "00": "van" beside another)"});
 }
 
 class WindowLabelsTest : public ::testing::Test {

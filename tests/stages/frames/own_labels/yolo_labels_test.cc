@@ -183,6 +183,11 @@ TEST(YoloYaml, AnythingElseIsRefused) {
   refused("names: [a]\nkpt_shape: [17, 4]", "got [17, 4]");
   refused("names: [a]\nkpt_shape: [100000000, 3]", "got [100000000, 3]");
   refused("names: [a]\nkpt_shape: [2, 3]\nkpt_names: [l]", "expected kpt_names of 2 joints, got 1");
+  std::string aliased = "names: [a]\nl: &l [j0";  // 1,001 lists of 1,000 names in 20 kB
+  for (int i = 1; i < 1000; ++i) aliased += ",j" + std::to_string(i);
+  aliased += "]\nkpt_shape: [1000, 3]\nkpt_names:\n";
+  for (int i = 0; i <= 1000; ++i) aliased += " " + std::to_string(i) + ": *l\n";
+  refused(aliased, "expected at most 1,000,000 names in kpt_names, got more, in data.yaml");
   refused("names: [a", "expected YAML");
   refused("names: \"\\x1b[2J", "expected YAML");
   refused(std::string(2000, '['), "expected YAML");
