@@ -104,8 +104,8 @@ Hdf5Handle scalar() { return {H5Screate(H5S_SCALAR), H5Sclose, "create", "a scal
 
 Hdf5Lock::Hdf5Lock() {
   if (locks_held++ == 0) hdf5_mutex().lock();
-  // Whoever opens a file closes it. What HDF5 does at the end of the process crashes on a file whose
-  // close() has failed.
+  // Whoever opens a file closes it. What HDF5 does at the end of the process crashes on a file
+  // whose close() has failed.
   static const herr_t no_end = H5dont_atexit();
   static_cast<void>(no_end);
   thread_local const herr_t quiet = H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);

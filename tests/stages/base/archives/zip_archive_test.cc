@@ -131,9 +131,8 @@ TEST_F(ZipArchiveTest, RefusesAMemberTwice) {
   std::ranges::replace(whole, 'x', 'a');  // libzip writes no name twice
   testing::write_file(file_, whole);
   EXPECT_THAT([&] { ZipArchive{file_}; },
-              ThrowsMessage<std::runtime_error>(
-                  "expected each member once, got one twice, in " + file_.string() +
-                  " (member a)"));
+              ThrowsMessage<std::runtime_error>("expected each member once, got one twice, in " +
+                                                file_.string() + " (member a)"));
 }
 
 TEST_F(ZipArchiveTest, ReadsPyTorchCheckpoint) {
