@@ -66,12 +66,25 @@ struct PairSensors {
       spec.camera = camera.name;
       spec.noise = camera.noise;
       spec.threshold = camera.threshold;
+      if (!kind.empty() && has_weights(spec.kind)) take_network_threshold(value, camera, spec);
       if (spec.threshold) set_threshold(spec);
       return;
     }
     fields.within("kind", kind);
     list_pair_sensor(fields, spec);
     fields.finish();
+  }
+
+  /// Told a model's threshold, a network would make other events than the camera.
+  static void take_network_threshold(const StrictValue& value, const CameraSensor& camera,
+                                     GeneratorSpec& spec) {
+    if (camera.network) {
+      spec.threshold = camera.network->threshold;
+      spec.threshold_weights = camera.network->weights;
+    } else if (camera.threshold) {
+      value.fault("a \"network\" in the sensor's document, which `eventgan fit --weights` finds",
+                  "a threshold of difference and esim alone");
+    }
   }
 
   Schema schema(const GeneratorSpec& spec) const {

@@ -94,13 +94,31 @@ void list_noise(Fields& fields, NoiseSpec& spec) {
               "dataset and a size, each of one polarity and of a rate of 5 to 100 Hz.");
 }
 
+namespace {
+
+void list_network_threshold(Fields& fields, NetworkThreshold& network) {
+  fields.at("weights", network.weights, texts(), "SHA-256 of the weights that it is of.");
+  std::optional<ThresholdSpec> threshold;
+  if (fields.is_writing()) threshold = network.threshold;
+  list_threshold(fields, threshold, "Contrast threshold, or [least, most], as above.");
+  if (threshold) {
+    network.threshold = *threshold;
+  } else if (fields.is_reading() && fields.is_sound("threshold")) {
+    fields.fault("threshold", "a number or [least, most]");
+  }
+}
+
+}  // namespace
+
 void list_camera_sensor(Fields& fields, CameraSensor& sensor) {
   if (!fields.has_format("eventgan-sensor", 1)) return;
   fields.at("name", sensor.name, names(), "Name of the camera.");
   list_threshold(fields, sensor.threshold,
-                 "Contrast threshold of ln(u/255 + 0.02), u the frames' grey level, or [least, "
-                 "most], from which it is drawn log-uniformly for each pair: the geometric mean of "
-                 "both polarities'.");
+                 "Contrast threshold of the models difference and esim, of ln(u/255 + 0.02), u the "
+                 "frames' grey level, or [least, most], from which it is drawn log-uniformly for "
+                 "each pair: the geometric mean of both polarities'.");
+  fields.find("network", sensor.network, objects(list_network_threshold),
+              "The threshold with which weights that know their sensor make as many events.");
   fields.find("noise", sensor.noise, objects(list_noise), kNoiseField);
   fields.find("origin", sensor.origin, texts(), "How the numbers were found, for people.");
 }

@@ -74,10 +74,20 @@ struct NoiseSpec {
 };
 inline constexpr double kMostNoise_hz = 1000;
 
-/// An event camera as a document tells it (manifests/schemas/sensor.schema.json).
+/// A threshold of a network that knows its sensor: it is told another one than a model for as many
+/// events, and one network another one than the next.
+struct NetworkThreshold {
+  std::string weights;  ///< SHA-256 of the weights' file
+  ThresholdSpec threshold;
+  bool operator==(const NetworkThreshold&) const = default;
+};
+
+/// An event camera as a document tells it (manifests/schemas/sensor.schema.json). Thresholds are of
+/// ln(u/255 + kFrameLogEpsilon), without a spread.
 struct CameraSensor {
-  std::string name;                        ///< as JobManifest::name
-  std::optional<ThresholdSpec> threshold;  ///< of ln(u/255 + kFrameLogEpsilon), without a spread
+  std::string name;                         ///< as JobManifest::name
+  std::optional<ThresholdSpec> threshold;   ///< of the models difference and esim
+  std::optional<NetworkThreshold> network;  ///< none: nobody has found it
   std::optional<NoiseSpec> noise;
   std::string origin;  ///< how the numbers were found, for people
   bool operator==(const CameraSensor&) const = default;

@@ -213,7 +213,9 @@ struct GeneratorSpec {
   SensorSpec sensor;   ///< kEsim, kDifference; at the middle of `threshold`
   std::string camera;  ///< name of the document that `threshold` and `noise` are of; empty: none
   std::optional<ThresholdSpec> threshold = {};  ///< of any kind but kEvents (pair_threshold)
-  std::optional<NoiseSpec> noise = {};          ///< of any kind but kEvents
+  /// SHA-256 of the weights that `threshold` is of, as `camera` says; empty: of any.
+  std::string threshold_weights;
+  std::optional<NoiseSpec> noise = {};  ///< of any kind but kEvents
   double duration_s = 0.1;          ///< time between the two frames, 1e-4..10. kEsim, kDifference:
                                     ///< for the sensor. `noise`: of pairs whose times are unknown
   double max_displacement_px = 10;  ///< kEsim: of the random motion, 0.1..100

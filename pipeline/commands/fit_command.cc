@@ -34,12 +34,12 @@ struct FitArguments {
 };
 
 /// The network, or null if there is none or it cannot be told a sensor.
-std::unique_ptr<Generator> open_told_generator(const std::string& weights) {
-  if (weights.empty()) return nullptr;
-  std::unique_ptr<Generator> generator = open_realism_generator(weights);
-  if (generator->thresholds()) return generator;
+NamedNetwork open_told_network(const std::string& weights) {
+  if (weights.empty()) return {};
+  NamedNetwork network = open_network(weights);
+  if (network.generator->thresholds()) return network;
   tell_note("the weights " + weights + " do not know their sensor: no threshold through them");
-  return nullptr;
+  return {};
 }
 
 /// What would be a fault of the document, once all is computed.
@@ -79,19 +79,21 @@ int run_fit(const FitArguments& arguments) {
     names += (names.empty() ? "" : ", ") + std::filesystem::path(part.path).filename().string();
   }
   if (parts.empty()) refuse_all_too_short();
-  const std::unique_ptr<Generator> network = open_told_generator(arguments.weights);
+  const NamedNetwork network = open_told_network(arguments.weights);
   const SensorFit fit =
-      fit_sensor(parts, network.get(), arguments.gaps, thread_count(arguments.threads));
+      fit_sensor(parts, network.generator.get(), arguments.gaps, thread_count(arguments.threads));
   for (const auto& recording : recordings) {
     for (const std::string& note : recording->notes()) tell_note(note);
   }
   for (const std::string& warning : fit.warnings) tell_warning(warning);
-  const CameraSensor sensor = fit.sensor(
-      arguments.name, program_version() + " fit of " + names + ": " +
-                          origin_text(fit, std::filesystem::path(arguments.weights).filename()));
+  const CameraSensor sensor =
+      fit.sensor(arguments.name,
+                 program_version() + " fit of " + names + ": " +
+                     origin_text(fit, std::filesystem::path(arguments.weights).filename()),
+                 network.weights_hash);
   const std::string document = to_document(sensor);
   std::cout << to_text(fit);
-  if (!arguments.out.empty() && !sensor.threshold && !sensor.noise) {
+  if (!arguments.out.empty() && !sensor.threshold && !sensor.network && !sensor.noise) {
     throw InputError("--out: expected recordings that tell a threshold or the noise, got none: " +
                      arguments.out + " is not written");
   }

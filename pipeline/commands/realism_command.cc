@@ -47,21 +47,28 @@ double number_in(const std::string& text, const std::string& expected) {
   return value;
 }
 
-/// The middle of the sensor's threshold, in place of a fitted one.
+ContrastThreshold middle_of(const ThresholdSpec& spec) {
+  return {std::sqrt(spec.range[0] * spec.range[1]), spec.ratio};
+}
+
+/// The sensor's thresholds in place of fitted ones.
 void take_sensor(const std::string& path_or_name, RealismOptions& options) {
   const CameraSensor sensor = open_camera_sensor(path_or_name);
-  if (!sensor.threshold) {
+  if (!sensor.threshold && !sensor.network) {
     throw UsageError("--sensor: expected a sensor with a threshold, got one without, in " +
                      path_or_name);
   }
-  const auto [least, most] = sensor.threshold->range;
-  options.threshold = {std::sqrt(least * most), sensor.threshold->ratio};
+  if (sensor.threshold) options.threshold = middle_of(*sensor.threshold);
+  if (!sensor.network) return;
+  options.network_threshold = middle_of(sensor.network->threshold);
+  options.network_weights = sensor.network->weights;
 }
 
 int run_realism(const RealismArguments& arguments) {
   RealismOptions options = arguments.options;
   if (arguments.threshold != "fit") {
     options.threshold = {number_in(arguments.threshold, "--threshold: expected fit or a number")};
+    options.network_threshold = options.threshold;
   }
   if (!arguments.sensor.empty()) take_sensor(arguments.sensor, options);
   const std::vector<RecordingSpec> parts = wanted_parts(arguments.recordings);
@@ -103,7 +110,7 @@ void add_methods(CLI::App& command, RealismArguments& arguments) {
                          "one that gives as many events as the camera");
   command
       .add_option("--sensor", arguments.sensor,
-                  "Take the threshold of a sensor: " +
+                  "Take the thresholds of a sensor, and fit what it has not: " +
                       fmt::format("{}", fmt::join(shipped_sensors(), ", ")) +
                       " or a document of eventgan fit (*.json)")
       ->excludes(threshold);

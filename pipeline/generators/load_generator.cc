@@ -129,8 +129,12 @@ LoadedGenerator load_without_weights(const JobManifest& manifest) {
 }
 
 /// A sensor that the weights have not learnt would give volumes of another one.
-void check_threshold(const Weights& weights, const GeneratorSpec& spec) {
+void check_threshold(const Weights& weights, const std::string& hash, const GeneratorSpec& spec) {
   if (!spec.threshold) return;
+  if (weights.thresholds && !spec.threshold_weights.empty() && spec.threshold_weights != hash) {
+    throw UsageError("$.generator.sensor.network: expected the threshold of " + spec.weights +
+                     ", got that of other weights (eventgan fit --weights finds it)");
+  }
   if (!weights.thresholds) {
     throw UsageError(
         "$.generator.sensor.threshold: expected weights that have learnt a sensor's threshold, got "
@@ -178,7 +182,7 @@ LoadedGenerator load_generator(const JobManifest& manifest) {
   const GeneratorSpec& spec = manifest.generator;
   if (!has_weights(spec.kind)) return load_without_weights(manifest);
   LoadedWeights loaded = load_weights(manifest);
-  check_threshold(loaded.weights, spec);
+  check_threshold(loaded.weights, loaded.hash, spec);
   const Precision precision =
       spec.precision ? *spec.precision
                      : choose_precision(spec.engine, spec.device,

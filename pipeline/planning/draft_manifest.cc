@@ -455,8 +455,8 @@ class Draft {
   static constexpr std::string_view kNetwork =
       R"(  // Volumes are made by the generator that comes with the program, unless another is named:
   // "generator": { "weights": "my.safetensors" },
-  // Weights that know their sensor make those of a camera. Its threshold is that of a model: fit
-  // the weights to a recording of yours for as many events as it has (manifests/guides/sensor.md).
+  // Weights that know their sensor make those of a camera, of one that ships or of your own, which
+  // `eventgan fit --weights` finds in its recordings (manifests/guides/sensor.md):
   // "generator": { "weights": "shipped:sensor", "sensor": "davis346" },
 )";
   static constexpr std::string_view kEvents =

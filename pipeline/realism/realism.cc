@@ -213,16 +213,16 @@ class MethodMaker {
 
   std::vector<std::unique_ptr<VolumeMethod>> make() {
     const auto& wanted = options_.methods;
-    std::unique_ptr<Generator> generator;
+    NamedNetwork opened;
     if (std::ranges::find(wanted, RealismMethod::kNetwork) != wanted.end()) {
-      generator = open_realism_generator(options_.weights);
-      bins_ = generator->bins();
+      opened = open_network(options_.weights);
+      bins_ = opened.generator->bins();
     }
     std::vector<std::unique_ptr<VolumeMethod>> methods;
     for (const RealismMethod method : wanted) {
       switch (method) {
         case RealismMethod::kNetwork:
-          methods.push_back(network(std::move(generator)));
+          methods.push_back(network(std::move(opened)));
           break;
         case RealismMethod::kDifference:
           methods.push_back(simulated(difference_scene()));
@@ -242,17 +242,21 @@ class MethodMaker {
     return frames_;
   }
 
-  std::unique_ptr<VolumeMethod> network(std::unique_ptr<Generator> generator) {
+  std::unique_ptr<VolumeMethod> network(NamedNetwork opened) {
+    const auto& told = options_.network_threshold;
     std::optional<ContrastThreshold> threshold;
-    if (const auto learnt = generator->thresholds()) {
-      threshold = options_.threshold;
-      if (!threshold) threshold = fitted_threshold(*generator, fitted_frames(), threads_);
+    if (const auto learnt = opened.generator->thresholds()) {
+      if (!options_.network_weights.empty() && options_.network_weights != opened.weights_hash) {
+        throw UsageError("--sensor: expected the threshold of " + options_.weights +
+                         ", got that of other weights");
+      }
+      threshold = told ? told : fitted_threshold(*opened.generator, fitted_frames(), threads_);
       check_learnt(*threshold, *learnt);
     }
-    const bool ignored = options_.threshold && !threshold;
-    return make_network_method(std::move(generator),
+    const bool ignored = told && !threshold;
+    return make_network_method(std::move(opened.generator),
                                options_.weights + (ignored ? ", which take no threshold" : ""),
-                               threshold, !options_.threshold, options_.seed);
+                               threshold, !told, options_.seed);
   }
 
   std::unique_ptr<VolumeMethod> simulated(SimulatedScene scene) {

@@ -32,9 +32,11 @@ struct RealismOptions {
                                         RealismMethod::kEsim};
   std::string weights = "shipped";  ///< of the network: a file, "shipped" or "shipped:WIDTH"
 
-  /// Contrast threshold of the two models, and of a network that knows its sensor, 0.01..5; none:
+  /// Contrast thresholds of the two models, and of a network that knows its sensor, 0.01..5; none:
   /// fitted, for each, so that it makes as many events as the camera did.
   std::optional<ContrastThreshold> threshold;
+  std::optional<ContrastThreshold> network_threshold;
+  std::string network_weights;      ///< SHA-256 of the weights that it is of; empty: of any
   double log_epsilon = 0.02;        ///< ε of their log intensity ln(u/255 + ε), 1e-6..1
   int esim_draws = 5;               ///< motions for a pair; its scores are the means over them
   double esim_displacement_px = 5;  ///< largest displacement a frame of the motions

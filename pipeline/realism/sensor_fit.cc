@@ -362,12 +362,15 @@ std::array<double, 2> three_digits(const std::array<double, 2>& range) {
 
 }  // namespace
 
-CameraSensor SensorFit::sensor(const std::string& name, const std::string& origin) const {
-  CameraSensor sensor{name, std::nullopt, std::nullopt, origin};
-  if (const auto& fitted = network ? network : difference) {
-    const double mean = three_digits(fitted->threshold.mean);
-    sensor.threshold = ThresholdSpec{{mean, mean}, three_digits(fitted->threshold.ratio)};
-  }
+CameraSensor SensorFit::sensor(const std::string& name, const std::string& origin,
+                               const std::string& weights) const {
+  const auto told = [](const FittedThreshold& fitted) {
+    const double mean = three_digits(fitted.threshold.mean);
+    return ThresholdSpec{{mean, mean}, three_digits(fitted.threshold.ratio)};
+  };
+  CameraSensor sensor{.name = name, .threshold = {}, .network = {}, .noise = {}, .origin = origin};
+  if (difference) sensor.threshold = told(*difference);
+  if (network) sensor.network = NetworkThreshold{weights, told(*network)};
   if (noise) {
     sensor.noise = NoiseSpec{three_digits(noise->noise.shot_hz), three_digits(noise->noise.leak_hz),
                              three_digits(noise->noise.hot_pixels)};

@@ -50,9 +50,9 @@ struct SensorFit {
   std::vector<EventRow> rows;                 ///< the camera's first; empty without kept pairs
   std::vector<std::string> warnings;          ///< what could not be told, and why
 
-  /// What goes into a document: the network's threshold, else the model's, and the noise, rounded
-  /// to three digits.
-  CameraSensor sensor(const std::string& name, const std::string& origin) const;
+  /// What goes into a document, rounded to three digits. `weights`: the network's SHA-256.
+  CameraSensor sensor(const std::string& name, const std::string& origin,
+                      const std::string& weights = {}) const;
 };
 
 /// Fits one camera's noise (fit_noise) and thresholds (fitted_threshold; of the frames' log

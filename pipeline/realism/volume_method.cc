@@ -13,6 +13,7 @@
 #include "manifests/values/weights.h"
 #include "pipeline/generators/load_generator.h"
 #include "pipeline/runtime/threads.h"
+#include "stages/base/files/sha256.h"
 #include "stages/events/drawn_events.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/simulate_pair.h"
@@ -82,17 +83,6 @@ class NetworkMethod final : public VolumeMethod {
   std::uint64_t seed_;
 };
 
-Weights named_weights(const std::string& name) {
-  const std::optional<WeightsName> parsed = parse_weights_name(name);
-  if (!parsed || parsed->origin == WeightsOrigin::kUntrained) {
-    throw UsageError(
-        "--weights: expected a file, shipped, shipped:sensor or shipped:WIDTH with WIDTH in 1.." +
-        std::to_string(kLargestNamedWidth) + ", got \"" + name + "\"");
-  }
-  if (parsed->origin == WeightsOrigin::kFile) return read_weights(parsed->path);
-  return read_shipped_weights(parsed->width ? *parsed->width : default_shipped_width());
-}
-
 }  // namespace
 
 std::unique_ptr<VolumeMethod> make_network_method(std::unique_ptr<Generator> generator,
@@ -102,8 +92,19 @@ std::unique_ptr<VolumeMethod> make_network_method(std::unique_ptr<Generator> gen
   return std::make_unique<NetworkMethod>(std::move(generator), weights, threshold, fitted, seed);
 }
 
-std::unique_ptr<Generator> open_realism_generator(const std::string& weights) {
-  return make_fastest_generator(named_weights(weights));
+NamedNetwork open_network(const std::string& weights) {
+  const std::optional<WeightsName> name = parse_weights_name(weights);
+  if (!name || name->origin == WeightsOrigin::kUntrained) {
+    throw UsageError(
+        "--weights: expected a file, shipped, shipped:sensor or shipped:WIDTH with WIDTH in 1.." +
+        std::to_string(kLargestNamedWidth) + ", got \"" + weights + "\"");
+  }
+  if (name->origin == WeightsOrigin::kFile) {
+    return {make_fastest_generator(read_weights(name->path)), sha256_of_file(name->path)};
+  }
+  const int width = name->width ? *name->width : default_shipped_width();
+  return {make_fastest_generator(read_shipped_weights(width)),
+          sha256_hex(shipped_weights_bytes(width))};
 }
 
 namespace {

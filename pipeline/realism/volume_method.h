@@ -37,10 +37,16 @@ std::unique_ptr<VolumeMethod> make_network_method(std::unique_ptr<Generator> gen
                                                   std::optional<ContrastThreshold> threshold,
                                                   bool fitted, std::uint64_t seed);
 
-/// The generator of a safetensors file, of "shipped" or of "shipped:WIDTH". Throws InputError if
+/// A network, and the SHA-256 of its weights' file.
+struct NamedNetwork {
+  std::unique_ptr<Generator> generator;
+  std::string weights_hash;
+};
+
+/// That of a safetensors file, of "shipped" or of "shipped:WIDTH". Throws InputError if
 /// the weights cannot be read or are not shipped, UsageError for another WIDTH than 1..64 and for
 /// "untrained:WIDTH".
-std::unique_ptr<Generator> open_realism_generator(const std::string& weights);
+NamedNetwork open_network(const std::string& weights);
 
 /// A model of a moving scene that a simulated sensor looks at.
 struct SimulatedScene {

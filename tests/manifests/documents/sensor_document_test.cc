@@ -31,6 +31,7 @@ constexpr char kSensorSchema[] = "sensor.schema.json";
 constexpr char kSoundSensor[] = R"({
   "format": "eventgan-sensor", "version": 1, "name": "mine",
   "threshold": [0.2, 0.4], "threshold_ratio": 1.1,
+  "network": {"weights": "abc", "threshold": 0.3, "threshold_ratio": 1.2},
   "noise": {"shot_hz": [0.5, 1], "leak_hz": 0.25, "hot_pixels": 1e-4},
   "origin": "by eye"
 })";
@@ -38,7 +39,11 @@ constexpr char kSoundSensor[] = R"({
 const ManifestCase kSensorCases[] = {
     {"as it is", {}, {}},
     {"nothing but a name",
-     {{"/threshold", ""}, {"/threshold_ratio", ""}, {"/noise", ""}, {"/origin", ""}},
+     {{"/threshold", ""},
+      {"/threshold_ratio", ""},
+      {"/network", ""},
+      {"/noise", ""},
+      {"/origin", ""}},
      {}},
     {"another format",
      {{"/format", R"("eventgan-manifest")"}},
@@ -50,6 +55,11 @@ const ManifestCase kSensorCases[] = {
     {"a ratio of no threshold",
      {{"/threshold", ""}},
      {"$.threshold_ratio: expected threshold beside it, got none"}},
+    {"a network's threshold of no weights, and none",
+     {{"/network", R"({"threshold_ratio": 1})"}},
+     {"$.network.weights: expected text, got nothing",
+      "$.network.threshold_ratio: expected threshold beside it, got none",
+      "$.network.threshold: expected a number or [least, most], got nothing"}},
     {"numbers out of range",
      {{"/threshold", "5.1"}, {"/threshold_ratio", "0.1"}, {"/noise/shot_hz", "-1"}},
      {"$.threshold: expected a number 0.01..5, got 5.1",
@@ -90,6 +100,7 @@ CameraSensor sound_sensor() {
   CameraSensor sensor;
   sensor.name = "mine";
   sensor.threshold = ThresholdSpec{{0.2, 0.4}, 1.1};
+  sensor.network = NetworkThreshold{"abc", ThresholdSpec{{0.3, 0.3}, 1.2}};
   sensor.noise = NoiseSpec{{0.5, 1}, {0.25, 0.25}, {1e-4, 1e-4}};
   sensor.origin = "by eye";
   return sensor;
@@ -121,7 +132,7 @@ TEST(ShippedSensors, AreThoseOfTheRepositoryAndOfTheSchema) {
     const CameraSensor sensor = open_camera_sensor(name);
     EXPECT_EQ(sensor, open_camera_sensor(entry.path())) << name;
     EXPECT_EQ(sensor.name, name);
-    EXPECT_TRUE(sensor.threshold && sensor.noise) << name;
+    EXPECT_TRUE(sensor.threshold && sensor.network && sensor.noise) << name;
     EXPECT_NE(sensor.origin, "") << name;
     const nlohmann::json manifest =
         nlohmann::json::parse(edited(kSoundManifest, {{"/generator/sensor", '"' + name + '"'}}));
@@ -143,9 +154,9 @@ class SensorOfAManifest : public ::testing::Test {
  protected:
   SensorOfAManifest() { testing::write_file(folder_ / "mine.json", kSoundSensor); }
 
-  JobManifest read(const std::string& sensor) {
-    testing::write_file(folder_ / "m.json",
-                        edited(kSoundManifest, {{"/generator/sensor", '"' + sensor + '"'}}));
+  JobManifest read(const std::string& sensor, std::vector<testing::Edit> edits = {}) {
+    edits.push_back({"/generator/sensor", '"' + sensor + '"'});
+    testing::write_file(folder_ / "m.json", edited(kSoundManifest, edits));
     return read_job_manifest(folder_ / "m.json");
   }
 
@@ -153,14 +164,31 @@ class SensorOfAManifest : public ::testing::Test {
 };
 
 TEST_F(SensorOfAManifest, IsThatOfTheDocument) {
-  const GeneratorSpec spec = read("mine.json").generator;
+  GeneratorSpec spec = read("mine.json").generator;
   EXPECT_EQ(spec.camera, "mine");
-  EXPECT_EQ(spec.threshold, sound_sensor().threshold);
+  EXPECT_EQ(spec.threshold, sound_sensor().network->threshold);
+  EXPECT_EQ(spec.threshold_weights, "abc");
   EXPECT_EQ(spec.noise, sound_sensor().noise);
+  spec = read("mine.json", {{"/generator/kind", R"("difference")"}, {"/generator/weights", ""}})
+             .generator;
+  EXPECT_EQ(spec.threshold, sound_sensor().threshold);
+  EXPECT_EQ(spec.threshold_weights, "");
   // Of a simulator: the middle of the range by polarity, of the frames' log intensity.
   EXPECT_EQ(spec.sensor.log_epsilon, kFrameLogEpsilon);
   EXPECT_NEAR(spec.sensor.negative_threshold / spec.sensor.positive_threshold, 1.1, 1e-9);
   EXPECT_NEAR(spec.sensor.negative_threshold * spec.sensor.positive_threshold, 0.08, 1e-9);
+}
+
+TEST_F(SensorOfAManifest, OfAModelAloneIsNoneForANetwork) {
+  testing::write_file(folder_ / "model.json", edited(kSoundSensor, {{"/network", ""}}));
+  EXPECT_THAT([&] { read("model.json"); },
+              ThrowsMessage<UsageError>(HasSubstr(
+                  "$.generator.sensor: expected a \"network\" in the sensor's document, which "
+                  "`eventgan fit --weights` finds, got a threshold of difference and esim alone")));
+  testing::write_file(
+      folder_ / "noise.json",
+      edited(kSoundSensor, {{"/network", ""}, {"/threshold", ""}, {"/threshold_ratio", ""}}));
+  EXPECT_EQ(read("noise.json").generator.threshold, std::nullopt);
 }
 
 TEST_F(SensorOfAManifest, StaysInTheTextWithoutTheFile) {
@@ -179,7 +207,7 @@ TEST_F(SensorOfAManifest, StaysInTheTextWithoutTheFile) {
 TEST_F(SensorOfAManifest, IsFoundByAShippedName) {
   const GeneratorSpec spec = read("davis346").generator;
   EXPECT_EQ(spec.camera, "davis346");
-  EXPECT_EQ(spec.threshold, open_camera_sensor("davis346").threshold);
+  EXPECT_EQ(spec.threshold, open_camera_sensor("davis346").network->threshold);
 }
 
 TEST_F(SensorOfAManifest, HasFaultsOfItsOwnFile) {

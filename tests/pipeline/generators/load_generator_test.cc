@@ -7,6 +7,7 @@
 #include <memory>
 #include <set>
 
+#include "manifests/documents/sensor_document.h"
 #include "manifests/values/faults.h"
 #include "pipeline/generators/choose_engine.h"
 #include "stages/base/files/sha256.h"
@@ -336,6 +337,27 @@ TEST_F(LoadSensorGenerator, TakesThresholdsThatItLearntAndNoOthers) {
   EXPECT_EQ(refusal({0.2, 0.22}, 4),
             "$.generator.sensor.threshold: expected 0.1..0.4 as the weights have learnt, got "
             "0.1..0.44 with threshold_ratio 4");
+}
+
+TEST(LoadGenerator, ShippedWeightsTakeTheShippedSensors) {
+  JobManifest manifest;
+  manifest.generator.weights = "shipped:sensor";
+  for (const std::string& name : shipped_sensors()) {
+    const CameraSensor sensor = open_camera_sensor(name);
+    manifest.generator.threshold = sensor.network->threshold;
+    manifest.generator.threshold_weights = sensor.network->weights;
+    EXPECT_TRUE(load_generator(manifest).generator->thresholds()) << name;
+  }
+}
+
+TEST_F(LoadSensorGenerator, RefusesThresholdsOfOtherWeights) {
+  manifest_.generator.threshold_weights = sha256_hex(testing::read_file(folder_ / "w.safetensors"));
+  EXPECT_EQ(refusal({0.2, 0.2}), "");
+  manifest_.generator.threshold_weights = sha256_hex("others");
+  EXPECT_EQ(
+      refusal({0.2, 0.2}),
+      "$.generator.sensor.network: expected the threshold of w.safetensors, got that of other "
+      "weights (eventgan fit --weights finds it)");
 }
 
 TEST_F(LoadSensorGenerator, RefusesThresholdsForWeightsThatLearntNone) {

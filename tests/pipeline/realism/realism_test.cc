@@ -63,11 +63,15 @@ TEST(MeasureRealism, TellsANetworkNoThresholdThatItHasNotLearnt) {
   options.methods = {RealismMethod::kNetwork};
   options.weights = "shipped:sensor";
   const FakeRecording recording = moving_bar_recording({12, 16}, 3);
-  options.threshold = {0.9};
+  options.network_threshold = {0.9};
   EXPECT_NO_THROW(measure_realism(recording, options));
-  options.threshold = {0.9, 1.2};
+  options.network_threshold = {0.9, 1.2};
   EXPECT_THROW(measure_realism(recording, options), UsageError);
-  options.threshold = {0.01};
+  options.network_threshold = {0.01};
+  EXPECT_THROW(measure_realism(recording, options), UsageError);
+  options.network_threshold = {0.3};
+  EXPECT_NO_THROW(measure_realism(recording, options));
+  options.network_weights = "of others";
   EXPECT_THROW(measure_realism(recording, options), UsageError);
   // Others take none, and the report says so.
   options.weights = "shipped:8";

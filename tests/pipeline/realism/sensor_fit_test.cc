@@ -304,10 +304,13 @@ TEST(FitSensor, FindsThresholdsByPolarityThroughANetwork) {
   EXPECT_LE(fit.network->ratio.low, fit.network->threshold.ratio * 1.01);
   EXPECT_GE(fit.network->ratio.high, fit.network->threshold.ratio * 0.99);
   EXPECT_EQ(fit.rows.size(), 5u);
-  // The document has the network's.
-  const CameraSensor sensor = fit.sensor("mine", "a test");
-  EXPECT_NEAR(sensor.threshold->range[0], fit.network->threshold.mean, 5e-3);
-  EXPECT_NEAR(sensor.threshold->ratio, fit.network->threshold.ratio, 5e-3);
+  // The document has both, each by itself.
+  const CameraSensor sensor = fit.sensor("mine", "a test", "abc");
+  EXPECT_NEAR(sensor.network->threshold.range[0], fit.network->threshold.mean, 5e-3);
+  EXPECT_NEAR(sensor.network->threshold.ratio, fit.network->threshold.ratio, 5e-3);
+  EXPECT_EQ(sensor.network->weights, "abc");
+  EXPECT_NEAR(sensor.threshold->range[0], fit.difference->threshold.mean, 5e-3);
+  EXPECT_EQ(sensor.threshold->ratio, 1);
   EXPECT_EQ(sensor.name, "mine");
   EXPECT_EQ(sensor.origin, "a test");
 }

@@ -70,12 +70,12 @@ TEST(NetworkMethod, DrawsEventsOfTheSensorItIsTold) {
 
 TEST(OpenRealismGenerator, RefusesNamesAndFilesThatAreNoWeights) {
   const testing::TemporaryFolder folder;
-  EXPECT_THROW(open_realism_generator((folder / "absent.safetensors").string()), InputError);
-  EXPECT_THROW(open_realism_generator("shipped:"), UsageError);
-  EXPECT_THROW(open_realism_generator("shipped:8x"), UsageError);
-  EXPECT_THROW(open_realism_generator("shipped:12345"), UsageError);
-  EXPECT_THROW(open_realism_generator("shipped:63"), InputError);  // a width that is not shipped
-  EXPECT_THROW(open_realism_generator("untrained:8"), UsageError);
+  EXPECT_THROW(open_network((folder / "absent.safetensors").string()), InputError);
+  EXPECT_THROW(open_network("shipped:"), UsageError);
+  EXPECT_THROW(open_network("shipped:8x"), UsageError);
+  EXPECT_THROW(open_network("shipped:12345"), UsageError);
+  EXPECT_THROW(open_network("shipped:63"), InputError);  // a width that is not shipped
+  EXPECT_THROW(open_network("untrained:8"), UsageError);
 }
 
 /// Makes round(scale / threshold) events at one pixel.
