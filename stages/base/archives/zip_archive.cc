@@ -36,10 +36,6 @@ std::size_t count_signatures(const InputFile& file) {
   return count;
 }
 
-struct DiscardArchive {
-  void operator()(zip_t* archive) const { zip_discard(archive); }
-};
-
 struct CloseMember {
   void operator()(zip_file_t* member) const { zip_fclose(member); }
 };
@@ -55,6 +51,10 @@ std::string text_of(int code) {
 }  // namespace
 
 struct ZipArchive::State {
+  struct Discard {
+    void operator()(zip_t* archive) const { zip_discard(archive); }
+  };
+
   explicit State(const std::filesystem::path& file) : path(file.string()) {
     const InputFile bytes(file);
     size_bytes = bytes.size_bytes();
@@ -93,7 +93,7 @@ struct ZipArchive::State {
 
   std::string path;
   std::uintmax_t size_bytes = 0;
-  std::unique_ptr<zip_t, DiscardArchive> archive;
+  std::unique_ptr<zip_t, Discard> archive;
   std::vector<std::string> names;
 };
 
