@@ -51,8 +51,10 @@ void list_settings(Some& some, SensorSpec& spec) {
             "A pixel is silent so long after an event.");
   some.find("leak_rate_hz", spec.leak_rate_hz, rates,
             "Positive events per pixel and second without any motion.");
-  some.find("shot_noise_rate_hz", spec.shot_noise_rate_hz, rates,
-            "Random events of either polarity per pixel and second.");
+  some.find(
+      "shot_noise_rate_hz", spec.shot_noise_rate_hz, rates,
+      "Random events of either polarity per pixel and second where it is black; a quarter of it "
+      "at white.");
   some.find("hot_pixel_fraction", spec.hot_pixel_fraction, numbers(0, 1),
             "Share of pixels that fire on their own.");
   some.find("hot_pixel_rate_hz", spec.hot_pixel_rate_hz, rates,

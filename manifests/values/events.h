@@ -32,8 +32,9 @@ struct SensorSpec {
   double refractory_s = 0;          ///< a pixel is silent so long after an event, 0..1; what it
                                     ///< passes by then is lost, its level follows
   double leak_rate_hz = 0;          ///< positive events per pixel and second without any motion
-  double shot_noise_rate_hz = 0;    ///< events of either polarity per pixel and second, Poisson;
-                                    ///< the rate of one polarity is half of it
+  double shot_noise_rate_hz = 0;    ///< events of either polarity per pixel and second of black,
+                                    ///< Poisson; the rate of one polarity is half of it, and of
+                                    ///< white a quarter
   double hot_pixel_fraction = 0;    ///< share of pixels that are hot, 0..1
   double hot_pixel_rate_hz = 0;     ///< events per second of a hot pixel, Poisson, one polarity
   double log_epsilon = 0.001;       ///< ε, 1e-6..1: keeps the logarithm of black finite

@@ -28,6 +28,7 @@
 #include "pipeline/runtime/trace.h"
 #include "stages/base/files/file_lock.h"
 #include "stages/frames/class_numbers.h"
+#include "stages/recordings/event_index.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {
@@ -129,14 +130,17 @@ void accept_inputs(const fs::path& folder, const std::string& plan_hash, const F
   }
 }
 
-PlannedJob plan_again(const JobManifest& manifest, const std::string& weights_hash,
-                      const std::string& engine, const Fingerprint& frozen,
-                      const RunOptions& options) {
-  return make_plan(manifest, weights_hash, engine,
-                   {.stop = [&] { return options.stop_requested(); },
-                    .trace = options.trace,
-                    .show_phase = options.show_phase,
-                    .limit = limit_of(frozen)});
+PlannedJob plan_again(const fs::path& folder, const JobManifest& manifest,
+                      const std::string& weights_hash, const std::string& engine,
+                      const Fingerprint& frozen, const RunOptions& options) {
+  const EventIndexes indexes(folder / kEventIndexFile);
+  PlannedJob planned = make_plan(manifest, weights_hash, engine,
+                                 {.stop = [&] { return options.stop_requested(); },
+                                  .trace = options.trace,
+                                  .show_phase = options.show_phase,
+                                  .limit = limit_of(frozen)});
+  indexes.save();
+  return planned;
 }
 
 /// Each once: a shard may be looked at more than once.
@@ -289,7 +293,7 @@ std::optional<RetryReport> nothing_to_retry(const fs::path& folder, const Frozen
   if (found.count > 0) return std::nullopt;
   RetryReport report = new_report(folder, found, frozen.plan.sample_count());
   const Fingerprint& before = frozen.plan.fingerprint;
-  PlannedJob job = plan_again(manifest, "", "", before, options);
+  PlannedJob job = plan_again(folder, manifest, "", "", before, options);
   const auto have_new = number_as_stored(folder, frozen, manifest, job.datasets);
   if (std::ranges::find(have_new, true) != have_new.end()) return std::nullopt;
   Fingerprint& now = job.plan.fingerprint;
@@ -320,8 +324,8 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
   const QuarantinedSamples found = find_quarantined(folder, outline);
   RetryReport report = new_report(folder, found, frozen.plan.sample_count());
 
-  PlannedJob job =
-      plan_again(manifest, weights_hash, generator.description(), frozen.plan.fingerprint, options);
+  PlannedJob job = plan_again(folder, manifest, weights_hash, generator.description(),
+                              frozen.plan.fingerprint, options);
   const auto have_new = number_as_stored(folder, outline, manifest, job.datasets);
   accept_inputs(folder, frozen.hash, frozen.plan.fingerprint, job.plan.fingerprint, manifest,
                 found.ids, report);

@@ -58,6 +58,7 @@ struct SourceDraft {
   bool is_stills = false;
   bool has_sizes = false;                 ///< the images that were looked at have several sizes
   bool has_frames = false;                ///< recording
+  bool are_windows = false;               ///< recordings, each a labelled window of its own
   bool needs_sensor = false;              ///< recording whose files do not tell the sensor's size
   std::optional<SensorGuess> guess = {};  ///< then: what the events show, if any was seen
   bool has_samples = false;
@@ -362,6 +363,18 @@ std::unique_ptr<Dataset> open_source(SourceSpec spec, const fs::path& folder,
   throw;
 }
 
+/// Whether each of the recordings is a window by itself, as tables with YOLO's texts are.
+bool each_is_a_window(SourceSpec spec, const fs::path& folder, const Dataset& recordings,
+                      SourceDraft draft) try {
+  const auto is_text = [](const std::string& file) { return file.ends_with(".txt"); };
+  if (std::ranges::none_of(recordings.annotation_files(), is_text)) return false;
+  spec.window.duration_s.reset();
+  open_source(std::move(spec), folder, draft);
+  return true;
+} catch (const InputError&) {  // one is not
+  return false;
+}
+
 double overlap_over_union(const Rectangle& a, const Rectangle& b) {
   const auto area = [](const Rectangle& box) {
     return std::max(box.right - box.left, 0.0) * std::max(box.bottom - box.top, 0.0);
@@ -552,7 +565,11 @@ class Draft {
                           size.height);
     }
     text +=
-        source.has_frames
+        source.are_windows
+            ? R"(      // Each file is a window. With it, only the last events of each are:
+      // "window_s": 0.05,
+)"
+        : source.has_frames
             ? R"(      // Without it, a window is an interval between two frames:
       // "window_s": 0.05,
 )"
@@ -670,6 +687,8 @@ ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const Draf
     const Survey counted = survey(*dataset, spec);
     if (has_events(found.dataset)) {
       source.has_frames = all_have_frames(*dataset);
+      source.are_windows =
+          !source.has_frames && each_is_a_window(spec, place.folder, *dataset, source);
       source.has_samples = counted.labelled_frames > 0 && !source.needs_sensor;
     } else {
       source.gaps = gaps_to_take(counted, source.gaps);

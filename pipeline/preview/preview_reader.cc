@@ -20,6 +20,7 @@
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/frames/decoding/still_clip.h"
 #include "stages/frames/still_clips.h"
+#include "stages/recordings/event_index.h"
 #include "stages/recordings/recording.h"
 #include "stages/shards/shard_reader.h"
 
@@ -38,9 +39,10 @@ namespace fs = std::filesystem;
 
 /// The frame of a recording of events, of `last` if it is that one; a fault names its file.
 /// `source`: that of the sample, if known. A path alone does not lead to it: two sources can be the
-/// two cameras of one file.
-Outcome<ColourFrame> decode_recorded(const fs::path& folder, const SourceSpec* source,
-                                     const FrameRef& frame, OpenRecording& last) try {
+/// two cameras of one file. `job`: the folder of its shard, which may know where its times lie.
+Outcome<ColourFrame> decode_recorded(const fs::path& folder, const fs::path& job,
+                                     const SourceSpec* source, const FrameRef& frame,
+                                     OpenRecording& last) try {
   const fs::path path = folder / frame.path;
   if (source == nullptr) {
     return SampleFault{
@@ -49,6 +51,7 @@ Outcome<ColourFrame> decode_recorded(const fs::path& folder, const SourceSpec* s
         path.string()};
   }
   if (!last.recording || last.path != path || last.options != source->recording) {
+    const EventIndexes indexes(job / kEventIndexFile);
     last = {path, source->recording, open_recording(path, {}, source->recording)};
   }
   const GreyImage grey = last.recording->frame(frame.video_frame);
@@ -223,12 +226,12 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
     if (!sample.valid || (state_->has_events && which.video_frame < 0)) {
       return std::vector<std::uint8_t>();
     }
-    return frame_image(
-        state_->has_events
-            ? decode_recorded(state_->frames, state_->source, which, state_->recording)
-            : state_->decoder.decode(which, sample.pair.video_stride(), orientation,
-                                     state_->manifest.image.range),
-        which, sample, state_->manifest.image, state_->warnings);
+    return frame_image(state_->has_events
+                           ? decode_recorded(state_->frames, shard.parent_path(), state_->source,
+                                             which, state_->recording)
+                           : state_->decoder.decode(which, sample.pair.video_stride(), orientation,
+                                                    state_->manifest.image.range),
+                       which, sample, state_->manifest.image, state_->warnings);
   };
   if (is_made && sample.valid) {
     Outcome<std::array<ColourFrame, 2>> made = state_->made_frames(sample);

@@ -13,6 +13,7 @@ import cv2
 import h5py
 import numpy as np
 
+import failing_files
 import program
 from camera_files import (BBOX, DHP19_JOINTS, DHP19_MATRICES, HEIGHT, WIDTH, random_events, volume_of,
                           whole_microseconds, write_columns, write_dat, write_dhp19, write_event_utils, write_mvsec,
@@ -597,6 +598,15 @@ class WithoutFrames(program.InFolder):
             run("convert", manifest, "--output", other, "--shards", part)
         self.assertEqual(index.read_bytes(), (other / "plan.index").read_bytes())
         self.assertEqual(shard_bytes(self.out), shard_bytes(other))
+
+    def test_later_commands_take_the_index_of_times(self):
+        write_mvsec(self.folder / "drive.hdf5", self.events, [20.0 + 0.05 * k for k in range(7)])
+        self.convert("drive.hdf5")
+        for command in (["convert", self.folder / "manifest.json"], ["retry", self.out], ["report", self.out],
+                        ["preview", self.out, "--out", self.folder / "images"]):
+            done = failing_files.run(self.out, "", *command)
+            self.assertEqual(done.code, 0, done.err)
+            self.assertIn("plan.index", [call.path.name for call in done.calls if call.kind == "open"], command)
 
     def test_more_recordings_than_files_may_be_open(self):
         many = self.folder / "many"

@@ -97,6 +97,20 @@ def write_dat(path, events, size=(HEIGHT, WIDTH)):
     path.write_bytes(header + b"\x0c\x08" + words.tobytes())
 
 
+def write_evt3(path, events, size=(HEIGHT, WIDTH), begin_us=0, padding=0, form="EVT3"):
+    """Prophesee's RAW in EVT 3.0, a camera whose clock is at `begin_us` when the events' times are 0; each `padding`
+    events a word that means nothing."""
+    words = []
+    for number, (x, y, time, positive) in enumerate(zip(*events.T.astype(int)[:2], whole_microseconds(events)[1],
+                                                        events[:, 3] > 0)):
+        time = int(time) + begin_us
+        if padding and number % padding == 0:
+            words.append(0x9999)
+        words += [8 << 12 | time >> 12 & 0xfff, 6 << 12 | time & 0xfff, y, 2 << 12 | int(positive) << 11 | x]
+    header = f"% evt {'2.1' if form == 'EVT21' else '3.0'}\n% format {form};height={size[0]};width={size[1]}\n% end\n"
+    path.write_bytes(header.encode() + np.array(words, "<u2").tobytes())
+
+
 BBOX = [("t", "<u8"), ("x", "<f4"), ("y", "<f4"), ("w", "<f4"), ("h", "<f4"), ("class_id", "u1"), ("track_id", "<u4"),
         ("class_confidence", "<f4")]
 

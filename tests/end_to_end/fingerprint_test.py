@@ -14,14 +14,17 @@ import PIL.Image
 import damage_test
 import failing_files
 import program
-from camera_files import BBOX, random_events, write_columns, write_dhp19, write_mvsec
+from camera_files import (BBOX, random_events, whole_microseconds, write_columns, write_dat, write_dhp19,
+                          write_event_utils, write_evt3, write_mvsec, write_v2e)
+from moving_texture import write_video
 from program import SHARED, text
 from small_job import LENIENT, save_image, small_job
 
 DOCUMENTS = {"manifest.json", "camera.json"}  # whose values are fields of the fingerprint
 # Of frames and recordings a fingerprint has the path and the size: to read them all for it would be to read them twice.
 IMAGES = {".png", ".jpg"}
-RECORDINGS = {"drive.hdf5", "drive_td.h5", "events.h5", "mov1.h5", "events.txt"}
+RECORDINGS = {"drive.hdf5", "drive_td.h5", "events.h5", "mov1.h5", "events.txt", "a.raw", "a.dat", "a.aedat4", "a.npy",
+              "a.npz", "v2e.h5", "hqf.h5", "m3ed.h5", "clip.mp4"}
 STILL = {"from": "stills", "motion": {"translation_px": [1, 2], "objects": {"translation_px": [1, 2]}}}
 BOX = "car,4,5,14,15"
 VOC = ("<annotation><filename>{}.png</filename><size><width>32</width><height>24</height><depth>3</depth></size>"
@@ -221,6 +224,59 @@ class OpenedFiles(program.InFolder):
         self.copied("davis/slider_depth")
         self.check(self.of({"dataset": "recording", "root": "davis/slider_depth"}, kind="events"), "events.txt",
                    "images.txt")
+
+    def test_recordings_of_cameras_and_tools(self):
+        folder = self.folder / "in"
+        folder.mkdir()
+        events, ticks = whole_microseconds(random_events(3000, 1, 1.4, 3))
+        columns = {"t": ticks, "x": events[:, 0].astype(np.uint16), "y": events[:, 1].astype(np.uint16),
+                   "p": (events[:, 3] > 0).astype(np.uint8)}
+        write_evt3(folder / "a.raw", events)
+        write_dat(folder / "a.dat", events)
+        np.savez(folder / "a.npz", **columns)
+        np.save(folder / "a.npy", np.stack(list(columns.values()), 1))
+        write_v2e(folder / "v2e.h5", events)
+        write_event_utils(folder / "hqf.h5", events)
+        write_columns(folder / "m3ed.h5", events, "prophesee/left", "prophesee/left/ms_map_idx")
+        self.write_aedat4(folder / "a.aedat4")
+        for name in ("a.raw", "a.dat", "a.npz", "a.npy", "v2e.h5", "hqf.h5", "m3ed.h5", "a.aedat4"):
+            self.out = self.folder / f"out of {name}"
+            source = {"dataset": "recording", "root": name, "window_s": 0.05}
+            if name != "a.aedat4":
+                source["sensor"] = {"width": 32, "height": 24}
+            self.check(self.of(source, kind="events"), name)
+
+    def write_aedat4(self, path):
+        """As `simulate` has it."""
+        self.images("moving")
+        self.write("simulation.json", json.dumps({
+            "format": "eventgan-simulation", "version": 1, "name": "s", "seed": 1,
+            "sources": [{"path": "moving", "method": "difference", "frames_per_second": 10, "name": "c"}],
+            "output": {"directory": "simulated", "format": "aedat4"}}))
+        program.run("simulate", self.folder / "in" / "simulation.json")
+        shutil.move(self.folder / "in" / "simulated" / "c.aedat4", path)
+
+    def test_windows_with_texts_and_a_table_of_labels_elsewhere(self):
+        (self.folder / "in" / "windows").mkdir(parents=True)
+        rows = whole_microseconds(random_events(300, 1, 1.04, 3))
+        table = np.stack([rows[1], rows[0][:, 0], rows[0][:, 1], rows[0][:, 3] > 0], 1).astype(np.int64)
+        np.save(self.folder / "in" / "windows" / "a.npy", table)
+        self.write("yolo/train/a.txt", "0 0.5 0.5 0.25 0.25\n")
+        self.write("yolo/classes.txt", "person\n")
+        source = {"dataset": "recording", "root": "windows", "sensor": {"width": 32, "height": 24}}
+        self.check(self.of({**source, "annotations": "yolo/train"}, kind="events"), "a.npy", "train/a.txt",
+                   "classes.txt")
+        self.write("labels.csv", "time_s,left,top,right,bottom,class\n1.03,2,3,12,13,car\n")
+        self.out = self.folder / "labels of csv"
+        self.check(self.of({**source, "root": "windows/a.npy", "annotations": "labels.csv", "window_s": 0.02},
+                           kind="events"), "labels.csv")
+
+    def test_a_video_with_its_labels(self):
+        (self.folder / "in").mkdir()
+        write_video(self.folder / "in" / "clip.mp4", 4)
+        self.write("clip.csv", "image,class,left,top,right,bottom\n"
+                   + "".join(f"clip.mp4/{k},{BOX}\n" for k in range(4)))
+        self.check(self.frames("clip.mp4", labels={"format": "csv", "path": "clip.csv"}), "clip.mp4", "clip.csv")
 
     def test_dhp19(self):
         write_dhp19(self.folder / "in" / "dhp19", recordings=("S1_1_1",))

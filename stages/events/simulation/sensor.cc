@@ -114,14 +114,17 @@ bool PixelNoise::any(const SensorSpec& spec) {
   return spec.shot_noise_rate_hz > 0 || (spec.hot_pixel_fraction > 0 && spec.hot_pixel_rate_hz > 0);
 }
 
-bool PixelNoise::take(std::size_t pixel) {
-  // One draw says which of the superposed processes this arrival belongs to.
+std::optional<bool> PixelNoise::take(std::size_t pixel, double light) {
+  // One draw says which of the superposed processes this arrival belongs to. Arrivals have the rate
+  // of the dark: of those of shot noise the light takes a share, so that their times stay.
   const std::uint64_t arrival = (draws_[pixel] - 1) * next_s_.size() + pixel;
   const double kind_hz = kind_random_.uniform(arrival) * rate_hz(pixel);
   draw_wait(pixel);
   const double shot_hz = shot_rate_hz_[pixel];
-  if (kind_hz < shot_hz) return kind_hz < shot_hz / 2;
-  return hot_[pixel] > 0;
+  if (kind_hz >= shot_hz) return hot_[pixel] > 0;
+  const double seen_hz = shot_hz * (1 - (1 - kShotNoiseAtWhite) * std::clamp(light, 0.0, 1.0));
+  if (kind_hz >= seen_hz) return std::nullopt;
+  return kind_hz < seen_hz / 2;
 }
 
 double PixelNoise::rate_hz(std::size_t pixel) const {
@@ -229,29 +232,40 @@ struct Pixel {
   PixelLeak leak;
 };
 
+/// What a pixel sees during a step: its log intensity moves on a line.
+struct Light {
+  float log_before;
+  float log_after;
+  float epsilon;
+
+  float log_change() const { return log_after - log_before; }
+  /// The linear intensity, at a part of the step.
+  double at(double part) const { return std::exp(log_before + log_change() * part) - epsilon; }
+};
+
 double next_noise_s(const PixelNoise* noise, std::size_t pixel) {
   return noise ? noise->next_s(pixel) : std::numeric_limits<double>::infinity();
 }
 
-void run_eventful_pixel(const Pixel& pixel, double change, const Step& step, PixelNoise* noise,
-                        PixelState& state, std::vector<Event>& events);
+void run_eventful_pixel(const Pixel& pixel, const Light& light, double change, const Step& step,
+                        PixelNoise* noise, PixelState& state, std::vector<Event>& events);
 
-/// Takes a pixel through a step in which its log intensity moves by `log_change`.
-inline void run_pixel(const Pixel& pixel, float log_change, const Step& step, PixelNoise* noise,
+/// Takes a pixel through a step.
+inline void run_pixel(const Pixel& pixel, const Light& light, const Step& step, PixelNoise* noise,
                       PixelState& state, std::vector<Event>& events) {
-  const double change = log_change + step.leak * pixel.leak.rate * pixel.positive_threshold;
+  const double change = light.log_change() + step.leak * pixel.leak.rate * pixel.positive_threshold;
   // Most pixels: a line between the thresholds at both ends crosses neither.
   const double end = state.difference + change;
   if (end < pixel.positive_threshold && end > -pixel.negative_threshold &&
       next_noise_s(noise, pixel.number) > step.end_s && state.held_until_s <= step.start_s) {
     state.difference = end;
   } else {
-    run_eventful_pixel(pixel, change, step, noise, state, events);
+    run_eventful_pixel(pixel, light, change, step, noise, state, events);
   }
 }
 
-void run_eventful_pixel(const Pixel& pixel, double change, const Step& step, PixelNoise* noise,
-                        PixelState& state, std::vector<Event>& events) {
+void run_eventful_pixel(const Pixel& pixel, const Light& light, double change, const Step& step,
+                        PixelNoise* noise, PixelState& state, std::vector<Event>& events) {
   const double positive = pixel.positive_threshold;
   const double negative = pixel.negative_threshold;
   // d is known at `now`: the step's start, the last reset, or the end of a refractory time.
@@ -267,8 +281,9 @@ void run_eventful_pixel(const Pixel& pixel, double change, const Step& step, Pix
     bool is_positive = change > 0;
     if (noise_at <= crossing) {
       const bool held = noise->next_s(pixel.number) < state.held_until_s;
-      is_positive = noise->take(pixel.number);
-      if (held) continue;
+      const std::optional<bool> taken = noise->take(pixel.number, light.at(noise_at));
+      if (held || !taken) continue;
+      is_positive = *taken;
     }
     const double event = std::min(crossing, noise_at);
     const double event_s = step.start_s + event * step.duration_s;
@@ -312,11 +327,11 @@ std::vector<Event> Sensor::step(std::span<const float> intensity, double t_s) {
   for (int y = 0; y < size_.height; ++y) {
     for (int x = 0; x < size_.width; ++x, ++number) {
       const float after = std::log(intensity[number] + epsilon);
-      const float log_change = after - log_intensity_[number];
+      const Light light{log_intensity_[number], after, epsilon};
       log_intensity_[number] = after;
       run_pixel({number, x, y, positive_threshold_[number], negative_threshold_[number],
                  leak_.empty() ? PixelLeak() : leak_[number]},
-                log_change, step, &*noise_, pixels_[number], events);
+                light, step, &*noise_, pixels_[number], events);
     }
   }
   time_s_ = t_s;
@@ -436,7 +451,7 @@ class RowRuns {
         random_(random),
         leaks_(spec.leak_rate_hz > 0),
         start_s_(times_s.front()),
-        changes_(times_s.size() - 1) {
+        logs_(times_s.size()) {
     for (std::size_t i = 1; i < times_s.size(); ++i) {
       steps_.emplace_back(times_s[i - 1], times_s[i], spec);
     }
@@ -464,7 +479,8 @@ class RowRuns {
       PixelState state{.difference = pixel.leak.phase * pixel.positive_threshold,
                        .held_until_s = start_s_};
       for (std::size_t k = 0; k < steps_.size(); ++k) {
-        run_pixel(pixel, changes_[k], steps_[k], noise_ ? &*noise_ : nullptr, state, events);
+        const Light light{logs_[k], logs_[k + 1], epsilon_};
+        run_pixel(pixel, light, steps_[k], noise_ ? &*noise_ : nullptr, state, events);
       }
     }
   }
@@ -497,13 +513,10 @@ class RowRuns {
     pixels_.resize(count);
   }
 
-  /// Computes the changes of a pixel's logarithm.
+  /// Computes a pixel's logarithms.
   void look(std::span<const float> intensity) {
-    float before = std::log(intensity[0] + epsilon_);
-    for (std::size_t k = 0; k < changes_.size(); ++k) {
-      const float after = std::log(intensity[(k + 1) * width_] + epsilon_);
-      changes_[k] = after - before;
-      before = after;
+    for (std::size_t k = 0; k < logs_.size(); ++k) {
+      logs_[k] = std::log(intensity[k * width_] + epsilon_);
     }
   }
 
@@ -527,7 +540,7 @@ class RowRuns {
   std::vector<std::size_t> pixels_;
   std::vector<float> positive_thresholds_;
   std::vector<float> negative_thresholds_;
-  std::vector<float> changes_;  ///< of a pixel, by step
+  std::vector<float> logs_;  ///< of a pixel, by image
 };
 
 }  // namespace

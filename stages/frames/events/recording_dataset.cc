@@ -334,7 +334,12 @@ class RecordingDataset final : public Dataset {
 
   void open_without_frames(Recorded& recorded) const {
     if (!recorded.event_span) {
-      throw InputError("expected events or frames, got neither, in " + recorded.path);
+      // What was passed over may be why: words of another format than the header's, another sensor.
+      std::vector<std::string> passed_over = recorded.recording->warnings();
+      std::ranges::move(recorded.recording->notes(), std::back_inserter(passed_over));
+      throw InputError(fmt::format(
+          "expected events or frames, got neither, in {}{}", recorded.path,
+          passed_over.empty() ? "" : fmt::format(" ({})", fmt::join(passed_over, "; "))));
     }
     const bool is_labelled = !recorded.label_file.empty();
     if (!window_.duration_s && !(is_labelled && window_.events) && !recorded.is_window()) {

@@ -184,6 +184,22 @@ TEST_F(DraftManifest, OfARecordingTakesItsEvents) {
               ElementsAre(AllOf(HasSubstr("of 1 recording"), Not(HasSubstr("gap")))));
 }
 
+TEST_F(DraftManifest, OfTablesWithTextsEachIsAWindow) {
+  for (const char* name : {"a", "b"}) {
+    const std::string file = std::string("windows/") + name;
+    testing::write_file(folder_ / (file + ".csv"), "t,x,y,p\n0.1,5,2,1\n0.17,3,3,0\n");
+    testing::write_file(folder_ / (file + ".txt"), "0 0.5 0.5 0.25 0.25\n");
+  }
+  const auto window_s = [&] {
+    return read(draft({found(DatasetKind::kRecording, "windows")})).sources[0].window.duration_s;
+  };
+  EXPECT_EQ(window_s(), std::nullopt);
+  std::filesystem::remove(folder_ / "windows/a.txt");
+  EXPECT_EQ(window_s(), std::nullopt) << "one without a text is left out";
+  std::filesystem::remove(folder_ / "windows/b.txt");
+  EXPECT_EQ(window_s(), 0.05);
+}
+
 TEST_F(DraftManifest, GuessesASensorFromEventsAlone) {
   const auto drafted = [&](const std::string& x) {
     testing::write_file(folder_ / "camera.csv",

@@ -2,10 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "stages/events/simulation/sensor.h"
@@ -66,11 +69,12 @@ struct ArrivalCounts {
   std::vector<int> negative;
 };
 
-ArrivalCounts count_until(PixelNoise& noise, std::size_t pixels, double end_s) {
+ArrivalCounts count_until(PixelNoise& noise, std::size_t pixels, double end_s, double light = 0) {
   ArrivalCounts counts{std::vector<int>(pixels), std::vector<int>(pixels)};
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
     while (noise.next_s(pixel) <= end_s) {
-      ++(noise.take(pixel) ? counts.positive : counts.negative)[pixel];
+      const std::optional<bool> positive = noise.take(pixel, light);
+      if (positive) ++(*positive ? counts.positive : counts.negative)[pixel];
     }
   }
   return counts;
@@ -101,6 +105,31 @@ TEST(PixelNoise, ShotNoiseHasTheSetRateOnAverageAndIsBalanced) {
   EXPECT_NEAR(sum, expected * kPixels, 4 * std::sqrt(variance * kPixels));
   EXPECT_NEAR(squares / kPixels / variance, 1, 0.15);
   EXPECT_NEAR(positive, sum / 2, 4 * std::sqrt(sum) / 2);
+}
+
+// v2e's rule: a quarter at white, on a line of the intensity; what is brighter is white.
+TEST(PixelNoise, LightTakesShotNoiseOfBothPolaritiesButNotThatOfHotPixels) {
+  constexpr std::size_t kPixels = 4096;
+  SensorSpec spec;
+  spec.shot_noise_rate_hz = 5;
+  const auto sums = [&](double light) {
+    PixelNoise noise(spec, kPixels, 0, CounterRandom(5));
+    const ArrivalCounts counts = count_until(noise, kPixels, 4, light);
+    return std::array{std::accumulate(counts.positive.begin(), counts.positive.end(), 0.0),
+                      std::accumulate(counts.negative.begin(), counts.negative.end(), 0.0)};
+  };
+  const auto dark = sums(0);
+  EXPECT_EQ(sums(-0.1), dark);
+  for (const auto& [light, share] : {std::pair(0.4, 0.7), {1.0, 0.25}, {7.0, 0.25}}) {
+    const auto lit = sums(light);
+    for (std::size_t k = 0; k < 2; ++k) {  // of a known number of arrivals, so binomial
+      EXPECT_NEAR(lit[k], share * dark[k], 5 * std::sqrt(dark[k]));
+    }
+  }
+  spec = {};
+  spec.hot_pixel_fraction = 1;
+  spec.hot_pixel_rate_hz = 9;
+  EXPECT_EQ(sums(1), sums(0));
 }
 
 TEST(PixelNoise, HotPixelsFireInOnePolarityAtTheirRate) {
@@ -141,7 +170,7 @@ TEST(PixelNoise, ArrivalsRise) {
   for (int i = 0; i < 1000; ++i) {
     EXPECT_GE(noise.next_s(0), last_s);
     last_s = noise.next_s(0);
-    noise.take(0);
+    noise.take(0, 0);
   }
 }
 
@@ -252,13 +281,41 @@ TEST(SensorNoise, ShotNoiseHasTheSetRateWithoutMotion) {
   SensorSpec spec;
   spec.shot_noise_rate_hz = 3;
   const std::vector<Event> events = watch_still(spec, 4, 9);
-  const double expected = 3.0 * 4 * static_cast<double>(kNoisySize.pixel_count());
+  const double light = std::exp(-1) - spec.log_epsilon;
+  const double of_a_pixel = 3.0 * 4 * (1 - 0.75 * light);
+  const double expected = of_a_pixel * static_cast<double>(kNoisySize.pixel_count());
   EXPECT_NEAR(static_cast<double>(events.size()), expected,
-              4 * std::sqrt(expected + 12 * expected * kRateVariance));
+              4 * std::sqrt(expected + of_a_pixel * expected * kRateVariance));
   double positive = 0;
   for (const Event& event : events) positive += event.positive;
   const auto count = static_cast<double>(events.size());
   EXPECT_NEAR(positive, count / 2, 4 * std::sqrt(count) / 2);
+}
+
+// From black to white on a line of the logarithm: most of the time it is dark.
+TEST(SensorNoise, ShotNoiseFollowsTheLightOfTheMoment) {
+  SensorSpec spec = exact_sensor(5);  // no event of the change
+  spec.shot_noise_rate_hz = 8;
+  constexpr double kBlack = -4, kWhite = 0;
+  double seen = 0;  // mean of 1 - 0.75 I over the way
+  for (int i = 0; i < 1000; ++i) {
+    seen += 1 - 0.75 * (std::exp(kBlack + (kWhite - kBlack) * (i + 0.5) / 1000) - spec.log_epsilon);
+  }
+  seen /= 1000;
+  for (const int steps : {1, 8}) {
+    Sensor sensor(spec, kNoisySize, CounterRandom(4));
+    double count = 0, late = 0;
+    for (int step = 0; step <= steps; ++step) {
+      const double part = static_cast<double>(step) / steps;
+      const auto events =
+          sensor.step(log_image(kNoisySize, kBlack + (kWhite - kBlack) * part, spec), 4 * part);
+      count += static_cast<double>(events.size());
+      for (const Event& event : events) late += event.t_s > 2;
+    }
+    const double dark = 8.0 * 4 * static_cast<double>(kNoisySize.pixel_count());
+    EXPECT_NEAR(count / dark, seen, 0.06);
+    EXPECT_LT(late, 0.47 * count);
+  }
 }
 
 TEST(SensorNoise, DoesNotDependOnHowTimeIsCut) {
@@ -284,10 +341,12 @@ TEST(SensorNoise, DoesNotDependOnHowTimeIsCut) {
 }
 
 TEST(SensorNoise, ANoiseEventSetsTheLevelAnew) {
-  // Shot noise far denser than the motion: hardly a pixel gets a full threshold away between two
-  // resets (0.3 log units at 0.1 a second, 50 resets a second: chance exp(-50 · 3)).
+  // Noise far denser than the motion: hardly a pixel gets a full threshold away between two
+  // resets (0.3 log units at 0.1 a second, 50 resets a second: chance exp(-50 · 3)). That of hot
+  // pixels, which light does not change.
   SensorSpec noisy = exact_sensor(0.3);
-  noisy.shot_noise_rate_hz = 50;
+  noisy.hot_pixel_fraction = 1;
+  noisy.hot_pixel_rate_hz = 50;
   Sensor moving(noisy, kNoisySize, CounterRandom(1));
   Sensor still(noisy, kNoisySize, CounterRandom(1));
   moving.step(log_image(kNoisySize, -3, noisy), 0);

@@ -193,8 +193,9 @@ TEST(SensorRefractory, DeadTimeLowersTheRateOfNoise) {
   spec.shot_noise_rate_hz = 20;
   spec.refractory_s = 0.05;
   Sensor sensor(spec, kSize, CounterRandom(3));
-  sensor.step(log_image(kSize, -1, spec), 0);
-  const std::vector<Event> events = sensor.step(log_image(kSize, -1, spec), 10);
+  const double black = std::log(spec.log_epsilon);  // where shot noise has its whole rate
+  sensor.step(log_image(kSize, black, spec), 0);
+  const std::vector<Event> events = sensor.step(log_image(kSize, black, spec), 10);
   // A renewal process with mean wait R + 1/r and variance 1/r^2: T / (R + 1/r) events a pixel, on
   // average (1/r^2 / mean^2 - 1)/2 + ... below 1 off that, of variance T / (r^2 mean^3). Over the
   // pixels' own rates the mean is 92, and the deviation, most of it between pixels, below 30.
@@ -251,8 +252,8 @@ TEST(SensorExtremes, EventsThatDoNotFitIntoMemoryAreRefusedWithTheSettings) {
   spec.shot_noise_rate_hz = 20;
   constexpr ImageSize kMany{50, 60};
   Sensor sensor(spec, kMany, CounterRandom(1));
-  sensor.step(std::vector<float>(3000, 0.5f), 0);
-  const std::size_t count = sensor.step(std::vector<float>(3000, 0.5f), 1).size();
+  sensor.step(std::vector<float>(3000, 0.0f), 0);
+  const std::size_t count = sensor.step(std::vector<float>(3000, 0.0f), 1).size();
   // The pixels' own rates deviate by 0.64 of their mean.
   EXPECT_NEAR(static_cast<double>(count), 60000,
               5 * std::sqrt(60000 + 3000 * std::pow(0.64 * 20, 2)));
