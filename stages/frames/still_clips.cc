@@ -418,7 +418,8 @@ class StillClips final : public WrappedDataset {
 
   std::vector<StillPose> poses(const LabelledFrame& frame, const Still& still, int last) const {
     const PairKey key{seed_, to_string(spec_.dataset), frame.sample_id, key_};
-    return clip_poses(spec_.pairs.stills.value(), key.pair(), still.boxes, still.size, last);
+    return clip_poses(spec_.pairs.stills.value(), key.pair(), still.boxes, still.carriers,
+                      still.size, last);
   }
 
   SourceSpec spec_;
