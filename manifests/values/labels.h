@@ -122,6 +122,8 @@ struct Annotation {
   std::vector<std::string> left_out = {};
   /// Where each of these stands among all boxes that the annotation has, counted from 0.
   std::vector<std::size_t> left_out_at = {};
+  /// What outlines in `boxes` are without: "expected X, got Y, in PATH:LINE" each.
+  std::vector<std::string> outlines_mended = {};
   bool operator==(const Annotation&) const = default;
 };
 

@@ -216,10 +216,12 @@ void turn_clockwise(std::vector<Ring>& loops) {
 
 }  // namespace
 
-Outline outline_of_parts(const std::vector<std::vector<Point>>& parts) {
+Outline outline_of_parts(const std::vector<std::vector<Point>>& parts, std::size_t* without_area) {
   Outline outline;
+  if (without_area) *without_area = 0;
   for (const Ring& part : parts) {
     std::vector<Ring> loops = loops_of(part);
+    if (without_area) *without_area += loops.empty();
     turn_clockwise(loops);
     std::ranges::move(loops, std::back_inserter(outline.rings));
   }

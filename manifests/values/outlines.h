@@ -35,8 +35,10 @@ bool has_area(const std::vector<Point>& ring);
 /// way they run. A ring that comes back to a corner is several: where a line joins parts or leads
 /// to a hole, be it there and back or from each part to the next one, the line is no part of the
 /// outline. A ring that lies in no other one of its part is turned to run clockwise, and those in
-/// it with it. Rings without area are left out.
-Outline outline_of_parts(const std::vector<std::vector<Point>>& parts);
+/// it with it. Rings without area are left out; `without_area`, if given, is how many parts lose
+/// all of theirs.
+Outline outline_of_parts(const std::vector<std::vector<Point>>& parts,
+                         std::size_t* without_area = nullptr);
 
 /// Outlines of an image that have more corners are noise, and take more memory than it is worth.
 inline constexpr std::size_t kMostCorners = 1'000'000;

@@ -185,22 +185,66 @@ double shared_area(const Rectangle& a, const Rectangle& b) {
                   std::min(a.bottom, b.bottom)});
 }
 
+/// Somebody who waits before a bus is narrow beside it and reaches down to its wheels; riders and
+/// bags are wider, and passengers end higher up.
+bool stands_before(const Rectangle& box, const Rectangle& other) {
+  constexpr double kNarrow = 0.3, kFoot = 0.85;
+  return box.right - box.left < kNarrow * (other.right - other.left) &&
+         box.bottom > other.top + kFoot * (other.bottom - other.top);
+}
+
+bool covers(const Outline& outline, Point at) {
+  int winding = 0;
+  for (const auto& ring : outline.rings) {
+    for (std::size_t i = 0; i < ring.size(); ++i) {
+      const Point& a = ring[i];
+      const Point& b = ring[i + 1 == ring.size() ? 0 : i + 1];
+      if ((a.y > at.y) == (b.y > at.y)) continue;
+      if (a.x + (at.y - a.y) / (b.y - a.y) * (b.x - a.x) > at.x) winding += a.y > b.y ? 1 : -1;
+    }
+  }
+  return winding != 0;
+}
+
+/// Whether half of what the other covers is the outline's, too, by a grid of places. So it is of
+/// two that were cut out of one another's boxes: one would hide the other as soon as they part.
+bool covers_half(const Outline& outline, const Outline& other) {
+  constexpr int kSteps = 24;
+  const Rectangle around = bounds(other);
+  int all = 0, both = 0;
+  for (int y = 0; y < kSteps; ++y) {
+    for (int x = 0; x < kSteps; ++x) {
+      const Point at{around.left + (x + 0.5) / kSteps * (around.right - around.left),
+                     around.top + (y + 0.5) / kSteps * (around.bottom - around.top)};
+      if (!covers(other, at)) continue;
+      ++all;
+      both += covers(outline, at);
+    }
+  }
+  return all > 0 && 2 * both >= all;
+}
+
 }  // namespace
 
 std::vector<std::size_t> carriers(const std::vector<Box>& boxes) {
   constexpr double kOfAnotherClass = 0.5, kOfTheSame = 0.9;  // share of the smaller one's box
   std::vector<std::size_t> carrier(boxes.size());
   for (std::size_t k = 0; k < boxes.size(); ++k) {
+    const Box& box = boxes[k];
     carrier[k] = k;
     double most = 0;
-    const double area = area_of(boxes[k].xyxy);
-    for (std::size_t j = 0; j < boxes.size() && moves_alone(boxes[k]); ++j) {
+    const double area = area_of(box.xyxy);
+    for (std::size_t j = 0; j < boxes.size() && moves_alone(box); ++j) {
       const Box& other = boxes[j];
       if (!moves_alone(other) || !(area_of(other.xyxy) > area)) continue;
-      const double share = shared_area(boxes[k].xyxy, other.xyxy) / area;
-      const bool is_same = other.class_id == boxes[k].class_id;
+      const double share = shared_area(box.xyxy, other.xyxy) / area;
       // Of a box without area the share is no number.
+      const bool is_same = other.class_id == box.class_id;
       if (!(share > most) || !(share >= (is_same ? kOfTheSame : kOfAnotherClass))) continue;
+      if (is_same ? !covers_half(other.outline, box.outline)
+                  : stands_before(box.xyxy, other.xyxy)) {
+        continue;
+      }
       most = share;
       carrier[k] = j;
     }
@@ -318,7 +362,9 @@ ImageMotion fitting(ImageMotion step, const Rectangle& box) {
 }  // namespace
 
 std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& still,
-                                  const std::vector<Box>& boxes, ImageSize image, int frames) {
+                                  const std::vector<Box>& boxes,
+                                  const std::vector<std::size_t>& carrier, ImageSize image,
+                                  int frames) {
   const double side = std::min(image.height, image.width);
   const PathLimits of_image{0.07 * side, 2, 0.02}, of_object{0.3 * side, 10, 0.15};
   const bool any_moves = spec.objects && std::ranges::any_of(boxes, moves_alone);
@@ -329,7 +375,6 @@ std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& s
                  of_image);
   }
   std::vector<std::optional<Path>> paths(boxes.size());
-  const std::vector<std::size_t> carrier = carriers(boxes);
   StillPose pose{{}, std::vector<std::optional<ImageMotion>>(any_moves ? boxes.size() : 0)};
   for (std::size_t k = 0; k < pose.objects.size(); ++k) {
     if (!moves_alone(boxes[k])) continue;

@@ -58,20 +58,25 @@ AffineMap object_in_clip(ImageSize image, const StillPose& pose, const ImageMoti
 /// The pose at u of the time from one frame to the next.
 StillPose pose_between(const StillPose& from, const StillPose& to, double u);
 
-/// The poses of a still's clip, `frames` + 1 of them; the first is the still itself. Speeds are
-/// drawn as the motions of single pairs are; directions change slowly, and now and then a thing
-/// pauses. The image stays where clip_window sees nothing beyond it. An object moves by a quarter
-/// of its size a frame at most (the root of its box's area), and as its carrier does. Pure.
-std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& still,
-                                  const std::vector<Box>& boxes, ImageSize image, int frames);
-
 /// Whether the object of a box can move on its own: it has an outline, and is not to be ignored.
 bool moves_alone(const Box& box);
 
 /// With which object of a clip each one moves: with a larger one, in whose box at least half of its
-/// own lies, as a rider with his horse and a bag with who carries it, or nearly all of it if they
-/// are of one class; else with itself. Of those that move with others the last one. Pure.
+/// own lies, as a rider with his horse and a bag with who carries it, unless it stands before that
+/// one (narrow beside it, and down to its foot); with one of its own class only if nearly all of
+/// its box lies in that one's and half of its outline is that one's, too, since people in a crowd
+/// walk apart; else with itself. Of those that move with others the last one. Pure.
 std::vector<std::size_t> carriers(const std::vector<Box>& boxes);
+
+/// The poses of a still's clip, `frames` + 1 of them; the first is the still itself. Speeds are
+/// drawn as the motions of single pairs are; directions change slowly, and now and then a thing
+/// pauses. The image stays where clip_window sees nothing beyond it. An object moves by a quarter
+/// of its size a frame at most (the root of its box's area), and as its carrier does, one of
+/// `carriers`. Pure.
+std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& still,
+                                  const std::vector<Box>& boxes,
+                                  const std::vector<std::size_t>& carriers, ImageSize image,
+                                  int frames);
 
 /// The image's motion of a still's pair; none at all (the identity) of as many as `spec` lets rest.
 /// The seed draws each number on its own, so that the limits of one do not change the others.

@@ -238,7 +238,7 @@ class RetrySink final : public SampleSink {
     const int slot = record_->quarantined.at(static_cast<std::size_t>(message.slot)).slot;
     rewrite_->redo(slot, message);
     if (!message.failed()) {
-      left_out_.add(message.sample.annotation.left_out);
+      losses_.add(message.sample.annotation);
       outlines_ += message.outlines;
       return;
     }
@@ -257,7 +257,7 @@ class RetrySink final : public SampleSink {
     report_.quarantined -= mended;
     report_.failed.insert(report_.failed.end(), failed_.begin(), failed_.end());
     failed_.clear();
-    report_.notes = left_out_.notes();
+    report_.notes = losses_.notes();
     if (outlines_ != OutlineCounts()) report_.notes.push_back(note_of(outlines_));
     return true;
   }
@@ -277,7 +277,7 @@ class RetrySink final : public SampleSink {
   const CommitRecord* record_ = nullptr;                   // of the shard under way
   std::unique_ptr<ShardRewrite> rewrite_;                  // of the shard under way
   std::vector<QuarantinedSlot> failed_;                    // of the shard under way
-  BoxesLeftOut left_out_;
+  LabelLosses losses_;
   OutlineCounts outlines_;
   RetryReport& report_;
   TraceRecorder* trace_;

@@ -90,19 +90,31 @@ void add_write_seconds(std::int64_t start_ns, CommitRecord& record) {
 
 }  // namespace
 
-void BoxesLeftOut::add(const std::vector<std::string>& reasons) {
+void LabelLosses::add(const Annotation& annotation) {
   constexpr std::size_t kListed = 3;
-  for (const std::string& reason : reasons) {
-    ++count_;
-    if (listed_.size() < kListed) listed_.push_back(reason);
-  }
+  const auto count = [](const std::vector<std::string>& found, Reasons& reasons) {
+    for (const std::string& reason : found) {
+      ++reasons.count;
+      if (reasons.listed.size() < kListed) reasons.listed.push_back(reason);
+    }
+  };
+  count(annotation.left_out, boxes_);
+  count(annotation.outlines_mended, outlines_);
 }
 
-std::vector<std::string> BoxesLeftOut::notes() const {
-  if (count_ == 0) return {};
-  const char* const more = count_ > std::ssize(listed_) ? "; ..." : "";
-  return {count_text(count_, "box", " of labels left out: ") +
-          joined(listed_, "; ", std::identity()) + more};
+std::vector<std::string> LabelLosses::notes() const {
+  std::vector<std::string> notes;
+  const auto tell = [&](const Reasons& reasons, const char* what, const char* lost) {
+    if (reasons.count == 0) return;
+    const char* const more = reasons.count > std::ssize(reasons.listed) ? "; ..." : "";
+    notes.push_back(count_text(reasons.count, what, lost) +
+                    joined(reasons.listed, "; ", std::identity()) + more);
+  };
+  tell(boxes_, "box", " of labels left out: ");
+  tell(outlines_, "outline",
+       outlines_.count == 1 ? " of labels taken without some of its parts: "
+                            : " of labels taken without some of their parts: ");
+  return notes;
 }
 
 std::string note_of(const OutlineCounts& outlines) {
@@ -145,7 +157,7 @@ void ShardSink::add(const SampleMessage& message) {
     ++record_.valid;
     record_.outlines += message.outlines;
   }
-  left_out_.add(message.sample.annotation.left_out);
+  losses_.add(message.sample.annotation);
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     record_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }

@@ -16,16 +16,20 @@
 
 namespace eventgan {
 
-/// Counts the boxes that labels lost (Annotation::left_out), for people.
-class BoxesLeftOut {
+/// Counts what labels lost (Annotation::left_out, outlines_mended), for people.
+class LabelLosses {
  public:
-  void add(const std::vector<std::string>& reasons);
-  /// One that tells how many, and of the first of them why; none of none.
+  void add(const Annotation& annotation);
+  /// One on boxes and one on outlines that tells how many, and of the first of them why; none of
+  /// none.
   std::vector<std::string> notes() const;
 
  private:
-  std::int64_t count_ = 0;
-  std::vector<std::string> listed_;
+  struct Reasons {
+    std::int64_t count = 0;
+    std::vector<std::string> listed;
+  };
+  Reasons boxes_, outlines_;
 };
 
 /// For people.
@@ -49,8 +53,8 @@ class ShardSink final : public SampleSink {
   bool closed() const override;
 
   const std::vector<CommittedShard>& committed() const { return committed_; }
-  /// What a person should know of the labels of all samples that were added: boxes left out.
-  std::vector<std::string> notes() const { return left_out_.notes(); }
+  /// What a person should know of the labels of all samples that were added.
+  std::vector<std::string> notes() const { return losses_.notes(); }
 
  private:
   const ConversionJob& job_;
@@ -61,7 +65,7 @@ class ShardSink final : public SampleSink {
   const PlannedShard* shard_ = nullptr;  // under way, or the last one
   std::unique_ptr<ShardWriter> writer_;  // of the shard under way
   CommitRecord record_;                  // of the shard under way
-  BoxesLeftOut left_out_;
+  LabelLosses losses_;
 };
 
 }  // namespace eventgan

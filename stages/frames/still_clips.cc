@@ -301,7 +301,7 @@ class StillClips final : public WrappedDataset {
         range_(manifest.image.range),
         decoder_(manifest.directory, kKeptVideoFrames) {
     const int last = spec_.pairs.clip_frames.value();
-    const int first = spec_.pairs.side == PairSide::kBefore ? 1 : 0;
+    const int first = first_frame();
     for (const LabelledFrame& still : dataset_->labelled_frames()) {
       stills_[still.label_key] = &still;
       for (int i = first; i < first + last; ++i) {
@@ -328,7 +328,13 @@ class StillClips final : public WrappedDataset {
     if (is_fault(*still)) return still->fault();
     const StillPose pose = poses(*scene.still, **still, scene.frame).back();
     const Frame frame((*still)->size, pose);
-    return FrameLabels(**still, frame).labels();
+    Annotation labels = FrameLabels(**still, frame).labels();
+    if (scene.frame != first_frame()) {  // what the still's labels lost is told once
+      labels.left_out.clear();
+      labels.left_out_at.clear();
+      labels.outlines_mended.clear();
+    }
+    return labels;
   }
 
   Outcome<Annotation> still_annotation(const std::string& label_key) const override {
@@ -355,6 +361,9 @@ class StillClips final : public WrappedDataset {
   }
 
  private:
+  /// The labelled one.
+  int first_frame() const { return spec_.pairs.side == PairSide::kBefore ? 1 : 0; }
+
   struct Scene {
     const LabelledFrame* still;
     int frame;
@@ -418,7 +427,8 @@ class StillClips final : public WrappedDataset {
 
   std::vector<StillPose> poses(const LabelledFrame& frame, const Still& still, int last) const {
     const PairKey key{seed_, to_string(spec_.dataset), frame.sample_id, key_};
-    return clip_poses(spec_.pairs.stills.value(), key.pair(), still.boxes, still.size, last);
+    return clip_poses(spec_.pairs.stills.value(), key.pair(), still.boxes, still.carriers,
+                      still.size, last);
   }
 
   SourceSpec spec_;

@@ -55,8 +55,9 @@ class Source:
     # the sensor has so many times the size's lines and columns; events are averaged down, as a camera's are before a
     # detector
     finer: int = 1
-    # photographs in layers: each object moves on its own, over a background that rests in half of them
+    # photographs in layers: each object moves on its own, over a background that rests in this share of them
     layers: bool = False
+    rests: float = 0.5
 
 
 # of an object, on top of the image's motion
@@ -160,6 +161,7 @@ LAYERS = {
     "EventGAN 8, layers": Source(SHIPPED[8], layers=True),
     "difference, layers": Source({"kind": "difference"}, layers=True),
     "gradient, layers": Source(of_pair=gradient, layers=True),
+    "EventGAN 16, layers, rests 0": Source(SHIPPED[16], layers=True, rests=0),
 }
 SOURCES = METHODS | SENSORS | LAYERS | {
     "EventGAN 16, finer": Source(SHIPPED[16], finer=2),
@@ -194,7 +196,7 @@ def manifest_of(args: argparse.Namespace, name: str, source: Source) -> dict[str
             motion = {"translation_px": [0, source.motion_px], "rotation_deg": 2, "scale": 0.03, "frames": 1}
             found["pairs"] = {"from": "stills", "motion": motion}
             if source.layers:
-                motion["objects"] = OBJECTS
+                motion |= {"objects": OBJECTS, "rests": source.rests}
                 found["outlines"] = str(_outlines(args, folder))
         sources.append(found)
     generator = dict(source.generator)

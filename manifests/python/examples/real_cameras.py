@@ -88,10 +88,12 @@ def drawn_sensors() -> list[Row]:
 
 
 def in_layers() -> list[Row]:
-    """Photographs in which objects move on their own, against those that move as one, and both together."""
+    """Photographs in which objects move on their own, against those that move as one, and mixtures."""
+    alone = [(each,) for name in LAYERS for each in (name.split(", layers")[0], name)]
+    layers = "EventGAN 16, layers"
+    mixed = [("EventGAN 16", layers), (layers, f"{layers}, rests 0")]
     return [Row(f"{' and '.join(sources)}, augmented, {SENSOR_STEPS} steps", sources, steps=SENSOR_STEPS)
-            for name in LAYERS for whole in [name.removesuffix(", layers")]
-            for sources in ((whole,), (name,), *([(whole, name)] if whole == "EventGAN 16" else []))]
+            for sources in dict.fromkeys([*alone, *mixed])]
 
 
 def ablations() -> list[Row]:

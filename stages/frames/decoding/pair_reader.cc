@@ -84,6 +84,7 @@ PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_und
       tells_between_(tells_between),
       images_(std::make_unique<SharedResults<SharedFrame>>(2 * pairs_under_way + kLongestGap +
                                                            kMargin)),
+      last_still_(std::make_unique<SharedResults<SharedImage>>(1)),
       files_(std::make_unique<FilesAhead>()),
       stills_(base_, pairs_under_way + kMargin),
       videos_(std::make_unique<OpenVideos<SharedFrame>>(
@@ -122,33 +123,43 @@ Outcome<std::array<SharedFrame, 2>> PairReader::frames(const FramePair& pair,
   return both;
 }
 
+Outcome<SharedImage> PairReader::still_image(const FramePair& pair, ImageOrientation orientation,
+                                             std::int64_t stride) const {
+  const FrameRef& still = pair.next;
+  if (still.video_frame >= 0) {
+    Outcome<ColourFrame> decoded = stills_.decode(still, stride);
+    if (is_fault(decoded)) return decoded.fault();
+    return std::make_shared<const ColourFrame>(*std::move(decoded));
+  }
+  const auto decode = [&] {
+    return std::make_shared<const ColourFrame>(
+        decode_image(files_->take(base_ / still.path), orientation, spec_.range));
+  };
+  return pair.poses.empty() ? decode() : last_still_->get(name_of(still, orientation), decode);
+}
+
 Outcome<PreparedPair> PairReader::still(const FramePair& planned, ImageOrientation orientation,
                                         std::int64_t stride, const std::vector<Box>& boxes,
                                         const Settle& settle) const {
   try {
-    const FrameRef& next = planned.next;
-    const bool is_image = next.video_frame < 0;
-    Outcome<ColourFrame> decoded =
-        is_image ? decode_image(files_->take(base_ / next.path), orientation, spec_.range)
-                 : stills_.decode(next, stride);
+    Outcome<SharedImage> decoded = still_image(planned, orientation, stride);
     if (is_fault(decoded)) return decoded.fault();
-    ColourFrame& image = *decoded;
-    FramePair pair = settle ? settle(planned, image.size) : planned;
-    const ColourView view{image.size, image.bgr.data()};
+    const SharedImage image = *std::move(decoded);
+    FramePair pair = settle ? settle(planned, image->size) : planned;
+    const ColourView view{image->size, image->bgr.data()};
     std::vector<Box> outlined = boxes;
     OutlineCounts outlines;
     if (!pair.objects.empty()) outlines = cut_out_missing(view, outlined);
     FramesBetween between;
     std::array<PreparedFrame, 2> frames;
     if (tells_between_ && pair.poses.empty()) {  // its ends are the frames
-      const ImageSize size = image.size;
-      between = frames_between(std::move(image), pair, spec_, outlined);
+      between = frames_between(image, pair, spec_, outlined);
       for (const int end : {0, 1}) {
-        frames[end] = {between.at(end).pixels, place(size, spec_, pair)};
+        frames[end] = {between.at(end).pixels, place(image->size, spec_, pair)};
       }
     } else {
       frames = prepare_still(view, pair, spec_, outlined);
-      if (tells_between_) between = frames_between(std::move(image), pair, spec_, outlined);
+      if (tells_between_) between = frames_between(image, pair, spec_, outlined);
     }
     PreparedPair prepared = prepare_pair(frames[0], frames[1]);
     prepared.outlines = outlines;
@@ -163,7 +174,9 @@ Outcome<PreparedPair> PairReader::still(const FramePair& planned, ImageOrientati
 void PairReader::expect(const FramePair& pair, ImageOrientation orientation) const {
   for (const FrameRef* frame : {&pair.previous, &pair.next}) {
     if ((pair.motion || !pair.poses.empty()) && frame == &pair.next) break;  // both are one image
-    if (frame->video_frame >= 0 || images_->has(name_of(*frame, orientation))) continue;
+    if (frame->video_frame >= 0) continue;
+    const std::string name = name_of(*frame, orientation);
+    if (pair.poses.empty() ? images_->has(name) : last_still_->has(name)) continue;
     files_->expect(base_ / frame->path);
   }
 }

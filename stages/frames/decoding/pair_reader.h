@@ -53,7 +53,8 @@ class FilesAhead {
 /// seen as it was.
 ///
 /// A still's pair (FramePair::motion) is made of its one image (prepare_still); of a video,
-/// besides, as many whole colour frames are kept as prepared ones.
+/// besides, as many whole colour frames are kept as prepared ones, and of clips' stills
+/// (FramePair::poses) the last image, so that it is decoded once for all of its clip.
 ///
 /// The two frames must have one size. Thread safety: `read` may be called from several threads;
 /// images are decoded in parallel, videos one frame after another under a lock.
@@ -90,6 +91,8 @@ class PairReader {
   Outcome<std::array<SharedFrame, 2>> frames(const FramePair& pair,
                                              ImageOrientation orientation) const;
   SharedFrame frame(const FrameRef& ref, ImageOrientation orientation) const;
+  Outcome<SharedImage> still_image(const FramePair& pair, ImageOrientation orientation,
+                                   std::int64_t stride) const;
   Outcome<PreparedPair> still(const FramePair& planned, ImageOrientation orientation,
                               std::int64_t stride, const std::vector<Box>& boxes,
                               const Settle& settle) const;
@@ -98,6 +101,7 @@ class PairReader {
   ImageSpec spec_;
   bool tells_between_;
   std::unique_ptr<SharedResults<SharedFrame>> images_;
+  std::unique_ptr<SharedResults<SharedImage>> last_still_;
   std::unique_ptr<FilesAhead> files_;
   FrameDecoder stills_;
   std::unique_ptr<OpenVideos<SharedFrame>> videos_;

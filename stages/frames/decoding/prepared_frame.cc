@@ -268,19 +268,19 @@ namespace {
 
 /// `Moving`: MovingStill or ClipFrames. The image lives as long as what tells its frames.
 template <class Moving>
-FramesBetween between_of(ColourFrame image, const FramePair& pair, const ImageSpec& spec,
+FramesBetween between_of(const SharedImage& image, const FramePair& pair, const ImageSpec& spec,
                          const std::vector<Box>& boxes, const Placement& placement) {
   struct Kept {
-    ColourFrame image;
+    SharedImage image;
     Resizable still;
     Moving moving;
-    Kept(ColourFrame frame, const FramePair& pair, const ImageSpec& spec,
+    Kept(SharedImage frame, const FramePair& pair, const ImageSpec& spec,
          const std::vector<Box>& boxes)
         : image(std::move(frame)),
-          still(grey_if_first({image.size, image.bgr.data()}, spec)),
+          still(grey_if_first({image->size, image->bgr.data()}, spec)),
           moving(still, pair, boxes) {}
   };
-  const auto kept = std::make_shared<const Kept>(std::move(image), pair, spec, boxes);
+  const auto kept = std::make_shared<const Kept>(image, pair, spec, boxes);
   return {[kept, spec, placement](double u) {
             return unless_refused([&] {
               PreparedFrame frame =
@@ -293,15 +293,15 @@ FramesBetween between_of(ColourFrame image, const FramePair& pair, const ImageSp
 
 }  // namespace
 
-FramesBetween frames_between(ColourFrame image, const FramePair& pair, const ImageSpec& spec,
+FramesBetween frames_between(const SharedImage& image, const FramePair& pair, const ImageSpec& spec,
                              const std::vector<Box>& boxes) {
   return unless_refused([&] {
     if (!pair.poses.empty()) {
-      const Placement placement = place(clip_window(image.size).size, spec);
-      return between_of<ClipFrames>(std::move(image), pair, spec, boxes, placement);
+      const Placement placement = place(clip_window(image->size).size, spec);
+      return between_of<ClipFrames>(image, pair, spec, boxes, placement);
     }
-    const Placement placement = place(image.size, spec, pair);
-    return between_of<MovingStill>(std::move(image), pair, spec, boxes, placement);
+    const Placement placement = place(image->size, spec, pair);
+    return between_of<MovingStill>(image, pair, spec, boxes, placement);
   });
 }
 

@@ -40,6 +40,9 @@ struct PreparedFrame {
 /// A frame that several pairs may hold, or why there is none, without the file's name.
 using SharedFrame = std::shared_ptr<const Outcome<PreparedFrame>>;
 
+/// An image that several pairs are made of.
+using SharedImage = std::shared_ptr<const ColourFrame>;
+
 /// Two frames, ready for the generator.
 struct PreparedPair {
   /// [frame, y, x] float32, C order; frame 0 = previous, 1 = next; x = (u/255 - 0.5) * 2 in [-1,
@@ -99,7 +102,7 @@ ColourFrame move_still(const ColourFrame& image, const FramePair& pair,
 /// What prepare_still makes the two ends of: at label_position it is that image, at the other end
 /// the moved one, and between them image and objects move steadily
 /// (manifests/values/still_motion.h). Throws as prepare_still.
-FramesBetween frames_between(ColourFrame image, const FramePair& pair, const ImageSpec& spec,
+FramesBetween frames_between(const SharedImage& image, const FramePair& pair, const ImageSpec& spec,
                              const std::vector<Box>& boxes);
 
 /// The generator's input of 8-bit grey: x = (u/255 - 0.5) * 2 in [-1, 1], in single precision.

@@ -125,14 +125,22 @@ Outline read_run_lengths(StrictObject object, ImageSize image) {
   return {};
 }
 
+struct Segmentation {
+  Outline outline = {};
+  std::size_t parts = 0;         ///< polygons
+  std::size_t without_area = 0;  ///< of these
+};
+
 /// None of a box without `segmentation`, or with an empty one.
-Outline read_segmentation(StrictObject& object, ImageSize image) {
+Segmentation read_segmentation(StrictObject& object, ImageSize image) {
   const auto segmentation = find_given(object, "segmentation");
   if (!segmentation) return {};
-  if (!segmentation->is_array()) return read_run_lengths(segmentation->object(), image);
+  if (!segmentation->is_array()) return {read_run_lengths(segmentation->object(), image)};
   std::vector<std::vector<Point>> parts;
   for (const StrictValue& part : segmentation->elements()) parts.push_back(read_polygon(part));
-  return outline_of_parts(parts);
+  Segmentation read{.parts = parts.size()};
+  read.outline = outline_of_parts(parts, &read.without_area);
+  return read;
 }
 
 /// COCO has 0 or 1; many tools write false or true.
@@ -213,7 +221,8 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
       has_names = !known->keypoints.empty();
     }
   }
-  box.outline = read_segmentation(object, image);
+  Segmentation segmentation = read_segmentation(object, image);
+  box.outline = std::move(segmentation.outline);
   auto sides = find_given(object, "bbox");
   const bool is_told = sides && !(sides->is_array() && sides->elements().empty());
   if (!is_told && !box.outline.empty()) sides.reset();
@@ -225,6 +234,7 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
   const bool is_person = read_keypoints(object, schema.joint_names.size(), has_names, person);
   entry.check();
   if (!add_box(box, image, entry.place(), annotation)) return;
+  note_parts_left_out(segmentation.without_area, segmentation.parts, entry.place(), annotation);
   if (is_person) {
     person.box = box.xyxy;
     annotation.persons.push_back(std::move(person));

@@ -60,6 +60,14 @@ bool add_box(const Box& box, ImageSize image, const std::string& place, Annotati
   return false;
 }
 
+void note_parts_left_out(std::size_t count, std::size_t of_parts, const std::string& place,
+                         Annotation& annotation) {
+  if (count == 0) return;
+  annotation.outlines_mended.push_back(
+      fmt::format("expected parts of an outline that have an area, got {} of {} without, in {}",
+                  count, of_parts, place));
+}
+
 bool overlaps(const Rectangle& box, ImageSize image) {
   return std::min(box.right, static_cast<double>(image.width)) > std::max(box.left, 0.0) &&
          std::min(box.bottom, static_cast<double>(image.height)) > std::max(box.top, 0.0);

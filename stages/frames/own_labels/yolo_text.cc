@@ -177,17 +177,20 @@ class YoloLine {
                      in_quotes(columns_[0]));
     }
     box.class_id = static_cast<int>(*number);
+    std::size_t without_area = 0;
     if (is_outline) {
       std::vector<Point> corners;
       for (std::size_t i = 1; i < columns_.size(); i += 2) {
         corners.push_back({share(i) * image_.width, share(i + 1) * image_.height});
       }
       box.xyxy = bounds(Outline{{corners}});
-      box.outline = outline_of_parts({corners});
+      box.outline = outline_of_parts({corners}, &without_area);
     } else {
       box.xyxy = centred();
     }
-    if (!add_box(box, image_, place, annotation) || joints == 0) return;
+    if (!add_box(box, image_, place, annotation)) return;
+    note_parts_left_out(without_area, 1, place, annotation);
+    if (joints == 0) return;
     Person person;
     person.box = box.xyxy;
     bool any = false;

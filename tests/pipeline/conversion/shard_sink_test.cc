@@ -204,6 +204,25 @@ class ShardSinkTest : public ::testing::Test {
   std::optional<ShardSink> sink_;
 };
 
+TEST(LabelLosses, AreCountedByKindAndTheFirstNamed) {
+  LabelLosses losses;
+  losses.add({});
+  EXPECT_TRUE(losses.notes().empty());
+  Annotation annotation;
+  annotation.outlines_mended = {"no area, in a.json (annotation 4)"};
+  losses.add(annotation);
+  EXPECT_THAT(losses.notes(), ::testing::ElementsAre(
+                                  "1 outline of labels taken without some of its parts: no area, "
+                                  "in a.json (annotation 4)"));
+  annotation.left_out = {"b", "c"};
+  annotation.outlines_mended = {"d", "e", "f"};
+  losses.add(annotation);
+  EXPECT_THAT(losses.notes(),
+              ::testing::ElementsAre("2 boxes of labels left out: b; c",
+                                     "4 outlines of labels taken without some of their parts: no "
+                                     "area, in a.json (annotation 4); d; e; ..."));
+}
+
 TEST_F(ShardSinkTest, CommitsEachShardWithItsCommitRecord) {
   const PlannedShard &a = frozen_.plan.shards[0], &b = frozen_.plan.shards[1];
   open_sink();

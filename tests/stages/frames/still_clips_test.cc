@@ -345,6 +345,24 @@ TEST_F(StillClipsTest, ARiderIsAsVisibleOnHisHorseAsInTheStill) {
   }
 }
 
+TEST_F(StillClipsTest, WhatLabelsLostIsToldOnceAClip) {
+  still_.left_out = {"a box outside"};
+  still_.left_out_at = {1};
+  still_.outlines_mended = {"a part without an area"};
+  for (const PairSide side : {PairSide::kBefore, PairSide::kAfter}) {
+    pairs().side = side;
+    const Dataset& dataset = open();
+    const auto& all = dataset.labelled_frames();
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const Annotation labels = *dataset.annotation(all[i].label_key);
+      const bool is_first = i == 0 || i == 25;  // of 25 frames each
+      EXPECT_EQ(labels.left_out.size(), is_first) << i;
+      EXPECT_EQ(labels.outlines_mended.size(), is_first) << i;
+      EXPECT_EQ(labels.original, "text");
+    }
+  }
+}
+
 TEST_F(StillClipsTest, ThereIsNothingToBeMadeOfOtherSources) {
   pairs().clip_frames.reset();
   const Dataset& dataset = open();

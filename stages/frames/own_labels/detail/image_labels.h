@@ -91,6 +91,10 @@ class ReadLabels : public OwnLabels {
 /// `place` is where the box stands, for the reason.
 bool add_box(const Box& box, ImageSize image, const std::string& place, Annotation& annotation);
 
+/// Tells that parts of the outline of the box that was added last are left out, if any are.
+void note_parts_left_out(std::size_t count, std::size_t of_parts, const std::string& place,
+                         Annotation& annotation);
+
 /// Whether some of the box is within the image.
 bool overlaps(const Rectangle& box, ImageSize image);
 

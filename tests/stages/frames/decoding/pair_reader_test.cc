@@ -243,6 +243,32 @@ TEST(PairReader, FramesOfAVideoAndOfAFolderPair) {
             "expected a frame at position 20, got a video whose frames end after 20, in clip.avi");
 }
 
+TEST(PairReader, AStillIsDecodedOnceForAllOfItsClip) {
+  const TemporaryFolder folder;
+  for (const auto& [name, grey] : {std::pair{"a.png", 77}, {"b.png", 99}}) {
+    cv::imwrite((folder / name).string(), cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(grey)));
+  }
+  for (const bool tells_between : {false, true}) {
+    SCOPED_TRACE(tells_between);
+    const PairReader reader(folder.path(), {}, 16, tells_between);
+    const auto clip = [&](const std::string& name) {
+      FramePair pair = pair_of(name, name);
+      pair.poses = {StillPose(), {{.x_px = 1.5}}};
+      reader.expect(pair);
+      return reader.read(pair);
+    };
+    const auto first = clip("a.png");
+    std::filesystem::rename(folder / "a.png", folder / "away.png");
+    const auto second = clip("a.png");
+    ASSERT_FALSE(is_fault(second)) << second.fault().reason;
+    EXPECT_EQ(second->input, first->input);
+    EXPECT_EQ(level(second->input.front()), 77);
+    EXPECT_EQ(level(clip("b.png")->input.front()), 99);
+    EXPECT_TRUE(is_fault(clip("a.png"))) << "the last one alone is kept";
+    std::filesystem::rename(folder / "away.png", folder / "a.png");
+  }
+}
+
 template <class T>
 std::vector<T> read_dataset(hid_t file, const std::string& name, hid_t type, std::size_t count) {
   std::vector<T> values(count);

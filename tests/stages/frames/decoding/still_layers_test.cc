@@ -76,6 +76,8 @@ class StillObjects : public ::testing::Test {
 
   ColourFrame moved() const { return move_still(image_, pair_, boxes_); }
 
+  SharedImage shared() const { return std::make_shared<const ColourFrame>(image_); }
+
   /// Calls each(x, y) for every pixel of the image.
   template <class Each>
   void for_each_pixel(const Each& each) const {
@@ -281,7 +283,7 @@ TEST_F(StillObjects, BetweenTheFramesEverythingMovesSteadily) {
   for (const double position : {0.0, 1.0}) {
     SCOPED_TRACE(position);
     pair_.label_position = position;
-    const FramesBetween between = frames_between(image_, pair_, {}, boxes_);
+    const FramesBetween between = frames_between(shared(), pair_, {}, boxes_);
     const auto ends = prepare_still({image_.size, image_.bgr.data()}, pair_, {}, boxes_);
     EXPECT_EQ(between.at(0).pixels, ends[0].grey);
     EXPECT_EQ(between.at(1).pixels, ends[1].grey);
@@ -303,7 +305,7 @@ TEST_F(StillObjects, BetweenTheFramesEverythingMovesSteadily) {
   ImageSpec spec;
   spec.size = ImageSize{30, 40};
   pair_.motion = ImageMotion{.x_px = 2, .scale = 1.1};
-  const FramesBetween between = frames_between(image_, pair_, spec, boxes_);
+  const FramesBetween between = frames_between(shared(), pair_, spec, boxes_);
   EXPECT_EQ(between.at(0.3).size, (ImageSize{30, 40}));
 }
 
@@ -313,8 +315,8 @@ TEST_F(StillObjects, NoPointOfAnOutlineBeyondItsBoxMovesFarther) {
   pair_.objects[0] = ImageMotion{.angle_deg = 3};
   // About the box's middle, in pixel centres (34.5, 24.5); the farthest corner is at (79.5, 29.5).
   const double chord = 2 * std::sin(1.5 * std::numbers::pi / 180);
-  EXPECT_NEAR(frames_between(image_, pair_, {}, boxes_).displacement_px, chord * std::hypot(45, 5),
-              1e-9);
+  EXPECT_NEAR(frames_between(shared(), pair_, {}, boxes_).displacement_px,
+              chord * std::hypot(45, 5), 1e-9);
 }
 
 TEST_F(StillObjects, WhatDoesNotMoveOnItsOwnIsAPartOfTheImage) {

@@ -153,6 +153,25 @@ TEST_F(CocoOutlines, WithoutAreaThereIsNone) {
   EXPECT_THAT(outline("[[1, 1, 3, 3], [0, 0, 1, 0, 1, 1]]").rings, SizeIs(1));
 }
 
+TEST_F(CocoOutlines, PartsThatAreLeftOutAreTold) {
+  const auto told = [&](const std::string& segmentation) {
+    return read(R"("bbox": [0, 0, 5, 4], "segmentation": )" + segmentation)->outlines_mended;
+  };
+  // A line there and back has no area either; a ring that is closed, or in two parts, has.
+  EXPECT_THAT(told("[[1, 1, 3, 3], [0, 0, 1, 0, 1, 1], [], [0, 0, 2, 0, 2, 2, 2, 0, 0, 0]]"),
+              ElementsAre("expected parts of an outline that have an area, got 3 of 4 without, in "
+                          "instances.json (annotation 17)"));
+  for (const char* sound : {"null", "[]", "[[0, 0, 1, 0, 1, 1, 0, 0]]",
+                            "[[0, 0, 1, 0, 1, 1, 0, 0, 2, 2, 3, 2, 3, 3, 2, 2, 0, 0]]",
+                            R"({"size": [4, 5], "counts": [20]})"}) {
+    EXPECT_THAT(told(sound), IsEmpty()) << sound;
+  }
+  // Nothing is told of a box that is left out itself.
+  const auto outside = read(R"("bbox": [50, 0, 5, 4], "segmentation": [[1, 1, 3, 3]])");
+  EXPECT_THAT(outside->outlines_mended, IsEmpty());
+  EXPECT_THAT(outside->left_out, SizeIs(1));
+}
+
 TEST_F(CocoOutlines, ABadOneIsAFaultOfTheImage) {
   EXPECT_EQ(fault("[[1, 2, 3]]"),
             "instances.json (annotation 17): $.segmentation[0]: expected x and y of each corner, "
@@ -197,6 +216,15 @@ TEST(YoloOutlines, AreSharesOfTheImage) {
   EXPECT_THAT(
       read.boxes[2].outline.rings,
       ElementsAre(ElementsAre(Point{0, 0}, Point{1.005 * 40, 0}, Point{40, 30}, Point{0, 30})));
+}
+
+TEST(YoloOutlines, OneWithoutAreaIsABoxAndTold) {
+  const Annotation read = read_segments("0 0 0 0.5 0.5 0.25 0.25\n1 0.5 0.5 0.7 0.5 0.7 0.7");
+  ASSERT_THAT(read.boxes, SizeIs(2));
+  EXPECT_TRUE(read.boxes[0].outline.empty());
+  EXPECT_THAT(read.outlines_mended,
+              ElementsAre("expected parts of an outline that have an area, got 1 of 1 without, in "
+                          "a.txt:1"));
 }
 
 TEST(YoloOutlines, PartsAreJoinedByABridge) {
