@@ -91,7 +91,7 @@ def in_layers() -> list[Row]:
     """Photographs in which objects move on their own, against those that move as one, and mixtures."""
     alone = [(each,) for name in LAYERS for each in (name.split(", layers")[0], name)]
     layers = "EventGAN 16, layers"
-    mixed = [("EventGAN 16", layers), (layers, f"{layers}, rests 0")]
+    mixed = [("EventGAN 16", layers), (layers, f"{layers}, rests 0"), ("EventGAN 16", f"{layers}, rests 0")]
     return [Row(f"{' and '.join(sources)}, augmented, {SENSOR_STEPS} steps", sources, steps=SENSOR_STEPS)
             for sources in dict.fromkeys([*alone, *mixed])]
 
