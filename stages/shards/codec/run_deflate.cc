@@ -19,7 +19,7 @@ namespace eventgan {
 namespace {
 
 constexpr std::size_t kStep = std::size_t{1} << 18;     // bytes that are looked at together
-constexpr std::size_t kEnough = std::size_t{1} << 15;   // literals for codes of their own
+constexpr std::size_t kEnough = std::size_t{1} << 16;   // literals for codes of their own
 constexpr std::size_t kLargest = std::size_t{1} << 24;  // block: a literal's place has 24 bits
 constexpr std::size_t kHeader = 512;                    // more than a block's codes and end take
 constexpr std::size_t kStored = 65535;                  // the most that a stored block holds
