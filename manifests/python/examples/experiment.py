@@ -7,6 +7,8 @@ simulated camera.
     experiment.py trade --program build/release/eventgan --trainer ../shared/trainers/yolov3 --out cars
     experiment.py real --program build/release/eventgan --frames labelled_frames --real real_labels --peers peers --out
     persons
+    experiment.py real --task cars --program build/release/eventgan --frames labelled_frames --real real_labels --out
+    persons
 
 detection: the demo's streets are converted by the network, by log differences and by ESIM; YOLOv3-tiny is trained on
 each, and on the grey frames. The detectors of the three kinds of events are tested on the "camera's" events of other
@@ -14,8 +16,9 @@ streets, as they are and made as bright as the training volumes, that of the fra
 pose: pose_resnet is trained on the demo's figures as the network converts them, and is tested on the "camera's" events
 of others: as they are, without those that stand alone, and after its last layer was trained on the camera's for 1 and
 for 5 epochs; and one that was trained on the camera's alone. trade: as detection, of the network's volumes in several
-widths, precisions and scopes: what their errors mean to a detector. real: detectors of persons, trained on labelled
-photographs turned into events, on those of models and on frames, are tested on real cameras' events.
+widths, precisions and scopes: what their errors mean to a detector. real: detectors of persons or cars, or
+networks for joints, trained on labelled photographs turned into events, on those of models and on frames, are tested on
+real cameras' events.
 
 The "camera" of the first three is the sensor model with noise, before which the scenes move as they do: drawn at 160
 images a second. The same command resumes where it was.
@@ -79,6 +82,8 @@ def read_args() -> argparse.Namespace:
         kind.add_argument("--small", action="store_true",
                           help="8 sequences, one seed, 2 steps: tests that it runs; the scores mean nothing")
     real = kinds.add_parser("real", parents=[shared])
+    real.add_argument("--task", choices=["persons", "cars", "joints"], default="persons",
+                      help="what is learnt (default: %(default)s); results of the others are in OUT/TASK")
     real.add_argument("--frames", required=True, type=pathlib.Path,
                       help="folder of photographs and clips with boxes.csv and frames.csv")
     real.add_argument("--real", required=True, type=pathlib.Path,

@@ -1,8 +1,7 @@
-"""Events with boxes of persons, for `experiment.py real`: photographs and clips turned into events in several ways, and
+"""Events with labels, for `experiment.py real`: photographs and clips turned into events in several ways, and
 recordings of real cameras.
 
-All of them become items of `DetectionDataset`, which are kept in OUT/items. `args` is experiment.py's: frames, real,
-peers, out.
+All of them become items of `DetectionDataset`, or items with `joints` in place of boxes, which are kept in OUT/items. `args` is experiment.py's: frames, real, peers, out; and its task, a row of real_cameras.TASKS.
 """
 
 from __future__ import annotations
@@ -32,13 +31,34 @@ from eventgan.detection_scores import overlapping
 from eventgan.outlines import mask
 from eventgan.torch import DetectionDataset
 
-STILLS, CLIPS = ("pennfudan", "coco256", "voc100"), ("sot_person", "davis_tennis")
-EVERY = 3  # labelled frame of a clip is used: its neighbours are nearly the same
 SIZE, DAVIS346 = (192, 320), (260, 346)  # of volumes and of the camera, H, W
 MOTION_PX = 8  # of stills, at most
-CLASSES = ["person"]
+PERSON = "person"  # the class of labels that name none
+# of items with joints; LSP's head is from the neck to its top, CDEHP's is its middle
+JOINTS = ["head", *(f"{side}_{name}" for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+                    for side in ("right", "left"))]
 
 Item = dict[str, Any]  # of DetectionDataset, its volume in half precision
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    """What is learnt from which frames, and on what it is tested."""
+
+    classes: tuple[str, ...]
+    stills: tuple[str, ...]
+    # of every so many labelled frames one is used: its neighbours are nearly the same
+    clips: Mapping[str, int]
+    columns: Mapping[str, str]  # scores with their titles; rows are compared by the first one
+    # the first windows of a recording: settings are chosen on these, which are in no table
+    development: Mapping[str, int]
+    network: Any = None  # real_cameras.Network
+    methods: tuple[str, ...] = ()  # of SOURCES, all with `steps`; (): persons' tables
+    steps: int = 0
+    least_px: float = 0  # boxes with a smaller side, in a volume's pixels, are neither right nor wrong in training
+    joints: bool = False  # without polarity, which their recordings do not have
+    # the first windows of a recording that rows may learn from, which are then tested on the others
+    learnt: Mapping[str, int] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -160,6 +180,7 @@ LAYERS = {
     "EventGAN 16, layers": Source(SHIPPED[16], layers=True),
     "EventGAN 8, layers": Source(SHIPPED[8], layers=True),
     "difference, layers": Source({"kind": "difference"}, layers=True),
+    "ESIM, layers": Source({"kind": "esim"}, layers=True),
     "gradient, layers": Source(of_pair=gradient, layers=True),
     "EventGAN 16, layers, rests 0": Source(SHIPPED[16], layers=True, rests=0),
 }
@@ -181,18 +202,20 @@ SOURCES = METHODS | SENSORS | LAYERS | {
 
 
 def manifest_of(args: argparse.Namespace, name: str, source: Source) -> dict[str, Any]:
-    """That converts the photographs and the clips with boxes of persons."""
+    """That converts the task's photographs and clips."""
     labels = args.out / "labels"
     labels.mkdir(parents=True, exist_ok=True)
     sources = []
-    for folder in (*STILLS, *CLIPS):
-        path = labels / f"{folder}.csv"
+    for folder in (*args.task.stills, *args.task.clips):
+        path, kind = args.frames / folder / "person_keypoints.json", "coco"
         if not path.exists():
-            _write_boxes(args.frames / folder, path, EVERY if folder in CLIPS else 1)
+            path, kind = labels / f"{folder}.csv", "csv"
+        if not path.exists():
+            _write_boxes(args.frames / folder, path, args.task.clips.get(folder, 1))
         found = {"dataset": "frames", "root": str(args.frames / folder / "images"),
-                 "labels": {"format": "csv", "path": str(path)},
+                 "labels": {"format": kind, "path": str(path)},
                  "pairs": {"gaps": [1, 2, 3], "side": "before", "choose": "one"}}
-        if folder in STILLS:
+        if folder in args.task.stills:
             motion = {"translation_px": [0, source.motion_px], "rotation_deg": 2, "scale": 0.03, "frames": 1}
             found["pairs"] = {"from": "stills", "motion": motion}
             if source.layers:
@@ -229,7 +252,9 @@ def _outlines(args: argparse.Namespace, folder: str) -> pathlib.Path:
     """A folder of index masks of the objects in the photographs: as they were annotated, or else cut out of their
     boxes."""
     masks = args.out / "outlines" / folder
-    labels = args.out / "labels" / f"{folder}.json"
+    labels = args.frames / folder / "person_keypoints.json"
+    if not labels.exists():
+        labels = args.out / "labels" / f"{folder}.json"
     if not labels.exists():
         _write_coco(args.frames / folder, labels)
     manifest = {"format": "eventgan-manifest", "version": 1, "name": folder, "seed": 7,
@@ -237,7 +262,7 @@ def _outlines(args: argparse.Namespace, folder: str) -> pathlib.Path:
                              "labels": {"format": "coco", "path": str(labels)}, "pairs": {"from": "stills"}}],
                 "generator": {"kind": "difference"}, "image": {"height": SIZE[0], "width": SIZE[1]},
                 "output": {"directory": folder}}
-    path = labels.with_suffix(".manifest.json")
+    path = args.out / "labels" / f"{folder}.manifest.json"
     path.write_text(json.dumps(manifest), encoding="utf-8")
     subprocess.run([os.environ["EVENTGAN_PROGRAM"], "outline", path, "--out", masks], check=True)
     return masks
@@ -295,7 +320,7 @@ def fitted_threshold(args: argparse.Namespace) -> float:
     of the first camera that has events, not drawings of them; their labels are not looked at."""
     path = args.out / "threshold.json"
     if not path.exists():
-        folder = next(folder for folder in recordings_in(args.real) if any(folder.glob("*.npz")))
+        folder = next(folder for folder in recordings_in(args, args.real) if any(folder.glob("*.npz")))
         wanted = np.mean([(window["volume"] > 0).any(0).float().mean().item()
                           for window in test_items(args, folder, SIZE, signed=False)])
         samples = shards_of(args, "EventGAN 16")
@@ -323,11 +348,13 @@ def items_of(args: argparse.Namespace, name: str, signed: bool = True) -> list[I
             shards = shards.changed(functools.partial(source.of_pair, args))
         elif signed and source.finer == 1:
             shards = shards.changed(train_detector.signed)
-        data = DetectionDataset(shards, CLASSES)
+        if args.task.joints:
+            return [with_joints(shards[i], shards.joint_names(i)) for i in range(len(shards))]
+        data = DetectionDataset(shards, args.task.classes)
         items = (data[i] for i in range(len(data)))
         if source.finer > 1:
             return [_smaller(item, source.size, signed_channel if signed else _normalized) for item in items]
-        return [_halved(item) for item in items]
+        return [_halved(without_small(item, args.task.least_px)) for item in items]
 
     return _kept(args, f"{file_name(name)}{'' if signed else '-volume'}", make)
 
@@ -346,62 +373,110 @@ def _halved(item: Item) -> Item:
     return {**item, "volume": item["volume"].half()}
 
 
-def recordings_in(folder: pathlib.Path) -> list[pathlib.Path]:
-    """The folders of recordings with boxes: of windows (NAME.npz and NAME.txt) or of drawn events (images/, with
-    labels/ beside it or with boxes in the boxes.csv of the folder above)."""
-    found = [each for each in (folder, *sorted(folder.iterdir())) if each.is_dir()
-             and (any(each.glob("*.npz")) and any(each.glob("*.txt")) or
-                  (each / "images").is_dir() and (each / "labels").is_dir())]
-    for path in sorted([*folder.glob("boxes.csv"), *folder.glob("*/boxes.csv")]):
-        # sets without a person are for other tasks
-        found += sorted({path.parent / image.split("/")[0] for image, boxes in _table(path).items()
-                         if image.count("/") == 2 and len(boxes)})
+def without_small(item: Item, least_px: float) -> Item:
+    """The item with boxes that have a side of less than least_px ignored."""
+    sides = item["boxes"][:, 2:] - item["boxes"][:, :2]
+    return {**item, "ignore": item["ignore"] | (sides < least_px).any(1)}
+
+
+def with_joints(sample: Mapping[str, Any], names: Sequence[str]) -> Item:
+    """Of a sample's first person: `joints` [J, 2], NaN where they are not annotated, in the order of JOINTS; its
+    volume without polarity."""
+    places, annotated = sample["persons"]["joints"][0], (sample["persons"]["joints_source"][0] != -1).any(-1)
+    points = dict(zip(names, np.where(annotated[:, None], places, np.nan)))
+    points["head"] = (points["head_top"] + points["neck"]) / 2
+    return _halved({"volume": torch.from_numpy(np.abs(sample["volume"])), "id": sample["pair"]["sample_id"],
+                    "joints": torch.from_numpy(np.stack([points[name] for name in JOINTS])).float()})
+
+
+def recordings_in(args: argparse.Namespace, folder: pathlib.Path) -> list[pathlib.Path]:
+    """The task's recordings: of joints, folders with a joints.csv; of persons, folders of windows (NAME.npz and
+    NAME.txt) or of drawn events (images/ with labels/ beside it); of these and others, folders of drawn events
+    (images/) with boxes in the boxes.csv of the folder above."""
+    folders = [each for each in (folder, *sorted(folder.iterdir())) if each.is_dir()]
+    if args.task.joints:
+        found = [each for each in folders if (each / "joints.csv").exists()]
+    else:
+        found = [each for each in folders if PERSON in args.task.classes
+                 and (any(each.glob("*.npz")) and any(each.glob("*.txt")) or
+                      (each / "images").is_dir() and (each / "labels").is_dir())]
+        for path in sorted([*folder.glob("boxes.csv"), *folder.glob("*/boxes.csv")]):
+            # sets without such an object are for other tasks
+            found += sorted({path.parent / image.split("/")[0]
+                             for image, boxes in _table(path, args.task.classes).items()
+                             if image.count("/") == 2 and len(boxes)})
     if not found:
-        raise SystemExit("expected folders with windows (NAME.npz, NAME.txt) or drawn events (images/ with labels/ or "
-                         f"a boxes.csv), got none, in {folder}")
+        raise SystemExit("expected folders with windows (NAME.npz, NAME.txt) or drawn events (images/ with labels/, "
+                         f"a boxes.csv or a joints.csv), got none for {args.task.classes[0]}, in {folder}")
     return found
 
 
 @functools.cache
-def _table(path: pathlib.Path) -> dict[str, np.ndarray]:
-    """Of a boxes.csv, by the image: the boxes of persons, f64 [N, 4] in pixels, left, top, right, bottom."""
+def _table(path: pathlib.Path, classes: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """Of a boxes.csv, by the image: the boxes of the classes, f64 [N, 4] in pixels, left, top, right, bottom."""
     boxes = collections.defaultdict(list)
     with open(path, newline="", encoding="utf-8") as file:
         for row in csv.DictReader(file):
-            boxes[row["image"]] += [[float(row[edge]) for edge in ("x1", "y1", "x2", "y2")]] * (row["class"] in CLASSES)
+            boxes[row["image"]] += [[float(row[edge]) for edge in ("x1", "y1", "x2", "y2")]] * (row["class"] in classes)
     return {image: np.array(each).reshape(-1, 4) for image, each in boxes.items()}
 
 
-def test_items(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, int],
-               signed: bool = True) -> list[Item]:
-    """The windows of a recording with boxes, brought to the size: signed channels, or volumes divided by their 98th
-    percentiles and clipped at 1; [] if it has drawings of events alone and volumes are asked for."""
+@functools.cache
+def _joints(path: pathlib.Path) -> dict[str, np.ndarray]:
+    """Of a joints.csv, by the image: joints [J, 2] in the order of JOINTS, NaN where it calls them uncertain. Which
+    side is left is not sure."""
+    found = {}
+    with open(path, newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            names = [name.replace("right", "red").replace("left", "green").replace("wrist", "hand")
+                     .replace("ankle", "foot") for name in JOINTS]
+            found[row["image"]] = np.array([[math.nan if name in row["uncertain"] else float(row[f"{name}_{axis}"])
+                                             for axis in "xy"] for name in names])
+    return found
+
+
+def test_items(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, int], signed: bool = True,
+               shown: str = "images") -> list[Item]:
+    """The windows of a recording, brought to the size: signed channels, or volumes divided by their 98th percentiles
+    and clipped at 1; [] if it has drawings of events alone and volumes are asked for. `shown` "frames": its grey
+    frames; [] if it has none."""
     def make() -> list[Item]:
         if (folder / "images").is_dir():
-            return [_drawn(path, size) for path in sorted((folder / "images").iterdir())] if signed else []
-        windows = DetectionDataset(windows_of(args, folder, DAVIS346, "none"), CLASSES)
+            paths = sorted((folder / shown).iterdir()) if signed and (folder / shown).is_dir() else []
+            return [_drawn(args, path, size) for path in paths]
+        if shown == "frames":
+            return []
+        windows = DetectionDataset(windows_of(args, folder, DAVIS346, "none"), [PERSON])
         return [_smaller(windows[i], size, signed_channel if signed else _normalized) for i in range(len(windows))]
 
-    return _kept(args, f"{key_of(folder)}-{size[0]}x{size[1]}{'' if signed else '-volume'}", make)
+    return _kept(args, f"{key_of(folder)}-{size[0]}x{size[1]}{'' if signed else '-volume'}"
+                 f"{'-frames' * (shown == 'frames')}", make)
 
 
-def _drawn(path: pathlib.Path, size: tuple[int, int]) -> Item:
-    """Of an image in which somebody has drawn positive minus negative events in grey,
-    stretched to 0..255 by its own range, or events without their polarity."""
+def _drawn(args: argparse.Namespace, path: pathlib.Path, size: tuple[int, int]) -> Item:
+    """Of an image in which somebody has drawn positive minus negative events in grey, stretched to 0..255 by its own
+    range, or events without their polarity; or of a grey frame, in a folder of that name. For joints no polarity is
+    shown; else one is drawn for each pixel of a drawing that has none."""
     image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     if image is None:
         raise ValueError(f"expected an image, got none, in {path}")
     # What is no event is known before the image is made smaller, when values are still whole.
     events = image.astype(np.float32) - np.bincount(image.ravel()).argmax()
-    if events.min() == 0 or events.max() == 0:  # no polarity: one is drawn for each pixel
-        events *= np.random.default_rng(zlib.crc32(path.stem.encode())).choice(np.float32([-1, 1]), events.shape)
     folder = path.parent.parent
+    if args.task.joints:
+        item = {"volume": torch.from_numpy(np.abs(events[None])), "id": path.stem,
+                "joints": torch.from_numpy(_joints(folder / "joints.csv")[path.name]).float()}
+        return _smaller(item, size, lambda events: signed_channel(np.concatenate([events, 0 * events])))
+    if events.min() == 0 or events.max() == 0:
+        events *= np.random.default_rng(zlib.crc32(path.stem.encode())).choice(np.float32([-1, 1]), events.shape)
     texts = folder / "labels"
     boxes = torch.from_numpy(_boxes(texts / f"{path.stem}.txt", image.shape) if texts.is_dir() else
-                             _table(folder.parent / "boxes.csv")[f"{folder.name}/images/{path.name}"]).float()
+                             _table(folder.parent / "boxes.csv", args.task.classes)[f"{folder.name}/images/{path.name}"]).float()
     item = {"volume": torch.from_numpy(events[None]), "boxes": boxes,
             "labels": torch.zeros(len(boxes), dtype=torch.int64), "ignore": torch.zeros(len(boxes), dtype=torch.bool),
             "id": path.stem}
+    if path.parent.name == "frames":
+        return _smaller({**item, "volume": torch.from_numpy(signed_channel(image))}, size, lambda grey: grey)
     return _smaller(item, size, lambda signed: signed_channel(np.concatenate([signed.clip(0), (-signed).clip(0)])))
 
 
@@ -414,9 +489,11 @@ def _smaller(item: Item, size: tuple[int, int], finish: Callable[[np.ndarray], n
     height, width = lines.stop - lines.start, columns.stop - columns.start
     volume = np.zeros((len(events), *size), np.float32)
     volume[:, shown[0], shown[1]] = [cv2.resize(each, (width, height), interpolation=cv2.INTER_AREA) for each in events]
-    scale = np.tile(np.divide((width, height), events.shape[:0:-1]), 2)
-    boxes = item["boxes"] * torch.from_numpy(scale).float() + torch.tensor([columns.start, lines.start] * 2)
-    return _halved({**item, "volume": torch.from_numpy(finish(volume)), "boxes": boxes})
+    scale = torch.from_numpy(np.divide((width, height), events.shape[:0:-1])).float()
+    start = torch.tensor([columns.start, lines.start])
+    moved = ({"joints": (item["joints"] + 0.5) * scale + start - 0.5} if "joints" in item else
+             {"boxes": item["boxes"] * scale.tile(2) + start.tile(2)})
+    return _halved({**item, **moved, "volume": torch.from_numpy(finish(volume))})
 
 
 def _normalized(volume: np.ndarray) -> np.ndarray:
@@ -437,7 +514,7 @@ def windows_of(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, 
     for path in folder.glob("*.npz"):
         end = f"{np.load(path)['t_us'][-1] * 1e-6:.6f}"  # a sample is at the time of its label, the window's end
         boxes = _boxes(path.with_suffix(".txt"), DAVIS346)
-        lines = [f"{end},{','.join(f'{edge:.3f}' for edge in box)},{CLASSES[0]}" for box in boxes] or [end]
+        lines = [f"{end},{','.join(f'{edge:.3f}' for edge in box)},{PERSON}" for box in boxes] or [end]
         (labels / f"{path.stem}.csv").write_text("\n".join(["time_s,left,top,right,bottom,class", *lines, ""]),
                                                  encoding="utf-8")
     source = {"dataset": "recording", "root": str(folder), "annotations": str(labels),

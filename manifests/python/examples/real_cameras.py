@@ -1,10 +1,11 @@
-"""`experiment.py real`: detectors of persons that learn from photographs turned into events, tested on events of real
-cameras.
+"""`experiment.py real`: networks for persons, cars or joints that learn from photographs turned into events, tested on
+events of real cameras.
 
-Photographs and clips with boxes are converted by the program, one data set for each way of making events
-(labelled_events.py). The detector of train_detector.py is trained on each, plain and with the package's augmentation of
-sensors, and tested on recordings of real cameras that it has never seen. Weights and scores of each row and seed are in
-OUT/runs; what is there is not computed again.
+Photographs and clips with labels are converted by the program, one data set for each way of making events
+(labelled_events.py). The detector of train_detector.py, or for joints the network of real_joints.py, is trained on each
+with the package's augmentation of sensors, that for persons without it too, and tested on recordings of real cameras
+that it has never seen. Weights and scores of each row and seed are in OUT/runs, of other tasks than persons in
+OUT/TASK/runs; what is there is not computed again. A task is a row of TASKS.
 """
 
 from __future__ import annotations
@@ -22,19 +23,20 @@ import platform
 import subprocess
 import sys
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import cv2
 import numpy as np
+import real_joints
 import torch
 import train_detector
 import training
 from eventgan import Shards, drawing
-from eventgan.detection_scores import Detections, GroundTruth, detection_scores, overlapping
+from eventgan.detection_scores import Detections, GroundTruth, curve, detection_scores, match_as_voc, overlapping
 from eventgan.evaluate import Samples, evaluate_detections
 from eventgan.torch import EventAugmentation
-from labelled_events import (CLASSES, LAYERS, METHODS, SENSORS, SIZE, SOURCES, Item, file_name, items_of, key_of,
+from labelled_events import (LAYERS, METHODS, PERSON, SENSORS, SIZE, SOURCES, Item, Task, file_name, items_of, key_of,
                              recordings_in, replace, test_items, windows_folder, windows_of)
 from torch import nn
 
@@ -43,11 +45,10 @@ ABLATION_SEEDS = 3
 COUNTS = (50, 100, 200, 400)  # of labelled images
 SENSOR_STEPS = 900
 LONGER = (3000, 1000)  # steps; the longest first, so that all processors are busy to the end
-# the first windows of a recording: settings are chosen on these, which are in no table
-DEVELOPMENT = {"cdehp": 48, "obaid_d1": 26, "pedro": 1}
 PLAIN = EventAugmentation(invert=0.5, scale=(0.7, 2.0), shift=0.15)
 FULL = train_detector.AUGMENTATION
-COLUMNS = {"ap50": "AP@0.5", "ap75": "AP@0.75", "ap": "AP@[.5:.95]", "best": "best box"}
+LAST_LAYER_STEPS = 200
+TUNED, CONSTANT = ", last layer tuned", "the same answer everywhere, of the test's own labels"
 
 Results = dict[str, list[dict[str, Any]]]  # by row, for each seed, what train_and_test gives
 
@@ -63,6 +64,7 @@ class Row:
     images: int | None = None  # so many, drawn by the seed; None: all
     norm: str = "batch"
     signed: bool = True        # or the volume
+    base: Row | None = None    # it has that row's weights, and learns its last layer anew
 
     def size(self) -> tuple[int, int]:
         return next((SOURCES[name].size for name in self.sources if name in SOURCES), SIZE)
@@ -96,6 +98,16 @@ def in_layers() -> list[Row]:
             for sources in dict.fromkeys([*alone, *mixed])]
 
 
+def task_rows(task: Task) -> list[Row]:
+    """Of a task other than persons: its methods; where it has windows to learn from, a network that has learnt from
+    these alone, and those that have tuned their last layer on them."""
+    found = [Row(f"{name}, augmented, {task.steps} steps", (name,), steps=task.steps) for name in task.methods]
+    for real in (f"real {name}" for name in task.learnt):
+        found += [Row(f"{real}, augmented, {task.steps} steps", (real,), steps=task.steps),
+                  *(Row(row.name + TUNED, (real,), steps=LAST_LAYER_STEPS, base=row) for row in found)]
+    return found
+
+
 def ablations() -> list[Row]:
     """What differs from "EventGAN 16" or "EventGAN 16, augmented" in one thing each."""
     only = functools.partial(dataclasses.replace, PLAIN)
@@ -112,13 +124,16 @@ def ablations() -> list[Row]:
                     for name in ("EventGAN 16", "difference", "ESIM")]
 
 
-def train(args: argparse.Namespace, row: Row, seed: int) -> train_detector.Detector:
-    """The row's detector of that seed, trained unless it has been."""
-    folder = _run_folder(args, row, seed)
+def train(args: argparse.Namespace, row: Row, seed: int) -> nn.Module:
+    """The row's network of that seed, trained unless it has been."""
+    folder, task = _run_folder(args, row, seed), args.task
     norm = nn.BatchNorm2d if row.norm == "batch" else functools.partial(nn.GroupNorm, 8)
     if not (folder / "weights.pt").exists():
+        if row.base:
+            train(args, row.base, seed)
         torch.manual_seed(seed)
-        parts = [items_of(args, name, row.signed) for name in row.sources]
+        parts = [items_of(args, name, row.signed)[:task.learnt.get(name.removeprefix("real "))]
+                 for name in row.sources]
         # a few windows among hundreds of photographs: each part is drawn as often
         if any(name.startswith("real ") for name in row.sources):
             parts = [part * math.ceil(max(map(len, parts)) / len(part)) for part in parts]
@@ -126,46 +141,64 @@ def train(args: argparse.Namespace, row: Row, seed: int) -> train_detector.Detec
         items = [_float(items[i]) for i in np.random.default_rng(seed).permutation(len(items))[:row.images]]
         folder.mkdir(parents=True, exist_ok=True)
         run = argparse.Namespace(out=str(folder), batch=BATCH, lr=RATE, steps=args.steps or row.steps, epochs=None,
-                                 minutes=None, every=10_000, seed=seed, workers=0, device="cpu", pretrained=None,
+                                 minutes=None, every=10_000, seed=seed, workers=0, device="cpu",
+                                 pretrained=str(_run_folder(args, row.base, seed) / "weights.pt") if row.base else None,
                                  bfloat16=row.norm == "batch" and training.has_bfloat16())
-        train_detector.train(run, items, CLASSES, row.augmentation, items[:BATCH], norm)
+        task.network.train(run, items, task, row, norm)
         (folder / "checkpoint.pt").unlink()
     weights = torch.load(folder / "weights.pt")
-    model = train_detector.Detector(next(iter(weights.values())).shape[1], len(CLASSES), norm)
+    model = task.network.make(next(iter(weights.values())).shape[1], norm)
     model.load_state_dict(weights)
     return model.eval()
 
 
 def train_and_test(args: argparse.Namespace, row: Row, seed: int) -> dict[str, Any]:
     """The scores on each recording, by its name, those of a network before its training under "untrained"."""
-    path = _run_folder(args, row, seed) / f"scores-{key_of(args.test)}.json"
+    path = _run_folder(args, row, seed) / f"tested-{key_of(args.test)}.json"
     if path.exists():
         return json.loads(path.read_text(encoding="utf-8"))
-    model, scores = train(args, row, seed), {}
+    model, network, first = train(args, row, seed), args.task.network, [*args.task.columns][0]
     torch.manual_seed(seed)
-    untrained = train_detector.Detector(len(model.eighth[0][0].weight[0]), len(CLASSES)).eval()
-    for recording in recordings_in(args.test):
-        windows = [_float(item) for item in test_items(args, recording, row.size(), row.signed)]
-        kept = development_windows(args, recording)
-        if args.test != args.real or f"real {recording.name}" not in row.sources:
-            parts = {recording.name: windows[kept:], f"{recording.name}, development": windows[:kept]}
-            if windows and not row.signed:
-                parts[f"{recording.name}, as bright"] = _as_bright(windows,
-                                                                   items_of(args, row.sources[0], row.signed))[kept:]
-            for name, part in parts.items():
-                if part:
-                    scores[name] = scores_of(model, part) | {"untrained": scores_of(untrained, part)["ap50"]}
+    untrained = network.make(len(model.eighth[0][0].weight[0]), nn.BatchNorm2d).eval()
+    scores = {}
+    for name, part in parts_of(args, row).items():
+        scores[name] = (network.scores(part, network.find(model, part))
+                        | {"untrained": network.scores(part, network.find(untrained, part))[first]})
     replace(path, lambda new: new.write_text(json.dumps(scores, indent=1) + "\n", encoding="utf-8"))
     return scores
 
 
+def parts_of(args: argparse.Namespace, row: Row) -> dict[str, list[Item]]:
+    """What the row is tested on: of each recording it has not learnt from, the windows behind the first ones; these
+    ("development"); its grey frames; and, where rows may learn from its first windows, those behind these
+    ("others")."""
+    found = {}
+    for recording in recordings_in(args, args.test):
+        name, windows = recording.name, [_float(item) for item in test_items(args, recording, row.size(), row.signed)]
+        kept, seen = development_windows(args, recording), 0
+        if args.test == args.real:
+            seen = args.task.learnt.get(name, 0)
+        if args.test != args.real or f"real {name}" not in row.sources:
+            found |= {name: windows[kept:], f"{name}, development": windows[:kept]}
+            if row.signed:
+                frames = test_items(args, recording, row.size(), shown="frames")
+                found[f"{name}, grey frames"] = [_float(item) for item in frames[kept:]]
+            else:
+                found[f"{name}, as bright"] = _as_bright(windows, items_of(args, row.sources[0], False))[kept:]
+        if seen:
+            found[f"{name}, others"] = windows[seen:]
+    return {name: part for name, part in found.items() if part}
+
+
 def development_windows(args: argparse.Namespace, recording: pathlib.Path) -> int:
     """How many of the recording's first windows are in no table."""
-    return DEVELOPMENT.get(recording.name, 0) if args.test == args.real else 0
+    return args.task.development.get(recording.name, 0) if args.test == args.real else 0
 
 
 def _as_bright(windows: list[Item], training_items: list[Item]) -> list[Item]:
     """With the mean of the training volumes, and clipped at 1 as these are."""
+    if not windows:
+        return []
     mean = [np.mean([float(item["volume"].float().mean()) for item in items])
             for items in (training_items[::10], windows)]
     return [{**item, "volume": (item["volume"] * (mean[0] / mean[1])).clamp(max=1)} for item in windows]
@@ -179,45 +212,117 @@ def _float(item: Item) -> Item:
     return {**item, "volume": item["volume"].float()}
 
 
-def scores_of(model: train_detector.Detector, items: Sequence[Item]) -> dict[str, float]:
-    """AP@0.5, AP@0.75, AP@[.5:.95], and the share of windows in which the box with the highest score lies on a person
-    (IoU 0.5 or more)."""
-    found, truth, best = [], [], []
-    for i, (item, (boxes, labels, scores)) in enumerate(train_detector.search(model, items, BATCH)):
-        found.append((np.full(len(boxes), i), labels.numpy(), boxes.numpy(), scores.numpy()))
+Boxes = Sequence[tuple[torch.Tensor, torch.Tensor, torch.Tensor]]  # for each item: boxes [n, 4], labels, scores
+
+
+def find_boxes(model: train_detector.Detector, items: Sequence[Item]) -> Boxes:
+    return [boxes for _, boxes in train_detector.search(model, items, BATCH)]
+
+
+def box_scores(items: Sequence[Item], found: Boxes) -> dict[str, float]:
+    """AP@0.5, AP@0.75, AP@[.5:.95]; precision, recall and F1 at the score where F1 is greatest; and the share of
+    windows in which the box with the highest score lies on an object (IoU 0.5 or more)."""
+    predicted, truth, best = [], [], []
+    for i, (item, (boxes, labels, scores)) in enumerate(zip(items, found)):
+        predicted.append((np.full(len(boxes), i), labels.numpy(), boxes.numpy(), scores.numpy()))
         there = item["boxes"].numpy()
         truth.append((np.full(len(there), i), item["labels"].numpy(), there, item["ignore"].numpy(),
                       np.full(len(there), -1)))
         first = boxes[scores.argmax()[None]].numpy() if len(boxes) else np.zeros((0, 4))
         best.append(len(overlapping(np.zeros(len(first), int), first, np.zeros(len(there), int), there, 0.5)[0]) > 0)
-    predictions, labelled = (Detections.of(*map(np.concatenate, zip(*found))),
+    predictions, labelled = (Detections.of(*map(np.concatenate, zip(*predicted))),
                              GroundTruth(*map(np.concatenate, zip(*truth))))
-    at = {iou: detection_scores(predictions, labelled, {CLASSES[0]: 0}, iou)[CLASSES[0]] for iou in (0.5, 0.75)}
+    at = {iou: detection_scores(predictions, labelled, {"": 0}, iou)[""] for iou in (0.5, 0.75)}
+    matched, counts = match_as_voc(predictions, labelled)
+    recall, precision = (np.append(each, 0) for each in curve(matched[counts] >= 0, (~labelled.ignore).sum()))
+    f1 = 2 * recall * precision / np.maximum(recall + precision, 1e-9)
     return {"ap50": at[0.5]["ap_voc"], "ap75": at[0.75]["ap_voc"], "ap": at[0.5]["ap_coco"],
+            "precision": float(precision[f1.argmax()]), "recall": float(recall[f1.argmax()]), "f1": float(f1.max()),
             "best": float(np.mean(best))}
+
+
+def constant_box(items: Sequence[Item]) -> Boxes:
+    """In each item the same box: that of their labels which lies on an object in most items (IoU 0.5 or more)."""
+    boxes = torch.cat([item["boxes"] for item in items]).numpy()
+    of = np.repeat(np.arange(len(items)), [len(item["boxes"]) for item in items])
+    pairs = overlapping(np.zeros(len(boxes), int), boxes, np.zeros(len(boxes), int), boxes, 0.5)
+    hits = [len(np.unique(of[pairs.second[pairs.first == i]])) for i in range(len(boxes))]
+    box = torch.from_numpy(boxes[np.argmax(hits)][None])
+    return [(box, torch.zeros(1, dtype=torch.int64), torch.ones(1))] * len(items)
+
+
+def draw_boxes(item: Item, found: tuple[torch.Tensor, torch.Tensor, torch.Tensor]) -> np.ndarray:
+    """What is found (blue: the best two) beside the boxes (green)."""
+    boxes, _, scores = found
+    best = scores.argsort(descending=True)[:2]
+    return training.draw_item(item, boxes[best], [f"{score:.2f}" for score in scores[best].tolist()])
+
+
+def _train_boxes(run: argparse.Namespace, items: list[Item], task: Task, row: Row, norm: train_detector.Norm) -> None:
+    train_detector.train(run, items, task.classes, row.augmentation, items[:BATCH], norm)
+
+
+def _train_joints(run: argparse.Namespace, items: list[Item], _: Task, row: Row, norm: train_detector.Norm) -> None:
+    real_joints.train(run, items, row.augmentation, norm, row.base is not None)
+
+
+@dataclasses.dataclass(frozen=True)
+class Network:
+    """What a task is learnt with. `find` answers for each of some items, `scores` judges the answers, `constant` gives
+    the same one for all, which no network sees anything for, and `draw` shows one."""
+
+    make: Callable[..., nn.Module]
+    train: Callable[..., None]
+    find: Callable[[Any, Sequence[Item]], Sequence[Any]]
+    scores: Callable[[Sequence[Item], Any], dict[str, float]]
+    constant: Callable[[Sequence[Item]], Any]
+    draw: Callable[[Item, Any], np.ndarray]
+
+
+def _detector(channels: int, norm: train_detector.Norm) -> train_detector.Detector:
+    return train_detector.Detector(channels, 1, norm)
+
+
+DETECTOR = Network(_detector, _train_boxes, find_boxes, box_scores, constant_box, draw_boxes)
+POSE = Network(real_joints.Pose, _train_joints, real_joints.find, real_joints.scores_of, real_joints.constant,
+               real_joints.draw)
+IN_LAYERS = ("EventGAN 16, layers", "EventGAN 8, layers", "difference, layers", "ESIM, layers", "gradient, layers",
+             "grey frames")
+TASKS = {
+    "persons": Task((PERSON,), ("pennfudan", "coco256", "voc100"), {"sot_person": 3, "davis_tennis": 3},
+                    {"ap50": "AP@0.5", "ap75": "AP@0.75", "ap": "AP@[.5:.95]", "best": "best box"},
+                    {"cdehp": 48, "obaid_d1": 26, "pedro": 1}, DETECTOR),
+    "cars": Task(("car",), ("coco256", "voc100", "kitti_mini"),
+                 {"cdnet_highway": 4, "cdnet_traffic": 2, "sot_car": 2, "davis_carshadow": 1, "camvid": 1},
+                 {"ap50": "AP@0.5", "precision": "precision", "recall": "recall", "f1": "F1", "best": "best box"},
+                 {"davis346_clip04": 6, "gen1_drive": 4, "gen1_mosaic": 1}, DETECTOR, IN_LAYERS, 3000, least_px=8),
+    "joints": Task((PERSON,), ("lsp_extended",), {},
+                   {"pckh": "PCKh@0.5", "pck": "PCK@0.2 of the torso", "mpjpe": "MPJPE, px"}, {"cdehp": 48}, POSE,
+                   IN_LAYERS, 3000, joints=True, learnt={"cdehp": 108}),  # two clips of four
+}
 
 
 def yolo(args: argparse.Namespace, name: str, seed: int) -> dict[str, Any]:
     """The scores of YOLOv3-tiny of --trainer, trained on the volumes of a source, on the recordings that have events,
     not drawings of them."""
     scores = {}
-    for recording in recordings_in(args.test):
+    for recording in recordings_in(args, args.test):
         if (recording / "images").is_dir():
             continue
         windows = windows_folder(args, recording, SIZE, "eta98")
         folder = args.out / "runs" / f"YOLOv3-tiny-{file_name(name)}-{seed}"
         command = [sys.executable, pathlib.Path(__file__).with_name("train_yolov3.py"), "--trainer", args.trainer,
                    "--data", args.out / "shards" / file_name(name), "--test", windows, "--out", folder, "--classes",
-                   CLASSES[0], "--scale", "1", "--steps", YOLO_STEPS, "--seed", seed, "--threads", "1", "--every",
+                   PERSON, "--scale", "1", "--steps", YOLO_STEPS, "--seed", seed, "--threads", "1", "--every",
                    "1000", "--images", "0"]
         found = folder / f"predictions-{key_of(recording)}.json"
         if not found.exists():
             subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
             (folder / "predictions.json").replace(found)
         ids = Shards(windows).column("sample_id")[development_windows(args, recording):].tolist()
-        result, _, _ = evaluate_detections(found, Samples(windows, None, None, ids), CLASSES)
-        scores[recording.name] = {"ap50": result["classes"][CLASSES[0]]["ap_voc"],
-                                  "ap": result["classes"][CLASSES[0]]["ap_coco"]}
+        result, _, _ = evaluate_detections(found, Samples(windows, None, None, ids), [PERSON])
+        scores[recording.name] = {"ap50": result["classes"][PERSON]["ap_voc"],
+                                  "ap": result["classes"][PERSON]["ap_coco"]}
     return scores
 
 
@@ -226,12 +331,14 @@ def spread(values: Iterable[float]) -> str:
     return f"{np.mean(values):.2f} ± {np.std(values):.2f}"
 
 
-def tables(results: Results, order: Sequence[str], title: str, reference: str | None = None) -> str:
+def tables(results: Results, order: Sequence[str], titles: Mapping[str, str], title: str,
+           reference: str | None = None) -> str:
     """Markdown, for each recording: the mean and the standard deviation over the seeds, and the difference from the row
-    `reference`, seed by seed, with its range."""
+    `reference`, seed by seed, with its range. `titles`: scores with their titles."""
+    first = [*titles][0]
     names = [*dict.fromkeys(name for of_seeds in results.values() for scores in of_seeds for name in scores
                             if "development" not in name)]
-    columns = [*COLUMNS.values(), *([f"AP@0.5 against {reference}"] if reference else [])]
+    columns = [*titles.values(), *([f"{titles[first]} against {reference}"] if reference else [])]
     text = ""
     for name in names:
         cells = [[f"{title}: {name}", "seeds", *columns]]
@@ -240,10 +347,10 @@ def tables(results: Results, order: Sequence[str], title: str, reference: str | 
             if not own:
                 continue
             cells.append([row, str(len(own)),
-                          *(spread(each[key] for each in own) if key in own[0] else "-" for key in COLUMNS)])
+                          *(spread(each[key] for each in own) if key in own[0] else "-" for key in titles)])
             if reference:
                 other = [scores[name] for scores in results[reference] if name in scores]
-                apart = [mine["ap50"] - each["ap50"] for mine, each in zip(own, other)]
+                apart = [mine[first] - each[first] for mine, each in zip(own, other)]
                 cells[-1].append("" if row == reference
                                  else f"{np.mean(apart):+.2f} ({min(apart):+.2f} to {max(apart):+.2f})")
         text += training.markdown(cells) + "\n\n" if len(cells) > 1 else ""
@@ -258,8 +365,9 @@ def conditions(args: argparse.Namespace, images: int) -> str:
                  f"{'AMX' if 'amx_tile' in found.get('flags', '') else 'no AMX'}")
     version = subprocess.run([args.program, "--version"], capture_output=True,
                              text=True, check=True).stdout.splitlines()[0]
+    [name] = [f"--task {name} " * (name != "persons") for name, task in TASKS.items() if task is args.task]
     return ("# Real cameras: measured\n\n" + "\n".join([
-        "- command: `experiment.py real --frames labelled_frames --real real_labels --peers peers`",
+        f"- command: `experiment.py real {name}--frames labelled_frames --real real_labels --peers peers`",
         f"- processor: {processor}, {len(os.sched_getaffinity(0))} cores",
         f"- program: {version}; PyTorch {torch.__version__}",
         f"- {images} labelled images, {STEPS} steps of {BATCH} unless a row says otherwise; mean ± standard deviation "
@@ -294,22 +402,16 @@ def draw_curves(args: argparse.Namespace, results: Results, images: int) -> None
 
 
 def draw(args: argparse.Namespace, drawn: Sequence[Row]) -> None:
-    """OUT/images/RECORDING.png: for some windows of each recording what the detectors of seed 0 find (blue:
-    the best two) beside the boxes (green)."""
-    for recording in recordings_in(args.test):
-        items = [_float(item) for item in test_items(args, recording, SIZE)]
-        models = {row.name: train(args, row, 0) for row in drawn}
-        lines = []
-        for i in np.unique(np.linspace(development_windows(args, recording), len(items) - 1, 4).round().astype(int)):
-            cells = []
-            for name, model in models.items():
-                boxes, _, scores = next(train_detector.detect(model, items[i]["volume"][None]))
-                best = scores.argsort(descending=True)[:2]
-                canvas = training.draw_item(items[i], boxes[best], [f"{score:.2f}" for score in scores[best].tolist()])
-                cells.append(cv2.putText(canvas, name, (8, canvas.shape[0] - 8), cv2.FONT_HERSHEY_SIMPLEX, 0.5,
-                                         drawing.BLACK, 1, cv2.LINE_AA))
-            lines.append(np.hstack(cells))
-        drawing.write(args.out / "images", recording.name, np.vstack(lines))
+    """OUT/images/RECORDING.png: for some windows of each part what the networks of seed 0 find."""
+    models = {row.name: train(args, row, 0) for row in drawn}
+    for name, items in parts_of(args, drawn[0]).items():
+        items = [items[i] for i in np.unique(np.linspace(0, len(items) - 1, 4).round().astype(int))]
+        columns = []
+        for title, model in models.items():
+            cells = map(args.task.network.draw, items, args.task.network.find(model, items))
+            columns.append(np.vstack([cv2.putText(cell, title, (8, cell.shape[0] - 8), cv2.FONT_HERSHEY_SIMPLEX, 0.5,
+                                                  drawing.BLACK, 1, cv2.LINE_AA) for cell in cells]))
+        drawing.write(args.out / "images", file_name(name), np.hstack(columns))
 
 
 def _run(task: tuple[argparse.Namespace, Row | str, int]) -> tuple[str, int, dict[str, Any]]:
@@ -319,63 +421,93 @@ def _run(task: tuple[argparse.Namespace, Row | str, int]) -> tuple[str, int, dic
     return row.name, seed, train_and_test(args, row, seed)
 
 
+@dataclasses.dataclass(frozen=True)
+class Section:
+    """Rows with a table of their own, which are compared with one of them."""
+
+    title: str
+    rows: Sequence[Row]
+    reference: str | None
+    seeds: int = 1_000_000  # at most
+
+
+def sections(args: argparse.Namespace) -> list[Section]:
+    task = args.task
+    if task.methods:
+        found = task_rows(task)
+        return [Section(task.classes[0] if not task.joints else "joints", found[:1] if args.quick else found,
+                        found[0].name)]
+    main = rows([folder.name for folder in recordings_in(args, args.real)])
+    if args.quick:
+        return [Section("Augmented", [row for row in main if row.name == "EventGAN 16, augmented"], None)]
+    main = [row for row in main if args.peers or row.sources != ("v2e",)]
+    longer = f"EventGAN 16, augmented, {SENSOR_STEPS} steps"
+    return [Section("Plain", [row for row in main if row.augmentation == PLAIN], "EventGAN 16"),
+            Section("Augmented", [row for row in main if row.augmentation == FULL], "EventGAN 16, augmented"),
+            Section("Drawn sensors", drawn_sensors(), longer),
+            Section("Objects that move on their own", in_layers(), longer),
+            Section("One thing changed", ablations(), None, ABLATION_SEEDS)]
+
+
 def run(args: argparse.Namespace) -> None:
-    """All rows; `args`: program, out, frames, real, test, peers, trainer, seeds, quick, as experiment.py has them."""
+    """All rows; `args`: task, program, out, frames, real, test, peers, trainer, seeds, quick, as experiment.py has
+    them."""
     warnings.filterwarnings("ignore", "shipped:.* are stand-in weights")
     os.environ["EVENTGAN_PROGRAM"] = args.program
     torch.set_num_threads(1)
     args.real = args.real.resolve()
     args.frames, args.test = args.frames.resolve(), (args.test or args.real).resolve()
     args.steps = None
-    names = [folder.name for folder in recordings_in(args.real)]
-    main, drawn, extra = ([row for row in rows(names) if args.peers or row.sources != ("v2e",)], drawn_sensors(),
-                          ablations())
     if args.quick:
-        args.out = args.out / "quick"
-        args.steps, args.seeds, main, drawn, extra = 60, 1, [row for row in main
-                                                             if row.name == "EventGAN 16, augmented"], [], []
-    layers = [] if args.quick else [row for row in in_layers() if row not in drawn]
-    tasks = [(args, row, seed) for seed in range(args.seeds) for row in (*main, *drawn, *layers)]
-    tasks += [(args, row, seed) for seed in range(min(args.seeds, ABLATION_SEEDS)) for row in extra]
-    if args.trainer and not args.quick:
+        args.out, args.steps, args.seeds = args.out / "quick", 60, 1
+    if args.task != "persons":
+        args.out = args.out / args.task
+    args.task = TASKS[args.task]
+    args.out.mkdir(parents=True, exist_ok=True)
+    parts = sections(args)
+    # those with a base come last, when it has been trained
+    tasks = sorted(((args, row, seed) for part in parts for seed in range(min(args.seeds, part.seeds))
+                    for row in part.rows), key=lambda each: (each[1].base is not None, each[2]))
+    tasks = [*{(row.name, seed): (args, row, seed) for args, row, seed in tasks}.values()]
+    if args.trainer and not args.task.methods and not args.quick:
         tasks += [(args, name, seed) for seed in range(min(args.seeds, ABLATION_SEEDS)) for name in SOURCES
                   if name.endswith(", eta98")]
     # What several processes read is made before there are several; the program uses all cores itself.
-    detectors = [row for _, row, _ in tasks if isinstance(row, Row)]
-    for name, signed in dict.fromkeys((name, row.signed) for row in detectors for name in row.sources):
+    learnt = [row for _, row, _ in tasks if isinstance(row, Row)]
+    for name, signed in dict.fromkeys((name, row.signed) for row in learnt for name in row.sources):
         items_of(args, name, signed)
-    for recording in recordings_in(args.test):
-        for size, signed in {(row.size(), row.signed) for row in detectors}:
-            test_items(args, recording, size, signed)
-        if len(detectors) < len(tasks) and not (recording / "images").is_dir():
-            windows_of(args, recording, SIZE, "eta98")
-    results: Results = collections.defaultdict(list)
+    for row in {(row.size(), row.signed): row for row in learnt}.values():
+        parts_of(args, dataclasses.replace(row, sources=row.sources[:1]))
+    if len(learnt) < len(tasks):
+        for recording in recordings_in(args, args.test):
+            if not (recording / "images").is_dir():
+                windows_of(args, recording, SIZE, "eta98")
+    network, first = args.task.network, [*args.task.columns][0]
+    same = {name: network.scores(items, network.constant(items))
+            for name, items in parts_of(args, Row(CONSTANT, ())).items()}
+    results: Results = collections.defaultdict(list, {CONSTANT: [same] * args.seeds})
     with multiprocessing.get_context("fork").Pool(len(os.sched_getaffinity(0))) as pool:
         for done, (name, seed, scores) in enumerate(pool.imap(_run, tasks), 1):
             results[name].append(scores)
             print(f"{done} of {len(tasks)}: {name}, seed {seed}: "
-                  + ", ".join(f"{key} {value['ap50']:.2f}" for key, value in scores.items()), flush=True)
-    text = conditions(args, len(items_of(args, "EventGAN 16")))
-    text += tables(results, [row.name for row in main if row.augmentation == PLAIN], "Plain", "EventGAN 16")
-    text += tables(results, [row.name for row in main if row.augmentation == FULL], "Augmented",
-                   "EventGAN 16, augmented")
-    text += tables(results, [row.name for row in drawn], "Drawn sensors",
-                   f"EventGAN 16, augmented, {SENSOR_STEPS} steps")
-    text += tables(results, [row.name for row in in_layers()], "Objects that move on their own",
-                   f"EventGAN 16, augmented, {SENSOR_STEPS} steps")
-    text += tables(results, ["EventGAN 16", "EventGAN 16, augmented", *(row.name for row in extra)],
-                   "One thing changed")
-    text += tables(results, [name for name in results if name.startswith("YOLO")], "YOLOv3-tiny")
+                  + ", ".join(f"{key} {value[first]:.2f}" for key, value in scores.items()), flush=True)
+    text = conditions(args, len(items_of(args, learnt[0].sources[0])))
+    for part in parts:
+        text += tables(results, [*(row.name for row in part.rows), CONSTANT], args.task.columns, part.title,
+                       part.reference)
+    text += tables(results, [name for name in results if name.startswith("YOLO")], args.task.columns, "YOLOv3-tiny")
     print(text)
     (args.out / "real.md").write_text(text, encoding="utf-8")
     (args.out / "real.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     if args.quick:
         # of all recordings: after 60 steps the AP of one alone is noise, on one processor above, on the next below
-        scores = [score for name, score in results[main[0].name][0].items() if "development" not in name]
-        trained, untrained = (np.mean([score[key] for score in scores]) for key in ("ap50", "untrained"))
+        scores = [score for name, score in results[learnt[0].name][0].items() if "development" not in name]
+        trained, untrained = (np.mean([score[key] for score in scores]) for key in (first, "untrained"))
         if not trained > untrained:
-            sys.exit(f"expected an AP above that of an untrained network, {untrained:.3f}, got {trained:.3f}")
+            sys.exit(f"expected scores above those of an untrained network, {untrained:.3f}, got {trained:.3f}")
         return
-    draw(args, [row for row in main
-                if row.name in ("EventGAN 16, augmented", "difference, augmented", "grey frames, augmented")])
-    draw_curves(args, results, len(items_of(args, "EventGAN 16")))
+    wanted = ("EventGAN 16, ", "difference, ", "grey frames, ")
+    draw(args, [next(row for row in parts[-1 if args.task.methods else 1].rows if row.name.startswith(name))
+                for name in wanted])
+    if not args.task.methods:
+        draw_curves(args, results, len(items_of(args, "EventGAN 16")))

@@ -39,12 +39,11 @@ def convolution(inputs: int, outputs: int, stride: int = 1, norm: Norm = nn.Batc
     return nn.Sequential(nn.Conv2d(inputs, outputs, 3, stride, 1, bias=False), norm(outputs), nn.ReLU(inplace=True))
 
 
-class Detector(nn.Module):
-    """Of events [N, C, H, W], sides multiples of 32: logits of the classes [N, K, H/8, W/8], and the distances of the
-    left, top, right and bottom edge from each cell's middle, in input pixels, [N, 4, H/8, W/8]. A U-Net down to 1/32 of
-    the size; 0.5 million numbers."""
+class Trunk(nn.Module):
+    """Of events [N, C, H, W], sides multiples of 32: what is `seen`, [N, 64, H/8, W/8]. A U-Net down to 1/32 of the
+    size; 0.5 million numbers."""
 
-    def __init__(self, channels: int, classes: int, norm: Norm = nn.BatchNorm2d) -> None:
+    def __init__(self, channels: int, norm: Norm) -> None:
         super().__init__()
         layer = functools.partial(convolution, norm=norm)
         self.eighth = nn.Sequential(layer(channels, 16, 2), layer(16, 32, 2), layer(32, 32), layer(32, 64, 2),
@@ -52,16 +51,27 @@ class Detector(nn.Module):
         self.sixteenth = nn.Sequential(layer(64, 96, 2), layer(96, 96))
         self.thirtysecond = nn.Sequential(layer(96, 96, 2), layer(96, 96))
         self.to_sixteenth, self.to_eighth = layer(96 + 96, 32), layer(64 + 32, 64)
+
+    def seen(self, events: torch.Tensor) -> torch.Tensor:
+        eighth = self.eighth(events)
+        sixteenth = self.sixteenth(eighth)
+        below = F.interpolate(self.thirtysecond(sixteenth), scale_factor=2.0)
+        below = F.interpolate(self.to_sixteenth(torch.cat([sixteenth, below], 1)), scale_factor=2.0)
+        return self.to_eighth(torch.cat([eighth, below], 1))
+
+
+class Detector(Trunk):
+    """Of events [N, C, H, W], sides multiples of 32: logits of the classes [N, K, H/8, W/8], and the distances of the
+    left, top, right and bottom edge from each cell's middle, in input pixels, [N, 4, H/8, W/8]."""
+
+    def __init__(self, channels: int, classes: int, norm: Norm = nn.BatchNorm2d) -> None:
+        super().__init__(channels, norm)
         self.logits, self.edges = nn.Conv2d(64, classes, 1), nn.Conv2d(64, 4, 1)
         nn.init.constant_(self.logits.bias, -4.6)  # at first an object has a chance of 1 % everywhere
         nn.init.constant_(self.edges.bias, np.log(4))  # and is 64 pixels wide and high
 
     def forward(self, events: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        eighth = self.eighth(events)
-        sixteenth = self.sixteenth(eighth)
-        below = F.interpolate(self.thirtysecond(sixteenth), scale_factor=2.0)
-        below = F.interpolate(self.to_sixteenth(torch.cat([sixteenth, below], 1)), scale_factor=2.0)
-        seen = self.to_eighth(torch.cat([eighth, below], 1))
+        seen = self.seen(events)
         return self.logits(seen).float(), STRIDE * self.edges(seen).float().clamp(max=5).exp()
 
 
