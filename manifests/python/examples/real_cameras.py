@@ -23,21 +23,22 @@ import platform
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import cv2
 import numpy as np
+import real_boxes
 import real_joints
 import torch
 import train_detector
 import training
 from eventgan import Shards, drawing
-from eventgan.detection_scores import Detections, GroundTruth, curve, detection_scores, match_as_voc, overlapping
 from eventgan.evaluate import Samples, evaluate_detections
 from eventgan.torch import EventAugmentation
-from labelled_events import (LAYERS, METHODS, PERSON, SENSORS, SIZE, SOURCES, Item, Task, file_name, items_of, key_of,
-                             recordings_in, replace, test_items, windows_folder, windows_of)
+from labelled_events import LAYERS, METHODS, SENSORS, SOURCES, items_of
+from labelled_recordings import (PERSON, SIZE, Item, Task, file_name, key_of, recordings_in, replace, test_items,
+                                 windows_folder, windows_of)
 from torch import nn
 
 STEPS, YOLO_STEPS, BATCH, RATE = 300, 200, 16, 2e-3
@@ -49,6 +50,25 @@ PLAIN = EventAugmentation(invert=0.5, scale=(0.7, 2.0), shift=0.15)
 FULL = train_detector.AUGMENTATION
 LAST_LAYER_STEPS = 200
 TUNED, CONSTANT = ", last layer tuned", "the same answer everywhere, of the test's own labels"
+IN_LAYERS = ("EventGAN 16, layers", "EventGAN 8, layers", "difference, layers", "ESIM, layers", "gradient, layers",
+             "grey frames")
+TASKS = {
+    "persons": Task(
+        classes=(PERSON,), stills=("pennfudan", "coco256", "voc100"), clips={"sot_person": 3, "davis_tennis": 3},
+        network=real_boxes.DETECTOR, development={"cdehp": 48, "obaid_d1": 26, "pedro": 1},
+        columns={"ap50": "AP@0.5", "ap75": "AP@0.75", "ap": "AP@[.5:.95]", "best": "best box"}),
+    "cars": Task(
+        classes=("car",), stills=("coco256", "voc100", "kitti_mini"),
+        clips={"cdnet_highway": 4, "cdnet_traffic": 2, "sot_car": 2, "davis_carshadow": 1, "camvid": 1}, least_px=8,
+        network=real_boxes.DETECTOR, development={"davis346_clip04": 6, "gen1_drive": 4, "gen1_mosaic": 1},
+        columns={"ap50": "AP@0.5", "precision": "precision", "recall": "recall", "f1": "F1", "best": "best box"},
+        methods=IN_LAYERS, steps=3000),
+    "joints": Task(
+        classes=(PERSON,), stills=("lsp_extended",), clips={}, joints=True, network=real_joints.POSE,
+        development={"cdehp": 48}, learnt={"cdehp": 48 + 60},  # the first clip, and the first two of four
+        columns={"pck": "PCK@0.2 of the torso", "pckh": "PCKh@0.5", "mpjpe": "MPJPE, px"},
+        methods=IN_LAYERS, steps=3000),
+}
 
 Results = dict[str, list[dict[str, Any]]]  # by row, for each seed, what train_and_test gives
 
@@ -143,8 +163,9 @@ def train(args: argparse.Namespace, row: Row, seed: int) -> nn.Module:
         run = argparse.Namespace(out=str(folder), batch=BATCH, lr=RATE, steps=args.steps or row.steps, epochs=None,
                                  minutes=None, every=10_000, seed=seed, workers=0, device="cpu",
                                  pretrained=str(_run_folder(args, row.base, seed) / "weights.pt") if row.base else None,
+                                 classes=task.classes, last_layer=row.base is not None,
                                  bfloat16=row.norm == "batch" and training.has_bfloat16())
-        task.network.train(run, items, task, row, norm)
+        task.network.train(run, items, row.augmentation, norm)
         (folder / "checkpoint.pt").unlink()
     weights = torch.load(folder / "weights.pt")
     model = task.network.make(next(iter(weights.values())).shape[1], norm)
@@ -210,96 +231,6 @@ def _run_folder(args: argparse.Namespace, row: Row, seed: int) -> pathlib.Path:
 
 def _float(item: Item) -> Item:
     return {**item, "volume": item["volume"].float()}
-
-
-Boxes = Sequence[tuple[torch.Tensor, torch.Tensor, torch.Tensor]]  # for each item: boxes [n, 4], labels, scores
-
-
-def find_boxes(model: train_detector.Detector, items: Sequence[Item]) -> Boxes:
-    return [boxes for _, boxes in train_detector.search(model, items, BATCH)]
-
-
-def box_scores(items: Sequence[Item], found: Boxes) -> dict[str, float]:
-    """AP@0.5, AP@0.75, AP@[.5:.95]; precision, recall and F1 at the score where F1 is greatest; and the share of
-    windows in which the box with the highest score lies on an object (IoU 0.5 or more)."""
-    predicted, truth, best = [], [], []
-    for i, (item, (boxes, labels, scores)) in enumerate(zip(items, found)):
-        predicted.append((np.full(len(boxes), i), labels.numpy(), boxes.numpy(), scores.numpy()))
-        there = item["boxes"].numpy()
-        truth.append((np.full(len(there), i), item["labels"].numpy(), there, item["ignore"].numpy(),
-                      np.full(len(there), -1)))
-        first = boxes[scores.argmax()[None]].numpy() if len(boxes) else np.zeros((0, 4))
-        best.append(len(overlapping(np.zeros(len(first), int), first, np.zeros(len(there), int), there, 0.5)[0]) > 0)
-    predictions, labelled = (Detections.of(*map(np.concatenate, zip(*predicted))),
-                             GroundTruth(*map(np.concatenate, zip(*truth))))
-    at = {iou: detection_scores(predictions, labelled, {"": 0}, iou)[""] for iou in (0.5, 0.75)}
-    matched, counts = match_as_voc(predictions, labelled)
-    recall, precision = (np.append(each, 0) for each in curve(matched[counts] >= 0, (~labelled.ignore).sum()))
-    f1 = 2 * recall * precision / np.maximum(recall + precision, 1e-9)
-    return {"ap50": at[0.5]["ap_voc"], "ap75": at[0.75]["ap_voc"], "ap": at[0.5]["ap_coco"],
-            "precision": float(precision[f1.argmax()]), "recall": float(recall[f1.argmax()]), "f1": float(f1.max()),
-            "best": float(np.mean(best))}
-
-
-def constant_box(items: Sequence[Item]) -> Boxes:
-    """In each item the same box: that of their labels which lies on an object in most items (IoU 0.5 or more)."""
-    boxes = torch.cat([item["boxes"] for item in items]).numpy()
-    of = np.repeat(np.arange(len(items)), [len(item["boxes"]) for item in items])
-    pairs = overlapping(np.zeros(len(boxes), int), boxes, np.zeros(len(boxes), int), boxes, 0.5)
-    hits = [len(np.unique(of[pairs.second[pairs.first == i]])) for i in range(len(boxes))]
-    box = torch.from_numpy(boxes[np.argmax(hits)][None])
-    return [(box, torch.zeros(1, dtype=torch.int64), torch.ones(1))] * len(items)
-
-
-def draw_boxes(item: Item, found: tuple[torch.Tensor, torch.Tensor, torch.Tensor]) -> np.ndarray:
-    """What is found (blue: the best two) beside the boxes (green)."""
-    boxes, _, scores = found
-    best = scores.argsort(descending=True)[:2]
-    return training.draw_item(item, boxes[best], [f"{score:.2f}" for score in scores[best].tolist()])
-
-
-def _train_boxes(run: argparse.Namespace, items: list[Item], task: Task, row: Row, norm: train_detector.Norm) -> None:
-    train_detector.train(run, items, task.classes, row.augmentation, items[:BATCH], norm)
-
-
-def _train_joints(run: argparse.Namespace, items: list[Item], _: Task, row: Row, norm: train_detector.Norm) -> None:
-    real_joints.train(run, items, row.augmentation, norm, row.base is not None)
-
-
-@dataclasses.dataclass(frozen=True)
-class Network:
-    """What a task is learnt with. `find` answers for each of some items, `scores` judges the answers, `constant` gives
-    the same one for all, which no network sees anything for, and `draw` shows one."""
-
-    make: Callable[..., nn.Module]
-    train: Callable[..., None]
-    find: Callable[[Any, Sequence[Item]], Sequence[Any]]
-    scores: Callable[[Sequence[Item], Any], dict[str, float]]
-    constant: Callable[[Sequence[Item]], Any]
-    draw: Callable[[Item, Any], np.ndarray]
-
-
-def _detector(channels: int, norm: train_detector.Norm) -> train_detector.Detector:
-    return train_detector.Detector(channels, 1, norm)
-
-
-DETECTOR = Network(_detector, _train_boxes, find_boxes, box_scores, constant_box, draw_boxes)
-POSE = Network(real_joints.Pose, _train_joints, real_joints.find, real_joints.scores_of, real_joints.constant,
-               real_joints.draw)
-IN_LAYERS = ("EventGAN 16, layers", "EventGAN 8, layers", "difference, layers", "ESIM, layers", "gradient, layers",
-             "grey frames")
-TASKS = {
-    "persons": Task((PERSON,), ("pennfudan", "coco256", "voc100"), {"sot_person": 3, "davis_tennis": 3},
-                    {"ap50": "AP@0.5", "ap75": "AP@0.75", "ap": "AP@[.5:.95]", "best": "best box"},
-                    {"cdehp": 48, "obaid_d1": 26, "pedro": 1}, DETECTOR),
-    "cars": Task(("car",), ("coco256", "voc100", "kitti_mini"),
-                 {"cdnet_highway": 4, "cdnet_traffic": 2, "sot_car": 2, "davis_carshadow": 1, "camvid": 1},
-                 {"ap50": "AP@0.5", "precision": "precision", "recall": "recall", "f1": "F1", "best": "best box"},
-                 {"davis346_clip04": 6, "gen1_drive": 4, "gen1_mosaic": 1}, DETECTOR, IN_LAYERS, 3000, least_px=8),
-    "joints": Task((PERSON,), ("lsp_extended",), {},
-                   {"pckh": "PCKh@0.5", "pck": "PCK@0.2 of the torso", "mpjpe": "MPJPE, px"}, {"cdehp": 48}, POSE,
-                   IN_LAYERS, 3000, joints=True, learnt={"cdehp": 108}),  # two clips of four
-}
 
 
 def yolo(args: argparse.Namespace, name: str, seed: int) -> dict[str, Any]:

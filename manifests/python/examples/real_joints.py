@@ -1,6 +1,6 @@
 """Joints of persons for `experiment.py real`: a small network that finds them in a person's crop, and its scores.
 
-Items are those of labelled_events with `joints`. A person is cropped to SIDE x SIDE pixels by the joints that are
+Items are those of labelled_recordings with `joints`. A person is cropped to SIDE x SIDE pixels by the joints that are
 annotated, in training and in tests alike.
 """
 
@@ -21,7 +21,7 @@ from eventgan import drawing
 from eventgan.augmentation import EventAugmentation, move_points, moved
 from eventgan.pose_scores import head_lengths, near_head
 from eventgan.torch import flip_pairs, heatmaps
-from labelled_events import JOINTS, Item
+from labelled_recordings import JOINTS, Item, Network
 from torch import nn
 from torch.utils.data import Dataset
 
@@ -41,7 +41,7 @@ Found = Sequence[np.ndarray]  # for each item, joints [J, 2] in pixels of its cr
 class Pose(train_detector.Trunk):
     """Of crops [N, C, SIDE, SIDE]: for each joint the logit of its place, [N, J, SIDE / 4, SIDE / 4]."""
 
-    def __init__(self, channels: int, norm: train_detector.Norm = nn.BatchNorm2d) -> None:
+    def __init__(self, channels: int, norm: train_detector.Norm) -> None:
         super().__init__(channels, norm)
         self.maps = nn.Conv2d(64, 4 * len(JOINTS), 1)
 
@@ -92,20 +92,20 @@ def loss_of_maps(logits: torch.Tensor, maps: torch.Tensor, weight: torch.Tensor)
     return -(wanted * F.log_softmax(logits.flatten(2), -1) * weight).sum() / weight.sum().clamp(min=1)
 
 
-def train(run: argparse.Namespace, items: Sequence[Item], augmentation: EventAugmentation, norm: train_detector.Norm,
-          last_layer: bool) -> None:
-    """By the options of `training`; `last_layer`: the others stay as they are in run.pretrained."""
+def train(run: argparse.Namespace, items: list[Item], augmentation: EventAugmentation,
+          norm: train_detector.Norm) -> None:
+    """With run.last_layer the others stay as they are in run.pretrained."""
     data = Crops(items, augmentation)
-    model = Pose(1, norm)
+    model = Pose(len(data.items[0]["volume"]), norm)
     training.load_fitting(model, run.pretrained)
     model = model.to(memory_format=torch.channels_last)
-    if last_layer:
+    if run.last_layer:
         model.requires_grad_(False).maps.requires_grad_(True)
     optimizer = torch.optim.AdamW([each for each in model.parameters() if each.requires_grad], run.lr,
                                   weight_decay=0.01)
 
     def loss_of(batch: tuple, _: float) -> torch.Tensor:
-        if last_layer:
+        if run.last_layer:
             model.eval()  # nor do the other layers' means and variances change
         crops, maps, weight = batch
         with torch.autocast("cpu", torch.bfloat16, enabled=run.bfloat16):
@@ -157,3 +157,6 @@ def draw(item: Item, found: np.ndarray) -> np.ndarray:
     drawing.draw_joints(canvas, true, drawing.TRUE)
     drawing.draw_joints(canvas, either_way(found, true), drawing.FOUND, true)
     return canvas
+
+
+POSE = Network(Pose, train, find, scores_of, constant, draw)

@@ -1,8 +1,9 @@
-"""manifests/python/examples/{labelled_events,real_cameras}.py: boxes and events against what they are made of, and
+"""manifests/python/examples/{labelled_events,labelled_recordings,real_cameras}.py, the task persons: boxes and events against what they are made of, and
 `experiment.py real --quick` where there is data."""
 
 import argparse
 import csv
+import dataclasses
 import os
 import pathlib
 import shutil
@@ -19,7 +20,9 @@ pytest.importorskip("eventgan._engine")
 EXAMPLES = SOURCE / "manifests" / "python" / "examples"
 sys.path.append(str(EXAMPLES))
 import labelled_events
+import labelled_recordings
 import real_cameras
+import train_detector
 
 from eventgan import Generator, signed_channel
 
@@ -55,10 +58,8 @@ def write_window(folder, name, left, top, right, bottom):
 
 
 @pytest.fixture
-def args(tmp_path, monkeypatch):
+def args(tmp_path):
     """Two folders of stills and one clip of seven frames; a recording of two windows and one of a drawing."""
-    monkeypatch.setattr(labelled_events, "STILLS", ("wide", "high"))
-    monkeypatch.setattr(labelled_events, "CLIPS", ("clip",))
     frames, real = tmp_path / "frames", tmp_path / "real"
     write_frames(frames / "wide", [texture(100, 260, i) for i in range(3)])
     write_frames(frames / "high", [texture(200, 150, 5 + i) for i in range(3)])
@@ -82,7 +83,9 @@ def args(tmp_path, monkeypatch):
                                                  "walking/images/d.png,car,0,0,50,50,,\n"
                                                  "driving/images/d.png,car,0,0,50,50,,\n")
     (real / "notes").mkdir()
-    return argparse.Namespace(frames=frames, real=real, test=real, out=tmp_path / "out", peers=None, steps=2)
+    task = dataclasses.replace(real_cameras.TASKS["persons"], stills=("wide", "high"), clips={"clip": 3},
+                               development={"windows": 1})
+    return argparse.Namespace(frames=frames, real=real, test=real, out=tmp_path / "out", peers=None, steps=2, task=task)
 
 
 def test_pairs_are_those_of_the_program(args):
@@ -113,18 +116,18 @@ def test_controls_are_of_the_frame(args):
     args.out.mkdir()
     sample = labelled_events.shards_of(args, "EventGAN 16")[0]
     grey, slope = labelled_events.grey(args, sample), labelled_events.gradient(args, sample)
-    assert grey.shape == slope.shape == (1, *labelled_events.SIZE) and np.abs(slope).max() == np.abs(grey).max() == 1
+    assert grey.shape == slope.shape == (1, *labelled_recordings.SIZE) and np.abs(slope).max() == np.abs(grey).max() == 1
     shown = np.abs(slope[0]).sum(1) > 0  # 100x260 in 192x320: 123 lines, the others are the letterbox's
     assert 120 <= shown.sum() <= 123 and not slope[0, :34].any() and not slope[0, -34:].any()
     np.testing.assert_array_equal(slope, labelled_events.gradient(args, sample))  # its direction is the sample's
 
 
 def test_windows_and_drawings_have_their_boxes_around_their_events(args):
-    drawn, windows, walking = labelled_events.recordings_in(args.real)  # in the other pictures nobody is seen
+    drawn, windows, walking = labelled_recordings.recordings_in(args, args.real)  # in the other pictures nobody is seen
     assert (drawn.name, windows.name, walking.name) == ("drawn", "windows", "walking")
-    assert labelled_events.recordings_in(windows) == [windows]
-    assert labelled_events.recordings_in(walking.parent) == [walking]
-    a, b = labelled_events.test_items(args, windows, (192, 320))
+    assert labelled_recordings.recordings_in(args, windows) == [windows]
+    assert labelled_recordings.recordings_in(args, walking.parent) == [walking]
+    a, b = labelled_recordings.test_items(args, windows, (192, 320))
     scale = 192 / 260  # 346x260 in 320x192: 256 wide, 32 left of it
     expected = [100 * scale + 32, 40 * scale, 140 * scale + 32, 160 * scale]
     np.testing.assert_allclose(a["boxes"][0], expected, atol=0.5)
@@ -134,8 +137,8 @@ def test_windows_and_drawings_have_their_boxes_around_their_events(args):
             and not channel[bottom + 1:].any())
     np.testing.assert_allclose(b["boxes"][0], [32, 0, 288, 192], atol=0.5)
     assert (b["volume"][0, :, 32:288] > 0.99).all()  # as many events everywhere make no pattern of lines
-    [c] = labelled_events.test_items(args, drawn, (192, 320))
-    [d] = labelled_events.test_items(args, walking, (192, 320))  # the same picture, its boxes in a table
+    [c] = labelled_recordings.test_items(args, drawn, (192, 320))
+    [d] = labelled_recordings.test_items(args, walking, (192, 320))  # the same picture, its boxes in a table
     torch.testing.assert_close(d["boxes"], c["boxes"], atol=1e-4, rtol=0)
     assert torch.equal(d["volume"], c["volume"])
     # 640x360: half of it, 6 lines below the top
@@ -145,12 +148,12 @@ def test_windows_and_drawings_have_their_boxes_around_their_events(args):
             and not channel[:, :99].any())
     # all pixels count in a smaller one, not some
     assert channel[:55, :190].abs().max() == channel[12:50, 202:298].abs().max() == 0
-    assert labelled_events.test_items(args, drawn, (192, 320), signed=False) == []
-    volume = labelled_events.test_items(args, windows, (192, 320), signed=False)[0]["volume"]
+    assert labelled_recordings.test_items(args, drawn, (192, 320), signed=False) == []
+    volume = labelled_recordings.test_items(args, windows, (192, 320), signed=False)[0]["volume"]
     # no negative events
     assert volume.shape == (18, 192, 320) and volume.max() == 1 and volume.min() == 0 and not volume[9:].any()
     with pytest.raises(SystemExit, match="expected folders with windows .* got none"):
-        labelled_events.recordings_in(args.frames)
+        labelled_recordings.recordings_in(args, args.frames)
 
 
 def test_events_of_a_finer_sensor_are_averaged(args):
@@ -170,25 +173,26 @@ def test_events_of_a_finer_sensor_are_averaged(args):
 
 def test_trained_once_and_never_on_what_it_is_tested_on(args, monkeypatch):
     args.out.mkdir()
-    monkeypatch.setitem(real_cameras.DEVELOPMENT, "windows", 1)
     row = real_cameras.Row("windows", ("real windows",))
     scores = real_cameras.train_and_test(args, row, 0)
     assert [*scores] == ["drawn", "walking"]
     network = real_cameras.train_and_test(args, real_cameras.Row("difference", ("difference",), images=5), 0)
-    assert [*network] == ["drawn", "windows", "windows, development", "walking"]
+    assert [*network] == ["drawn", "windows", "windows, development", "walking"]  # none has grey frames
     assert all(0 <= value <= 1 for score in network.values() for value in score.values())
     args.test = args.real.rename(args.real.with_name("others"))
     args.real.symlink_to(args.test)
-    monkeypatch.setattr(real_cameras.train_detector, "train", None)  # it would fail
+    monkeypatch.setattr(train_detector, "train", None)  # it would fail
     assert [*real_cameras.train_and_test(args, row, 0)] == ["drawn", "windows", "walking"]
 
 
 def test_tables_compare_seed_by_seed():
+    columns = real_cameras.TASKS["persons"].columns
+
     def score(value):
-        return {"camera": dict.fromkeys(real_cameras.COLUMNS, value), "camera, development": {}}
+        return {"camera": dict.fromkeys(columns, value), "camera, development": {}}
 
     text = real_cameras.tables({"EventGAN 16": [score(0.5), score(0.7)], "other": [score(0.4), score(0.9)]},
-                               ["EventGAN 16", "other", "none"], "Plain", "EventGAN 16")
+                               ["EventGAN 16", "other", "none"], columns, "Plain", "EventGAN 16")
     head, _, first, second = text.strip().splitlines()
     assert (head.startswith("| Plain: camera | seeds | AP@0.5 |")
             and first.startswith("| EventGAN 16 | 2 | 0.60 ± 0.10 |") and first.endswith(" |  |"))
