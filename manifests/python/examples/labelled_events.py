@@ -30,8 +30,8 @@ from eventgan import Generator, Shards, convert, signed_channel
 from eventgan.detection_scores import overlapping
 from eventgan.outlines import mask
 from eventgan.torch import DetectionDataset
-from labelled_recordings import (JOINTS, SIZE, Item, file_name, halved, kept, normalized, recordings_in, shown_in,
-                                 smaller, test_items)
+from labelled_recordings import (JOINTS, SIZE, Item, file_name, frame_channel, halved, kept, normalized, recordings_in,
+                                 shown_in, smaller, test_items)
 
 MOTION_PX = 8  # of stills, at most
 
@@ -59,9 +59,9 @@ class Source:
 OBJECTS = {"translation_px": [0, MOTION_PX], "rotation_deg": 3, "scale": 0.04}
 
 
-def grey(_: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
+def grey(args: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
     """The labelled frame itself."""
-    return _whereshown_in(sample, lambda _, image: signed_channel(image))
+    return _whereshown_in(sample, lambda _, image: frame_channel(args, image))
 
 
 def gradient(_: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
@@ -333,10 +333,9 @@ def without_small(item: Item, least_px: float) -> Item:
 
 
 def with_joints(sample: Mapping[str, Any], names: Sequence[str]) -> Item:
-    """Of a sample's first person: `joints` [J, 2], NaN where they are not annotated, in the order of JOINTS; its
-    volume without polarity."""
+    """Of a sample's first person: `joints` [J, 2], NaN where they are not annotated, in the order of JOINTS."""
     places, annotated = sample["persons"]["joints"][0], (sample["persons"]["joints_source"][0] != -1).any(-1)
     points = dict(zip(names, np.where(annotated[:, None], places, np.nan)))
     points["head"] = (points["head_top"] + points["neck"]) / 2
-    return halved({"volume": torch.from_numpy(np.abs(sample["volume"])), "id": sample["pair"]["sample_id"],
+    return halved({"volume": torch.from_numpy(sample["volume"]), "id": sample["pair"]["sample_id"],
                     "joints": torch.from_numpy(np.stack([points[name] for name in JOINTS])).float()})

@@ -61,7 +61,8 @@ class Task:
     development: Mapping[str, int]
     columns: Mapping[str, str]  # scores with their titles; rows are compared by the first one
     least_px: float = 0  # boxes with a smaller side, in a volume's pixels, are neither right nor wrong in training
-    joints: bool = False  # in place of boxes; without polarity, which their recordings do not have
+    joints: bool = False  # in place of boxes
+    polarity: bool = True  # False: networks see events without it, as some of the recordings have them
     # the first windows of a recording that rows may learn from, which are then tested on the others
     learnt: Mapping[str, int] = dataclasses.field(default_factory=dict)
     methods: tuple[str, ...] = ()  # of SOURCES, all with so many steps; (): those of persons
@@ -134,30 +135,42 @@ def test_items(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, 
 
 def _drawn(args: argparse.Namespace, path: pathlib.Path, size: tuple[int, int]) -> Item:
     """Of an image in which somebody has drawn positive minus negative events in grey, stretched to 0..255 by its own
-    range, or events without their polarity; or of a grey frame, in a folder of that name. For joints no polarity is
-    shown; else one is drawn for each pixel of a drawing that has none."""
+    range, or events without their polarity; or of a grey frame, in a folder of that name. Where the task has polarity,
+    one is drawn for each pixel of a drawing that has none."""
     image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     if image is None:
         raise ValueError(f"expected an image, got none, in {path}")
     # What is no event is known before the image is made smaller, when values are still whole.
     events = image.astype(np.float32) - np.bincount(image.ravel()).argmax()
-    folder = path.parent.parent
-    if args.task.joints:
-        item = {"volume": torch.from_numpy(np.abs(events[None])), "id": path.stem,
-                "joints": torch.from_numpy(_joints(folder / "joints.csv")[path.name]).float()}
-        return smaller(item, size, lambda events: signed_channel(np.concatenate([events, 0 * events])))
-    if events.min() == 0 or events.max() == 0:
+    if not args.task.polarity:
+        events = np.abs(events)
+    elif events.min() == 0 or events.max() == 0:
         events *= np.random.default_rng(zlib.crc32(path.stem.encode())).choice(np.float32([-1, 1]), events.shape)
+    item = {"volume": torch.from_numpy(events[None]), "id": path.stem}
+    if path.parent.name == "frames":
+        item["volume"] = torch.from_numpy(frame_channel(args, image))
+    if args.task.joints:
+        item["joints"] = torch.from_numpy(_joints(path.parents[1] / "joints.csv")[path.name]).float()
+    else:
+        item |= _with_boxes(args, path, image.shape)
+    return smaller(item, size, (lambda grey: grey) if path.parent.name == "frames" else
+                   lambda signed: signed_channel(np.concatenate([signed.clip(0), (-signed).clip(0)])))
+
+
+def frame_channel(args: argparse.Namespace, image: np.ndarray) -> np.ndarray:
+    """A grey frame, uint8 [H, W], in place of events: as these have a polarity, or from 0 to 1."""
+    return signed_channel(image) if args.task.polarity else image[None] / np.float32(255)
+
+
+def _with_boxes(args: argparse.Namespace, path: pathlib.Path, shape: tuple[int, int]) -> Item:
+    """`boxes`, `labels` and `ignore` of an image of the shape H, W or of its frame."""
+    folder = path.parent.parent
     texts = folder / "labels"
-    boxes = torch.from_numpy(_boxes(texts / f"{path.stem}.txt", image.shape) if texts.is_dir() else
+    boxes = torch.from_numpy(_boxes(texts / f"{path.stem}.txt", shape) if texts.is_dir() else
                              _table(folder.parent / "boxes.csv",
                                     args.task.classes)[f"{folder.name}/images/{path.name}"]).float()
-    item = {"volume": torch.from_numpy(events[None]), "boxes": boxes,
-            "labels": torch.zeros(len(boxes), dtype=torch.int64), "ignore": torch.zeros(len(boxes), dtype=torch.bool),
-            "id": path.stem}
-    if path.parent.name == "frames":
-        return smaller({**item, "volume": torch.from_numpy(signed_channel(image))}, size, lambda grey: grey)
-    return smaller(item, size, lambda signed: signed_channel(np.concatenate([signed.clip(0), (-signed).clip(0)])))
+    return {"boxes": boxes, "labels": torch.zeros(len(boxes), dtype=torch.int64),
+            "ignore": torch.zeros(len(boxes), dtype=torch.bool)}
 
 
 def smaller(item: Item, size: tuple[int, int], finish: Callable[[np.ndarray], np.ndarray]) -> Item:

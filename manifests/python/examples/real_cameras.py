@@ -60,17 +60,26 @@ TASKS = {
     "cars": Task(
         classes=("car",), stills=("coco256", "voc100", "kitti_mini"),
         clips={"cdnet_highway": 4, "cdnet_traffic": 2, "sot_car": 2, "davis_carshadow": 1, "camvid": 1}, least_px=8,
-        network=real_boxes.DETECTOR, development={"davis346_clip04": 6, "gen1_drive": 4, "gen1_mosaic": 1},
+        polarity=False, network=real_boxes.DETECTOR,
+        development={"davis346_clip04": 6, "gen1_drive": 4, "gen1_mosaic": 1},
         columns={"ap50": "AP@0.5", "precision": "precision", "recall": "recall", "f1": "F1", "best": "best box"},
         methods=IN_LAYERS, steps=3000),
     "joints": Task(
-        classes=(PERSON,), stills=("lsp_extended",), clips={}, joints=True, network=real_joints.POSE,
+        classes=(PERSON,), stills=("lsp_extended",), clips={}, joints=True, polarity=False,
+        network=real_joints.POSE,
         development={"cdehp": 48}, learnt={"cdehp": 48 + 60},  # the first clip, and the first two of four
         columns={"pck": "PCK@0.2 of the torso", "pckh": "PCKh@0.5", "mpjpe": "MPJPE, px"},
         methods=IN_LAYERS, steps=3000),
 }
 
 Results = dict[str, list[dict[str, Any]]]  # by row, for each seed, what train_and_test gives
+
+
+class Unsigned(EventAugmentation):
+    """Of events without polarity, also those that it adds."""
+
+    def sensor(self, volume: torch.Tensor) -> torch.Tensor:
+        return super().sensor(volume).abs()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -158,14 +167,15 @@ def train(args: argparse.Namespace, row: Row, seed: int) -> nn.Module:
         if any(name.startswith("real ") for name in row.sources):
             parts = [part * math.ceil(max(map(len, parts)) / len(part)) for part in parts]
         items = [item for part in parts for item in part]
-        items = [_float(items[i]) for i in np.random.default_rng(seed).permutation(len(items))[:row.images]]
+        items = [_float(args, items[i]) for i in np.random.default_rng(seed).permutation(len(items))[:row.images]]
         folder.mkdir(parents=True, exist_ok=True)
         run = argparse.Namespace(out=str(folder), batch=BATCH, lr=RATE, steps=args.steps or row.steps, epochs=None,
                                  minutes=None, every=10_000, seed=seed, workers=0, device="cpu",
                                  pretrained=str(_run_folder(args, row.base, seed) / "weights.pt") if row.base else None,
                                  classes=task.classes, last_layer=row.base is not None,
                                  bfloat16=row.norm == "batch" and training.has_bfloat16())
-        task.network.train(run, items, row.augmentation, norm)
+        augmentation = row.augmentation if task.polarity else Unsigned(**dataclasses.asdict(row.augmentation))
+        task.network.train(run, items, augmentation, norm)
         (folder / "checkpoint.pt").unlink()
     weights = torch.load(folder / "weights.pt")
     model = task.network.make(next(iter(weights.values())).shape[1], norm)
@@ -195,7 +205,8 @@ def parts_of(args: argparse.Namespace, row: Row) -> dict[str, list[Item]]:
     ("others")."""
     found = {}
     for recording in recordings_in(args, args.test):
-        name, windows = recording.name, [_float(item) for item in test_items(args, recording, row.size(), row.signed)]
+        name = recording.name
+        windows = [_float(args, item) for item in test_items(args, recording, row.size(), row.signed)]
         kept, seen = development_windows(args, recording), 0
         if args.test == args.real:
             seen = args.task.learnt.get(name, 0)
@@ -203,7 +214,7 @@ def parts_of(args: argparse.Namespace, row: Row) -> dict[str, list[Item]]:
             found |= {name: windows[kept:], f"{name}, development": windows[:kept]}
             if row.signed:
                 frames = test_items(args, recording, row.size(), shown="frames")
-                found[f"{name}, grey frames"] = [_float(item) for item in frames[kept:]]
+                found[f"{name}, grey frames"] = [_float(args, item) for item in frames[kept:]]
             else:
                 found[f"{name}, as bright"] = _as_bright(windows, items_of(args, row.sources[0], False))[kept:]
         if seen:
@@ -229,8 +240,9 @@ def _run_folder(args: argparse.Namespace, row: Row, seed: int) -> pathlib.Path:
     return args.out / "runs" / f"{file_name(row.name)}-{seed}"
 
 
-def _float(item: Item) -> Item:
-    return {**item, "volume": item["volume"].float()}
+def _float(args: argparse.Namespace, item: Item) -> Item:
+    volume = item["volume"].float()
+    return {**item, "volume": volume if args.task.polarity else volume.abs()}
 
 
 def yolo(args: argparse.Namespace, name: str, seed: int) -> dict[str, Any]:

@@ -61,11 +61,11 @@ def view_of(joints: np.ndarray, angle: float = 0.0) -> np.ndarray:
 
 def crop_of(item: Item, angle: float = 0.0,
             augmentation: EventAugmentation | None = None) -> tuple[torch.Tensor, np.ndarray]:
-    """The person's crop [1, SIDE, SIDE], without polarity, and its joints [J, 2] in it."""
+    """The person's crop [C, SIDE, SIDE] and its joints [J, 2] in it."""
     joints = item["joints"].double().numpy()
     crop, affine = moved(item["volume"].float(), math.nan, augmentation, (SIDE, SIDE), view_of(joints, angle))
     joints = move_points(joints, affine)
-    return crop.abs(), joints[MIRRORED] if np.linalg.det(affine[:, :2]) < 0 else joints
+    return crop, joints[MIRRORED] if np.linalg.det(affine[:, :2]) < 0 else joints
 
 
 class Crops(Dataset):

@@ -1,0 +1,306 @@
+"""manifests/python/examples/{labelled_recordings,real_boxes,real_joints,real_cameras}.py: cars and joints. Scores,
+sides, signed channels of pictures and constant answers against numbers worked out here; `experiment.py real --task`
+with few steps on a part of the data, where there is data."""
+
+import argparse
+import csv
+import dataclasses
+import json
+import math
+import os
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from conftest import SOURCE
+
+torch = pytest.importorskip("torch")
+cv2 = pytest.importorskip("cv2")
+pytest.importorskip("eventgan._engine")
+EXAMPLES = SOURCE / "manifests" / "python" / "examples"
+sys.path.append(str(EXAMPLES))
+import labelled_events
+import labelled_recordings
+import real_boxes
+import real_cameras
+import real_joints
+from labelled_recordings import JOINTS
+
+DATA = pathlib.Path(os.environ.get("EVENTGAN_TEST_DATA", SOURCE.parent / "shared" / "data"))
+RIGHT, LEFT = ([i for i, name in enumerate(JOINTS) if name.startswith(side)] for side in ("right", "left"))
+CDEHP = ["head", *(f"{side}_{name}" for name in ("shoulder", "elbow", "hand", "hip", "knee", "foot")
+                   for side in ("red", "green"))]
+
+
+def arguments(tmp_path, name):
+    (tmp_path / "out").mkdir()
+    return argparse.Namespace(task=real_cameras.TASKS[name], real=tmp_path / "real", test=tmp_path / "real",
+                              out=tmp_path / "out", steps=None)
+
+
+def standing(x=100.0, y=20.0):
+    """Joints [13, 2] of somebody upright, 120 px high; the right side is at the lower x."""
+    offsets = {"head": (0, 0), "shoulder": (20, 20), "elbow": (25, 40), "wrist": (25, 60), "hip": (10, 60),
+               "knee": (10, 90), "ankle": (10, 120)}
+    return np.array([[x + (-1 if name.startswith("right") else 1) * offsets[name.split("_")[-1]][0],
+                      y + offsets[name.split("_")[-1]][1]] for name in JOINTS])
+
+
+def person(joints):
+    return {"volume": torch.zeros(1, 192, 320).half(), "joints": torch.from_numpy(joints), "id": "a"}
+
+
+def boxed(*boxes, ignored=()):
+    boxes = torch.tensor([*boxes, *ignored], dtype=torch.float32).reshape(-1, 4)
+    return {"volume": torch.zeros(1, 192, 320), "boxes": boxes, "labels": torch.zeros(len(boxes), dtype=torch.int64),
+            "ignore": torch.arange(len(boxes)) >= len(boxes) - len(ignored), "id": "a"}
+
+
+def answer(*boxes_and_scores):
+    rows = torch.tensor(boxes_and_scores, dtype=torch.float32).reshape(-1, 5)
+    return rows[:, :4], torch.zeros(len(rows), dtype=torch.int64), rows[:, 4]
+
+
+def test_scores_of_boxes():
+    """The first and the third are right, of four to find: precision 1, 1/2, 2/3, recall 1/4, 1/4, 1/2."""
+    items = [boxed((0, 0, 40, 40), (100, 0, 140, 40)), boxed((0, 0, 40, 40), (200, 0, 240, 40),
+                                                             ignored=[(100, 100, 140, 140)])]
+    found = [answer((0, 0, 40, 38, 0.9), (50, 50, 90, 90, 0.8)),
+             answer((0, 0, 40, 40, 0.7), (100, 100, 140, 140, 0.95))]
+    scores = real_boxes.scores_of(items, found)
+    assert scores["ap50"] == pytest.approx(1 / 4 + 1 / 4 * 2 / 3)
+    assert (scores["precision"], scores["recall"]) == (pytest.approx(2 / 3), 0.5)
+    assert scores["f1"] == pytest.approx(2 * 2 / 3 / 2 / (2 / 3 + 1 / 2))
+    nothing = real_boxes.scores_of(items, [answer()] * 2)
+    assert [nothing[name] for name in ("ap50", "precision", "recall", "f1", "best")] == [0] * 5
+
+
+def test_constant_box_is_that_of_most_items():
+    often = [boxed((10 + i, 10, 60 + i, 60)) for i in range(3)]
+    items = [*often, boxed((200, 100, 300, 150), (202, 100, 302, 150), (204, 100, 304, 150), (201, 100, 301, 150)),
+             boxed()]
+    constant = real_boxes.constant(items)
+    assert len(constant) == 5 and all(torch.equal(boxes, constant[0][0]) for boxes, _, _ in constant)
+    assert constant[0][0].tolist()[0] in [item["boxes"][0].tolist() for item in often]
+    scores = real_boxes.scores_of(items, constant)
+    assert scores["recall"] == pytest.approx(3 / 7) and scores["best"] == pytest.approx(3 / 5)
+
+
+def test_small_boxes_are_neither_right_nor_wrong():
+    item = labelled_events.without_small(boxed((0, 0, 8, 30), (0, 0, 30, 7.9), (0, 0, 30, 30)), 8)
+    assert item["ignore"].tolist() == [False, True, False]
+
+
+def test_pictures_become_signed_channels(tmp_path):
+    """304x240 to 192x320: 243x192, 38 columns right of the left edge."""
+    args = arguments(tmp_path, "cars")
+    signed = argparse.Namespace(**{**vars(args), "out": tmp_path / "signed",
+                                   "task": dataclasses.replace(args.task, polarity=True)})
+    polar = np.full((240, 304), 128, np.uint8)
+    polar[80:160, 100:150], polar[80:160, 150:200] = 255, 0
+    alone = np.full((240, 304), 128, np.uint8)
+    alone[80:160, 100:200] = 255
+    for folder, image in (("polar", polar), ("alone", alone), ("walking", polar)):
+        for shown in ("images", "frames"):
+            (tmp_path / "real" / "set" / folder / shown).mkdir(parents=True)
+            cv2.imwrite(str(tmp_path / "real" / "set" / folder / shown / "a.png"), image)
+    (tmp_path / "real" / "set" / "boxes.csv").write_text(
+        "image,class,x1,y1,x2,y2,track,note\n"
+        + "".join(f"{name}/images/a.png,{kind},100,80,200,160,,\n"
+                  for name, kind in (("polar", "car"), ("alone", "car"), ("walking", "person"))))
+    (tmp_path / "real" / "windows").mkdir()
+    for name in ("a.npz", "a.txt"):
+        (tmp_path / "real" / "windows" / name).touch()  # of persons
+    folders = labelled_recordings.recordings_in(args, args.real)
+    assert [each.name for each in folders] == ["alone", "polar"]
+    [alone], [polar] = (labelled_recordings.test_items(signed, each, (192, 320)) for each in folders)
+    without = [labelled_recordings.test_items(args, each, (192, 320))[0] for each in folders]
+    for item in without:  # none has a polarity where one has none
+        channel = item["volume"][0].float().numpy()
+        assert (channel[66:126, 121:195] > 0.4).mean() > 0.95 and channel.min() == 0
+    for item in (alone, polar, *without):
+        np.testing.assert_allclose(item["boxes"][0], [100 * 0.8 + 38, 64, 200 * 0.8 + 38, 128], atol=0.5)
+    channel = polar["volume"][0].float().numpy()
+    assert (channel[66:126, 121:155] > 0.9).all() and (channel[66:126, 161:195] < -0.9).all()
+    channel = alone["volume"][0].float().numpy()
+    inside, outside = channel[66:126, 121:195], np.delete(channel, np.s_[62:130], 0)
+    # as many of both signs, and no area of either
+    assert not outside.any() and 0.4 < (inside > 0).mean() < 0.6 and abs(inside.mean()) < 0.1
+    [frame] = labelled_recordings.test_items(args, folders[1], (192, 320), shown="frames")
+    assert torch.equal(frame["boxes"], polar["boxes"])
+    channel = frame["volume"][0].float().numpy()  # as bright as it is
+    assert ((channel[66:126, 121:155] == 1).all() and (channel[66:126, 161:195] == 0).all()
+            and np.allclose(channel[10:50, 50:270], 128 / 255, atol=1e-3))
+
+
+def test_pictures_of_joints_have_no_polarity(tmp_path):
+    args = arguments(tmp_path, "joints")
+    joints = 4 * standing() + [0, 40]  # in 1280x800
+    image = np.zeros((800, 1280), np.uint8)
+    for x, y in joints.astype(int):
+        image[y - 8:y + 8, x - 8:x + 8] = 255
+    (tmp_path / "real" / "clips" / "images").mkdir(parents=True)
+    cv2.imwrite(str(tmp_path / "real" / "clips" / "images" / "a.png"), image)
+    with open(tmp_path / "real" / "clips" / "joints.csv", "w", newline="") as file:
+        csv.writer(file).writerow(["image", *(f"{name}_{axis}" for name in CDEHP for axis in "xy"), "uncertain"])
+        csv.writer(file).writerow(["a.png", *joints.ravel(), "green_elbow red_knee"])
+    [folder] = labelled_recordings.recordings_in(args, args.real)
+    [item] = labelled_recordings.test_items(args, folder, (192, 320))
+    assert item["volume"].min() == 0 and item["volume"].max() == 1
+    expected = (joints + 0.5) * 0.24 + [6.4, 0] - 0.5  # 307 of 320 columns, rounded
+    expected[[JOINTS.index("left_elbow"), JOINTS.index("right_knee")]] = np.nan
+    np.testing.assert_allclose(item["joints"].numpy(), expected, atol=0.6)
+    for x, y in expected[np.isfinite(expected[:, 0])].round().astype(int):
+        assert item["volume"][0, y, x] > 0.5
+    assert labelled_recordings.test_items(args, folder, (192, 320), shown="frames") == []
+
+
+def test_joints_of_photographs(tmp_path):
+    names = ["neck", "head_top", *JOINTS[1:]]
+    joints = np.concatenate([[[50, 40], [54, 20]], standing()[1:]]).astype(np.float32)
+    source = np.where(np.arange(14)[:, None] == 5, -1, joints)
+    item = labelled_events.with_joints({"volume": np.zeros((1, 4, 4), np.float32), "pair": {"sample_id": "a"},
+                                        "persons": {"joints": joints[None], "joints_source": source[None]}}, names)
+    np.testing.assert_allclose(item["joints"][0], [52, 30])
+    assert torch.isnan(item["joints"][4]).all() and names[5] == JOINTS[4] and torch.isfinite(item["joints"]).sum() == 24
+    np.testing.assert_allclose(item["joints"][5:], joints[6:])
+
+
+def test_crops_hold_the_person():
+    """The box around the joints is 50 wide and 120 high: 128 px are 1.4 x 120."""
+    _, joints = real_joints.crop_of(person(standing()))
+    np.testing.assert_allclose((joints.min(0) + joints.max(0)) / 2, [63.5, 63.5])
+    np.testing.assert_allclose(np.ptp(joints, 0), [50 * 128 / 168, 120 * 128 / 168])
+    turned = real_joints.view_of(standing(), 90)
+    np.testing.assert_allclose(np.ptp(standing() @ turned[:, :2].T, 0), [120 * 128 / 168, 50 * 128 / 168])
+    mirror = real_joints.EventAugmentation(flip=1)
+    _, mirrored = real_joints.crop_of(person(standing()), 0, mirror)  # right is at the lower x again
+    np.testing.assert_allclose(mirrored, joints, atol=1e-9)
+
+
+def test_the_better_of_both_sides_is_scored():
+    _, true = real_joints.crop_of(person(standing()))
+    exchanged = true.copy()
+    exchanged[RIGHT + LEFT] = true[LEFT + RIGHT]
+    np.testing.assert_array_equal(real_joints.either_way(exchanged, true), true)
+    np.testing.assert_array_equal(real_joints.either_way(true, true), true)
+    one_arm = true.copy()
+    wrists = [JOINTS.index("right_wrist"), JOINTS.index("left_wrist")]
+    one_arm[wrists] = true[wrists[::-1]]
+    np.testing.assert_array_equal(real_joints.either_way(one_arm, true), one_arm)  # wrong either way
+
+
+def test_scores_of_joints():
+    """In crops: the torso is the distance of a shoulder from the other side's hip, (30, 40) px times 128 / 168; the
+    head is 20 px times that from the middle of the shoulders."""
+    scale = 128 / 168
+    items = [person(standing()), person(np.where(np.arange(13)[:, None] == 0, math.nan, standing()))]
+    true = [real_joints.crop_of(item)[1] for item in items]
+    torso, head = 0.2 * 50 * scale, 0.3 * 20 * scale
+    found = [each.copy() for each in true]
+    found[0][0, 1] -= head * 0.99
+    found[0][JOINTS.index("right_wrist"), 0] -= head * 1.01
+    found[0][JOINTS.index("left_ankle"), 1] += torso * 1.01
+    found[1][JOINTS.index("left_ankle"), 1] += torso * 0.99
+    scores = real_joints.scores_of(items, found)
+    assert scores["pckh"] == pytest.approx(11 / 13)  # the second has no head
+    assert scores["pck"] == pytest.approx(24 / 25)
+    assert scores["mpjpe"] == pytest.approx((2 * head + 2 * torso) / 25)
+    perfect = real_joints.scores_of(items, true)
+    assert (perfect["pckh"], perfect["pck"], perfect["mpjpe"]) == (1, 1, 0)
+
+
+def test_the_constant_pose_is_the_mean():
+    wide = standing()
+    wide[RIGHT, 0] -= 10
+    wide[LEFT, 0] += 10
+    items = [person(standing()), person(wide)]
+    first, second = real_joints.constant(items)
+    np.testing.assert_array_equal(first, second)
+    scale = 128 / 168
+    _, true = real_joints.crop_of(items[0])
+    np.testing.assert_allclose(first[0], true[0])
+    np.testing.assert_allclose(first[RIGHT, 0], true[RIGHT, 0] - 5 * scale)
+
+
+def test_maps_give_back_the_joints():
+    """Where the logits are what the loss wants, the joints are found to half a cell."""
+    _, true = real_joints.crop_of(person(standing()))
+    crops = real_joints.Crops([person(standing())], real_joints.EventAugmentation(flip=0))
+    crops._augmentation = None
+    monkey, real_joints.ROTATION = real_joints.ROTATION, 0
+    try:
+        _, maps, weight = crops[0]
+    finally:
+        real_joints.ROTATION = monkey
+    assert weight.min() == 1
+    logits = torch.from_numpy(maps[None]).clamp(min=1e-6).log()
+    [found] = real_joints.find(lambda _: logits, [person(standing())])
+    assert np.abs(found - true).max() <= 2.5
+    right = real_joints.loss_of_maps(logits, torch.from_numpy(maps[None]), torch.from_numpy(weight[None]))
+    wrong = real_joints.loss_of_maps(logits.flip(-1), torch.from_numpy(maps[None]), torch.from_numpy(weight[None]))
+    assert right < wrong
+
+
+def test_only_the_last_layer_is_tuned_and_parts_are_what_they_say(tmp_path, monkeypatch):
+    args = arguments(tmp_path, "joints")
+    args.steps, args.seeds = 2, 1
+    args.task = dataclasses.replace(args.task, development={"clips": 1}, learnt={"clips": 2},
+                                    methods=("gradient, layers",))
+    items = [{**person(standing(100 + i)), "id": str(i)} for i in range(4)]
+    monkeypatch.setattr(real_cameras, "recordings_in", lambda *_: [pathlib.Path("clips")])
+    monkeypatch.setattr(real_cameras, "test_items",
+                        lambda *_, shown="images", **__: items if shown == "images" else [])
+    asked = []
+    monkeypatch.setattr(real_cameras, "items_of", lambda _, name, *__: asked.append(name) or items)
+    base, _, tuned = real_cameras.task_rows(args.task)
+    assert tuned.base == base
+    assert {name: [item["id"] for item in part] for name, part in real_cameras.parts_of(args, base).items()} == {
+        "clips": ["1", "2", "3"], "clips, development": ["0"], "clips, others": ["2", "3"]}
+    assert [*real_cameras.train_and_test(args, tuned, 0)] == ["clips, others"]
+    assert asked == ["gradient, layers", "real clips"]
+    before, after = (torch.load(real_cameras._run_folder(args, row, 0) / "weights.pt") for row in (base, tuned))
+    changed = {name for name in before if not torch.equal(before[name], after[name])}
+    assert changed == {"maps.weight", "maps.bias"}
+
+
+def part_of_data(folder, count):
+    """A folder as labelled_frames with the first images of each set."""
+    for source in sorted(path for path in (DATA / "labelled_frames").iterdir() if path.is_dir()):
+        target = folder / source.name
+        target.mkdir(parents=True)
+        for each in source.iterdir():
+            if each.suffix not in (".csv", ".json"):
+                (target / each.name).symlink_to(each)
+        if (source / "person_keypoints.json").exists():
+            labels = json.loads((source / "person_keypoints.json").read_text())
+            labels["images"] = labels["images"][:count]
+            ids = {image["id"] for image in labels["images"]}
+            labels["annotations"] = [each for each in labels["annotations"] if each["image_id"] in ids]
+            (target / "person_keypoints.json").write_text(json.dumps(labels))
+            continue
+        frames, boxes = ([*csv.reader((source / f"{name}.csv").read_text().splitlines())] for name in ("frames",
+                                                                                                      "boxes"))
+        frames = frames[:count + 1]
+        kept = {row[0] for row in frames}
+        for name, rows in (("frames", frames), ("boxes", [row for row in boxes if row[0] in kept])):
+            with open(target / f"{name}.csv", "w", newline="") as file:
+                csv.writer(file).writerows(rows)
+
+
+@pytest.mark.parametrize("task", ["cars", "joints"])
+def test_what_learnt_from_photographs_finds_something_in_real_events(tmp_path, task):
+    if not (DATA / "labelled_frames").is_dir() or not (DATA / "real_labels").is_dir():
+        pytest.skip("no ../shared/data")
+    part_of_data(tmp_path / "frames", 40)
+    line = [sys.executable, EXAMPLES / "experiment.py", "real", "--task", task, "--program",
+            os.environ["EVENTGAN_PROGRAM"], "--frames", tmp_path / "frames", "--real", DATA / "real_labels", "--out",
+            tmp_path / "out", "--quick"]
+    done = subprocess.run(line, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    text = (tmp_path / "out" / "quick" / task / "real.md").read_text()
+    assert real_cameras.CONSTANT in text and f"--task {task} " in text
+    again = subprocess.run(line, capture_output=True, text=True)
+    assert again.returncode == 0 and "epoch" not in again.stdout, again.stdout + again.stderr
