@@ -442,6 +442,13 @@ def run(args: argparse.Namespace) -> None:
     print(text)
     (args.out / "real.md").write_text(text, encoding="utf-8")
     (args.out / "real.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    if args.quick and args.task.methods:
+        # dozens of labels and 60 steps say nothing about a recording
+        summary = json.loads((_run_folder(args, learnt[0], 0) / "metrics.json").read_text(encoding="utf-8"))
+        if not summary[summary["metric"]] > summary["untrained"]:
+            sys.exit(f"expected a {summary['metric']} of what was learnt above that of an untrained network, "
+                     f"{summary['untrained']:.3f}, got {summary[summary['metric']]:.3f}")
+        return
     if args.quick:
         # of all recordings: after 60 steps the AP of one alone is noise, on one processor above, on the next below
         scores = [score for name, score in results[learnt[0].name][0].items() if "development" not in name]

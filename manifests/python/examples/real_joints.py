@@ -29,9 +29,9 @@ SIDE, STRIDE = 128, 4  # of crops, and pixels of one for each cell of the maps
 AROUND = 1.4  # sides of the crop per longer side of the box around the joints
 SIGMA = 1.5  # of a joint's Gaussian, cells
 ROTATION = 15.0  # of crops in training, standard deviation in degrees, at most twice that
+PAIRS = flip_pairs(JOINTS)
 MIRRORED = np.arange(len(JOINTS))
-for _left, _right in flip_pairs(JOINTS):
-    MIRRORED[[_left, _right]] = _right, _left
+MIRRORED[np.array(PAIRS)] = np.array(PAIRS)[:, ::-1]
 TORSO = [(JOINTS.index(f"{side}_shoulder"), JOINTS.index(f"{other}_hip"))
          for side, other in (("left", "right"), ("right", "left"))]
 
@@ -68,6 +68,14 @@ def crop_of(item: Item, angle: float = 0.0,
     return crop, joints[MIRRORED] if np.linalg.det(affine[:, :2]) < 0 else joints
 
 
+def facing(joints: np.ndarray) -> np.ndarray:
+    """Joints [J, 2] with the sides named as of somebody who faces the camera. Scores do not ask which side is which,
+    and events of somebody's back hardly tell."""
+    across = [joints[left, 0] - joints[right, 0] for left, right in PAIRS
+              if "shoulder" in JOINTS[left] or "hip" in JOINTS[left]]
+    return joints[MIRRORED] if np.nansum(across) < 0 else joints
+
+
 class Crops(Dataset):
     """Crops, changed anew each time, with the maps of their joints [J, H, W] and which of these count [J, 1]."""
 
@@ -81,6 +89,7 @@ class Crops(Dataset):
     def __getitem__(self, index: int) -> tuple[Any, ...]:
         angle = ROTATION * float(torch.randn(()).clamp(-2, 2))
         crop, joints = crop_of(self.items[index], angle, self._augmentation)
+        joints = facing(joints)
         cells = (joints - (STRIDE - 1) / 2) / STRIDE
         there = np.isfinite(cells).all(-1) & (cells > -0.5).all(-1) & (cells < SIDE / STRIDE - 0.5).all(-1)
         return crop, *heatmaps(np.nan_to_num(cells), there, SIDE // STRIDE, SIDE // STRIDE, SIGMA)

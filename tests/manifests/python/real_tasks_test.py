@@ -192,6 +192,18 @@ def test_the_better_of_both_sides_is_scored():
     np.testing.assert_array_equal(real_joints.either_way(one_arm, true), one_arm)  # wrong either way
 
 
+def test_sides_in_training_are_those_of_somebody_who_faces_the_camera():
+    front = standing()
+    back = front.copy()
+    back[RIGHT + LEFT] = front[LEFT + RIGHT]
+    crossed = front.copy()
+    wrists = [JOINTS.index("right_wrist"), JOINTS.index("left_wrist")]
+    crossed[wrists] = front[wrists[::-1]]
+    crossed[JOINTS.index("left_hip")] = math.nan
+    for given, expected in ((front, front), (back, front), (crossed, crossed)):
+        np.testing.assert_array_equal(real_joints.facing(given), expected)
+
+
 def test_scores_of_joints():
     """In crops: the torso is the distance of a shoulder from the other side's hip, (30, 40) px times 128 / 168; the
     head is 20 px times that from the middle of the shoulders."""
