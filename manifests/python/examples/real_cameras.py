@@ -120,7 +120,7 @@ def drawn_sensors() -> list[Row]:
 
 def in_layers() -> list[Row]:
     """Photographs in which objects move on their own, against those that move as one, and mixtures."""
-    alone = [(each,) for name in LAYERS for each in (name.split(", layers")[0], name)]
+    alone = [(each,) for name in LAYERS for each in (name.split(", layers")[0], name)] + [("grey frames",)]
     layers = "EventGAN 16, layers"
     mixed = [("EventGAN 16", layers), (layers, f"{layers}, rests 0"), ("EventGAN 16", f"{layers}, rests 0")]
     return [Row(f"{' and '.join(sources)}, augmented, {SENSOR_STEPS} steps", sources, steps=SENSOR_STEPS)
