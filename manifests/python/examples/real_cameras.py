@@ -49,6 +49,7 @@ LONGER = (3000, 1000)  # steps; the longest first, so that all processors are bu
 PLAIN = EventAugmentation(invert=0.5, scale=(0.7, 2.0), shift=0.15)
 FULL = train_detector.AUGMENTATION
 LAST_LAYER_STEPS = 200
+ALL = "all recordings"
 TUNED, CONSTANT = ", last layer tuned", "the same answer everywhere, of the test's own labels"
 IN_LAYERS = ("EventGAN 16, layers", "EventGAN 8, layers", "difference, layers", "ESIM, layers", "gradient, layers",
              "grey frames")
@@ -202,9 +203,10 @@ def train_and_test(args: argparse.Namespace, row: Row, seed: int) -> dict[str, A
 def parts_of(args: argparse.Namespace, row: Row) -> dict[str, list[Item]]:
     """What the row is tested on: of each recording it has not learnt from, the windows behind the first ones; these
     ("development"); its grey frames; and, where rows may learn from its first windows, those behind these
-    ("others")."""
-    found = {}
-    for recording in recordings_in(args, args.test):
+    ("others"). Of tasks other than persons also all recordings together."""
+    found: dict[str, list[Item]] = {ALL: []}
+    recordings = recordings_in(args, args.test)
+    for recording in recordings:
         name = recording.name
         windows = [_float(args, item) for item in test_items(args, recording, row.size(), row.signed)]
         kept, seen = development_windows(args, recording), 0
@@ -212,6 +214,8 @@ def parts_of(args: argparse.Namespace, row: Row) -> dict[str, list[Item]]:
             seen = args.task.learnt.get(name, 0)
         if args.test != args.real or f"real {name}" not in row.sources:
             found |= {name: windows[kept:], f"{name}, development": windows[:kept]}
+            if args.task.methods and len(recordings) > 1:  # few in each
+                found[ALL] += windows[kept:]
             if row.signed:
                 frames = test_items(args, recording, row.size(), shown="frames")
                 found[f"{name}, grey frames"] = [_float(args, item) for item in frames[kept:]]
