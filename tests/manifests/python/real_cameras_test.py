@@ -1,5 +1,5 @@
-"""manifests/python/examples/{labelled_events,labelled_recordings,real_cameras}.py, the task persons: boxes and events against what they are made of, and
-`experiment.py real --quick` where there is data."""
+"""manifests/python/examples/{labelled_events,labelled_recordings,real_cameras}.py, the task persons: boxes and events
+against what they are made of, and `experiment.py real --quick` where there is data."""
 
 import argparse
 import csv
@@ -123,7 +123,8 @@ def test_controls_are_of_the_frame(args):
 
 
 def test_windows_and_drawings_have_their_boxes_around_their_events(args):
-    drawn, windows, walking = labelled_recordings.recordings_in(args, args.real)  # in the other pictures nobody is seen
+    # in the other pictures nobody is seen
+    drawn, windows, walking = labelled_recordings.recordings_in(args, args.real)
     assert (drawn.name, windows.name, walking.name) == ("drawn", "windows", "walking")
     assert labelled_recordings.recordings_in(args, windows) == [windows]
     assert labelled_recordings.recordings_in(args, walking.parent) == [walking]
