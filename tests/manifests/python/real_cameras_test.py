@@ -116,7 +116,8 @@ def test_controls_are_of_the_frame(args):
     args.out.mkdir()
     sample = labelled_events.shards_of(args, "EventGAN 16")[0]
     grey, slope = labelled_events.grey(args, sample), labelled_events.gradient(args, sample)
-    assert grey.shape == slope.shape == (1, *labelled_recordings.SIZE) and np.abs(slope).max() == np.abs(grey).max() == 1
+    assert grey.shape == slope.shape == (1, *labelled_recordings.SIZE)
+    assert np.abs(slope).max() == np.abs(grey).max() == 1
     shown = np.abs(slope[0]).sum(1) > 0  # 100x260 in 192x320: 123 lines, the others are the letterbox's
     assert 120 <= shown.sum() <= 123 and not slope[0, :34].any() and not slope[0, -34:].any()
     np.testing.assert_array_equal(slope, labelled_events.gradient(args, sample))  # its direction is the sample's

@@ -237,16 +237,13 @@ def test_the_constant_pose_is_the_mean():
     np.testing.assert_allclose(first[RIGHT, 0], true[RIGHT, 0] - 5 * scale)
 
 
-def test_maps_give_back_the_joints():
+def test_maps_give_back_the_joints(monkeypatch):
     """Where the logits are what the loss wants, the joints are found to half a cell."""
     _, true = real_joints.crop_of(person(standing()))
     crops = real_joints.Crops([person(standing())], real_joints.EventAugmentation(flip=0))
-    crops._augmentation = None
-    monkey, real_joints.ROTATION = real_joints.ROTATION, 0
-    try:
-        _, maps, weight = crops[0]
-    finally:
-        real_joints.ROTATION = monkey
+    monkeypatch.setattr(crops, "_augmentation", None)
+    monkeypatch.setattr(real_joints, "ROTATION", 0)
+    _, maps, weight = crops[0]
     assert weight.min() == 1
     logits = torch.from_numpy(maps[None]).clamp(min=1e-6).log()
     [found] = real_joints.find(lambda _: logits, [person(standing())])
