@@ -4,6 +4,7 @@
 #   docker/bootstrap.sh test         the whole test suite
 #   docker/bootstrap.sh build        only the program, build/release/eventgan
 #   docker/bootstrap.sh package      Debian packages, build/release/*.deb: eventgan, eventgan-torch adds LibTorch, libeventgan1, its -dev, python3-eventgan
+#   docker/bootstrap.sh wheel        for any Linux, on Debian 12: build/wheel/*.whl for pip and *.tar.xz to unpack, without LibTorch
 #   docker/bootstrap.sh packages [LIST...]   only installs what is missing of docker/packages/LIST.txt (default: build test)
 # Run again, it does only what is left to do. JOBS sets the number of compilers at a time (default: all cores).
 set -euo pipefail
@@ -68,6 +69,19 @@ package() {
   (cd build/release && cpack)
 }
 
+# On Debian 12, the oldest of the tag: what is built there asks for no newer glibc.
+wheel() {
+  install_packages docker/packages/build.txt docker/packages/package.txt docker/packages/wheel.txt
+  say "building FFmpeg"
+  JOBS=$jobs docker/wheel/ffmpeg.sh build/wheel/ffmpeg
+  say "building"
+  PKG_CONFIG_PATH=$PWD/build/wheel/ffmpeg/lib/pkgconfig \
+    cmake --preset release -B build/wheel -DEVENTGAN_TESTS=OFF -DEVENTGAN_PORTABLE=ON
+  cmake --build build/wheel -j "$jobs" --target eventgan libeventgan
+  say "packing"
+  docker/wheel/pack.py build/wheel
+}
+
 demo() {
   local folder=${1:-demo} program=build/release/eventgan
   build_program
@@ -110,6 +124,7 @@ case "$task" in
   test) run_tests ;;
   build) build_program ;;
   package) package ;;
+  wheel) wheel ;;
   packages) packages "${@:2}" ;;
-  *) sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 64 ;;
+  *) sed -n '2,10s/^# \{0,1\}//p' "$0" >&2; exit 64 ;;
 esac

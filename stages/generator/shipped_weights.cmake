@@ -31,4 +31,10 @@ eventgan_shipped_end:
 ")
 set_source_files_properties(${assembly} PROPERTIES OBJECT_DEPENDS "${weights_files}")
 # Apart from the library, whose warnings are for C++.
-add_library(eventgan_shipped_weights OBJECT ${assembly})
+if(EVENTGAN_PORTABLE)  # beside the program and libeventgan, for both
+  add_library(eventgan_shipped_weights SHARED ${assembly})
+  set_target_properties(eventgan_shipped_weights PROPERTIES
+    OUTPUT_NAME eventgan-weights LINKER_LANGUAGE C LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR})
+else()
+  add_library(eventgan_shipped_weights OBJECT ${assembly})
+endif()
