@@ -11,8 +11,7 @@ set(opencv ${EVENTGAN_STATIC_opencv_imgproc} ${EVENTGAN_STATIC_opencv_core} even
            ${EVENTGAN_STATIC_blas} eventgan_stand_ins TBB::tbb ZLIB::ZLIB Threads::Threads ${CMAKE_DL_LIBS})
 set(EVENTGAN_OPENCV_VIDEO ${EVENTGAN_STATIC_opencv_video})
 
-# HDF5's plugins (Blosc, LZF) look for its functions, one of them for one that the program does not call.
-set(hdf5 "-Wl,--undefined=H5Epush1,--export-dynamic-symbol=H5*")
+set(hdf5)
 foreach(library IN LISTS HDF5_C_LIBRARIES)
   get_filename_component(folder ${library} DIRECTORY)
   if(library MATCHES "/libhdf5[^/]*\\.so$")
@@ -28,4 +27,4 @@ set(HDF5_C_LIBRARIES ${hdf5})
 set_target_properties(PkgConfig::matio PROPERTIES INTERFACE_LINK_LIBRARIES "${EVENTGAN_STATIC_matio};eventgan_hdf5")
 
 add_link_options(-Wl,--gc-sections)
-set(CMAKE_INSTALL_RPATH "$ORIGIN")  # the weights' library
+set(CMAKE_INSTALL_RPATH "$ORIGIN" ${ffmpeg_LIBRARY_DIRS})  # the weights' library, and FFmpeg's

@@ -23,8 +23,12 @@ file(CONFIGURE OUTPUT ${assembly} @ONLY CONTENT
   .section .data.rel.ro, \"aw\"
   .balign 8
   .globl eventgan_shipped_begin
+  .type eventgan_shipped_begin, %object
 eventgan_shipped_begin:
-@table@  .globl eventgan_shipped_end
+@table@  .size eventgan_shipped_begin, . - eventgan_shipped_begin
+  .globl eventgan_shipped_end
+  .type eventgan_shipped_end, %object
+  .size eventgan_shipped_end, 0
 eventgan_shipped_end:
   .section .rodata
 @content@  .section .note.GNU-stack, \"\", %progbits
