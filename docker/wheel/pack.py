@@ -20,6 +20,7 @@ import base64
 import csv
 import hashlib
 import io
+import lzma
 import os
 import pathlib
 import platform
@@ -42,7 +43,7 @@ LOWERED = {("libm.so.6", "GLIBC_2.35"): ("GLIBC_2.2.5", {"hypot", "hypotf"}),
            ("libstdc++.so.6", "GLIBCXX_3.4.30"):
                ("GLIBCXX_3.4.11", {"_ZNSt18condition_variable4waitERSt11unique_lockISt5mutexE"})}
 # Of what is packed. A wheel's deflate packs oneDNN to 11 MB, xz to 7.
-MOST_BYTES = {".whl": 55_000_000, ".xz": 42_000_000}
+MOST_BYTES = {".whl": 55_000_000, ".xz": 40_000_000}
 # Their licence asks nothing of what they are compiled into.
 HEADERS_ONLY_OF_THE_COMPILER = re.compile(r"glibc|linux|gcc-\d+")
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
@@ -295,10 +296,13 @@ def is_program(name: str) -> bool:
 
 
 def write_archive(tree: pathlib.Path, out: pathlib.Path, version: str) -> pathlib.Path:
-    """Likewise."""
+    """Likewise, and without owners and times."""
     name = f"eventgan-{version}-linux-{platform.machine()}"
     path = out / f"{name}.tar.xz"
-    with tarfile.open(path, "w:xz", preset=9, format=tarfile.PAX_FORMAT) as archive:
+    # Jumps in x86's code by where they lead, 4 % less. tar and xz read it as any other.
+    filters = [{"id": lzma.FILTER_X86}, {"id": lzma.FILTER_LZMA2, "preset": 9 | lzma.PRESET_EXTREME}]
+    with lzma.open(path, "w", filters=filters) as file, tarfile.open(fileobj=file, mode="w",
+                                                                    format=tarfile.PAX_FORMAT) as archive:
         for file, data, runs in files_of(tree):
             entry = tarfile.TarInfo(f"{name}/{file}")
             entry.size, entry.mode = len(data), 0o755 if runs else 0o644
