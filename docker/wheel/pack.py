@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""pack.py BUILD: what runs on any Linux, of a build with EVENTGAN_PORTABLE, in BUILD: a wheel for pip, and an archive to
-unpack. `docker/bootstrap.sh wheel` calls it.
+"""pack.py BUILD: what runs on any Linux, of a build with EVENTGAN_PORTABLE, in BUILD: a wheel for pip, and an archive
+to unpack. `docker/bootstrap.sh wheel` calls it.
 
 Both hold one tree, the wheel inside the Python package:
     bin/eventgan, lib/libeventgan.so.1    find what they load in lib/eventgan
@@ -34,8 +34,8 @@ import tomllib
 import zipfile
 
 # What every Linux of the tag has, in at least these versions: RHEL 9, Debian 12, Ubuntu 22.04, and what came later.
-SYSTEM = {"ld-linux-x86-64.so.2", "libc.so.6", "libdl.so.2", "libgcc_s.so.1", "libm.so.6", "libpthread.so.0", "librt.so.1",
-          "libstdc++.so.6"}
+SYSTEM = {"ld-linux-x86-64.so.2", "libc.so.6", "libdl.so.2", "libgcc_s.so.1", "libm.so.6", "libpthread.so.0",
+          "librt.so.1", "libstdc++.so.6"}
 NEWEST = {"GLIBC": (2, 34), "GLIBCXX": (3, 4, 29), "CXXABI": (1, 3, 13), "GCC": (11, 0)}
 TAG = f"manylinux_2_34_{platform.machine()}"
 # Functions that got another version for what no caller here sees (errno, noexcept), and the one that they had.
@@ -66,7 +66,8 @@ class Elf:
         self.path = path
         headers = said("objdump", "-p", path)
         self.needed = re.findall(r"(?m)^  NEEDED +(\S+)", headers)
-        self.searched = [place for text in re.findall(r"(?m)^  R(?:UN)?PATH +(\S+)", headers) for place in text.split(":")]
+        self.searched = [place for text in re.findall(r"(?m)^  R(?:UN)?PATH +(\S+)", headers)
+                         for place in text.split(":")]
         # [(library, version)]
         self.versions = []
         for library, lines in re.findall(r"(?m)^  required from (\S+):\n((?:    .*\n)+)", headers):
@@ -160,7 +161,8 @@ def install(build: pathlib.Path, tree: pathlib.Path) -> dict[str, pathlib.Path]:
     for path in [*own, *folder.iterdir()]:
         # One after the other: together, patchelf 0.14 takes one's text for another's.
         said("patchelf", *renamed, path)
-        said("patchelf", "--set-rpath", os.path.join("$ORIGIN", os.path.relpath(folder, path.parent)).removesuffix("/."), path)
+        place = os.path.join("$ORIGIN", os.path.relpath(folder, path.parent)).removesuffix("/.")
+        said("patchelf", "--set-rpath", place, path)
         lower_versions(path)
     return copies
 
@@ -168,11 +170,12 @@ def install(build: pathlib.Path, tree: pathlib.Path) -> dict[str, pathlib.Path]:
 def faults(tree: pathlib.Path) -> list[str]:
     """Why another Linux would not take it."""
     result = []
-    for path in sorted(path for path in tree.rglob("*") if path.is_file() and not path.is_symlink() and is_elf(path)):
+    for path in sorted(path for path in tree.rglob("*") if path.is_file() and is_elf(path)):
         elf, name = Elf(path), path.relative_to(tree)
         places = []
         for place in elf.searched:
-            inside = re.fullmatch(r"\$ORIGIN(/.*)?", place) and (path.parent / ("." + place.removeprefix("$ORIGIN"))).resolve()
+            inside = (re.fullmatch(r"\$ORIGIN(/.*)?", place) and
+                      (path.parent / ("." + place.removeprefix("$ORIGIN"))).resolve())
             if not inside or not inside.is_relative_to(tree.resolve()):
                 result.append(f"expected a search path inside, $ORIGIN, got {place}, in {name}")
             else:
@@ -181,18 +184,20 @@ def faults(tree: pathlib.Path) -> list[str]:
                    if library not in SYSTEM and not any((place / library).exists() for place in places)]
         for library, version in elf.versions:
             kind, _, number = version.partition("_")
-            if library in SYSTEM and (kind not in NEWEST or not re.fullmatch(r"[\d.]+", number) or
-                                      tuple(map(int, number.split("."))) > NEWEST[kind]):
-                result.append(f"expected no version newer than {kind}_{'.'.join(map(str, NEWEST.get(kind, ())))}, got {version} "
-                              f"of {library} ({', '.join(sorted(elf.users(version)))}), in {name}")
+            newest = NEWEST.get(kind, ())
+            known = re.fullmatch(r"[\d.]+", number) and tuple(map(int, number.split("."))) <= newest
+            if library in SYSTEM and not known:
+                result.append(f"expected no version newer than {kind}_{'.'.join(map(str, newest))}, got {version} of "
+                              f"{library} ({', '.join(sorted(elf.users(version)))}), in {name}")
     return result
 
 
 def owners(paths: set[str]) -> dict[str, str]:
     """The Debian packages of files."""
     result = {}
-    for line in subprocess.run(["dpkg-query", "--search", *sorted(paths)], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-                               text=True, check=False).stdout.splitlines():
+    done = subprocess.run(["dpkg-query", "--search", *sorted(paths)], stdout=subprocess.PIPE,
+                          stderr=subprocess.DEVNULL, text=True, check=False)  # it fails for what is nobody's
+    for line in done.stdout.splitlines():
         package, _, path = line.partition(": ")
         result[path] = package.split(",")[0]
     return result
@@ -239,7 +244,8 @@ def add_licences(build: pathlib.Path, tree: pathlib.Path, copies: dict[str, path
         texts.append(copyright.read_text(errors="replace"))
     # What Debian's files only point to.
     (folder / "common-licenses").mkdir()
-    for name in sorted({name for text in texts for name in re.findall(r"/usr/share/common-licenses/([A-Za-z0-9.+-]*[A-Za-z0-9])", text)}):
+    common = re.compile(r"/usr/share/common-licenses/([A-Za-z0-9.+-]*[A-Za-z0-9])")
+    for name in sorted({name for text in texts for name in common.findall(text)}):
         if pathlib.Path("/usr/share/common-licenses", name).exists():
             shutil.copyfile(f"/usr/share/common-licenses/{name}", folder / "common-licenses" / name)
         else:
@@ -248,11 +254,13 @@ def add_licences(build: pathlib.Path, tree: pathlib.Path, copies: dict[str, path
 
 
 def metadata(project: dict, version: str) -> str:
-    lines = ["Metadata-Version: 2.1", f"Name: {project['name']}", f"Version: {version}", f"Summary: {project['description']}",
+    lines = ["Metadata-Version: 2.1", f"Name: {project['name']}", f"Version: {version}",
+             f"Summary: {project['description']}", "License: MIT; GPL-2.0-or-later with FFmpeg and x264 inside",
              f"Requires-Python: {project['requires-python']}", "Requires-Dist: numpy", "Requires-Dist: h5py>=3",
              "Description-Content-Type: text/markdown"]
     for extra, packages in project["optional-dependencies"].items():
-        lines += [f"Provides-Extra: {extra}", *(f'Requires-Dist: {package}; extra == "{extra}"' for package in packages)]
+        lines.append(f"Provides-Extra: {extra}")
+        lines += [f'Requires-Dist: {package}; extra == "{extra}"' for package in packages]
     return "\n".join(lines) + "\n\n" + (SOURCE / "README.md").read_text(encoding="utf-8")
 
 
@@ -270,9 +278,9 @@ def write_wheel(tree: pathlib.Path, out: pathlib.Path, version: str) -> pathlib.
     content = []
     for name, data, runs in files_of(tree):
         content.append((f"eventgan/{name.removeprefix(package)}", data, runs and is_program(name)))
+    form = f"Wheel-Version: 1.0\nGenerator: eventgan\nRoot-Is-Purelib: false\nTag: py3-none-{TAG}\n"
     content += [(f"{info}/METADATA", metadata(project, version).encode(), False),
-                (f"{info}/WHEEL", f"Wheel-Version: 1.0\nGenerator: eventgan\nRoot-Is-Purelib: false\nTag: py3-none-{TAG}\n".encode(),
-                 False),
+                (f"{info}/WHEEL", form.encode(), False),
                 (f"{info}/entry_points.txt", b"[console_scripts]\neventgan = eventgan.__main__:main\n", False),
                 (f"{info}/LICENSE", (SOURCE / "LICENSE").read_bytes(), False)]
     record = io.StringIO()
@@ -301,8 +309,7 @@ def write_archive(tree: pathlib.Path, out: pathlib.Path, version: str) -> pathli
     path = out / f"{name}.tar.xz"
     # Jumps in x86's code by where they lead, 4 % less. tar and xz read it as any other.
     filters = [{"id": lzma.FILTER_X86}, {"id": lzma.FILTER_LZMA2, "preset": 9 | lzma.PRESET_EXTREME}]
-    with lzma.open(path, "w", filters=filters) as file, tarfile.open(fileobj=file, mode="w",
-                                                                    format=tarfile.PAX_FORMAT) as archive:
+    with lzma.LZMAFile(path, "w", filters=filters) as packed, tarfile.open(fileobj=packed, mode="w") as archive:
         for file, data, runs in files_of(tree):
             entry = tarfile.TarInfo(f"{name}/{file}")
             entry.size, entry.mode = len(data), 0o755 if runs else 0o644

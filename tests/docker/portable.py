@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """What `docker/bootstrap.sh wheel` packed, tried where nothing of it was built:
 
-    portable.py BUILD [RELEASE...]    the files of BUILD, in a bare Debian of each release (default: bookworm trixie sid)
+    portable.py BUILD [RELEASE...]    BUILD's files, in a bare Debian of each release (default: bookworm trixie sid)
 
 Each time a user without rights unpacks the archive where there is no Python, then installs the wheel where there is
 Python, NumPy and h5py: a dataset and a video are converted, finalized, reported, exported, the README's Python run, and
@@ -78,7 +78,8 @@ def differences(made, expected):
     """(the largest difference of any value, the number of values that differ at all)"""
     assert made.keys() == expected.keys(), (made.keys(), expected.keys())
     pairs = [(made[name], expected[name]) for name in made]
-    return (max(float(abs(one - other).max()) for one, other in pairs), sum(int((one != other).sum()) for one, other in pairs))
+    return (max(float(abs(one - other).max()) for one, other in pairs),
+            sum(int((one != other).sum()) for one, other in pairs))
 
 
 def do_job(folder, program):

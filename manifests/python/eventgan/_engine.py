@@ -12,7 +12,7 @@ _NAME = "libeventgan.so.1"
 
 
 def _library() -> ctypes.CDLL:
-    """Beside this file, as pip and a build lay it; below, in a wheel with the program; behind lib/python3/dist-packages;
+    """Beside this file, as pip and a build lay it; below, in the wheel with a program; behind python3/dist-packages;
     else the system's."""
     here = os.path.dirname(os.path.abspath(__file__))
     for place in (here, os.path.join(here, "lib"), os.path.join(here, "..", "..", "..")):
