@@ -3,13 +3,20 @@
 # GnuTLS, Kerberos and LDAP; OpenCV's core OpenGL and Fortran. LAPACK stays, for calibration.
 foreach(name IN ITEMS opencv_core opencv_imgproc opencv_video matio lapack_pic blas)
   find_library(EVENTGAN_STATIC_${name} lib${name}.a PATH_SUFFIXES blas REQUIRED)
+  add_library(static_${name} STATIC IMPORTED)
+  set_target_properties(static_${name} PROPERTIES IMPORTED_LOCATION ${EVENTGAN_STATIC_${name}})
 endforeach()
 
-add_library(eventgan_stand_ins STATIC docker/wheel/stand_ins.c)
+# Objects, which the linker takes before it looks into an archive.
+add_library(eventgan_stand_ins OBJECT docker/wheel/stand_ins.c)
 set_target_properties(eventgan_stand_ins PROPERTIES POSITION_INDEPENDENT_CODE ON)
-set(opencv ${EVENTGAN_STATIC_opencv_imgproc} ${EVENTGAN_STATIC_opencv_core} eventgan_stand_ins ${EVENTGAN_STATIC_lapack_pic}
-           ${EVENTGAN_STATIC_blas} eventgan_stand_ins TBB::tbb ZLIB::ZLIB Threads::Threads ${CMAKE_DL_LIBS})
-set(EVENTGAN_OPENCV_VIDEO ${EVENTGAN_STATIC_opencv_video})
+target_link_libraries(static_opencv_core INTERFACE
+  $<TARGET_OBJECTS:eventgan_stand_ins> static_lapack_pic TBB::tbb ZLIB::ZLIB Threads::Threads ${CMAKE_DL_LIBS})
+target_link_libraries(static_lapack_pic INTERFACE static_blas)
+target_link_libraries(static_opencv_imgproc INTERFACE static_opencv_core)
+target_link_libraries(static_opencv_video INTERFACE static_opencv_imgproc)
+set(opencv static_opencv_imgproc static_opencv_core)
+set(EVENTGAN_OPENCV_VIDEO static_opencv_video)
 
 set(hdf5)
 foreach(library IN LISTS HDF5_C_LIBRARIES)
@@ -24,7 +31,8 @@ foreach(library IN LISTS HDF5_C_LIBRARIES)
   list(APPEND hdf5 ${library})
 endforeach()
 set(HDF5_C_LIBRARIES ${hdf5})
-set_target_properties(PkgConfig::matio PROPERTIES INTERFACE_LINK_LIBRARIES "${EVENTGAN_STATIC_matio};eventgan_hdf5")
+target_link_libraries(static_matio INTERFACE ${hdf5})
+set_target_properties(PkgConfig::matio PROPERTIES INTERFACE_LINK_LIBRARIES "static_matio")
 
-add_link_options(-Wl,--gc-sections)
+add_link_options(-Wl,--gc-sections,--no-undefined)
 set(CMAKE_INSTALL_RPATH "$ORIGIN" ${ffmpeg_LIBRARY_DIRS})  # the weights' library, and FFmpeg's

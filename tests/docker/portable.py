@@ -137,7 +137,7 @@ def try_release(top, release, wheel, archive, expected):
 pip install --quiet --no-index --no-deps ./*.whl
 {JOB}
 python3 -m eventgan --version
-python3 try.py "$(echo lib/python3*/site-packages/eventgan/bin/eventgan)" | tee told""")
+python3 try.py "$(echo lib/python3*/site-packages/eventgan/bin/eventgan)" >told""")
     for name, those in {**expected, "again": expected["labelled"]}.items():
         assert differences(volumes(home / name), those) == (0, 0), (release, name)
     for name, took in re.findall(r"(?m)^start (\w+) (\S+)$", (home / "told").read_text()):
