@@ -28,6 +28,7 @@ void become(const eventgan::HandOver& other, char** argv) {
   std::error_code fault;
   fs::path self = fs::read_symlink("/proc/self/exe", fault);
   if (fault) {  // no /proc
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): the kernel has no other way to tell it
     self = fs::canonical(reinterpret_cast<const char*>(getauxval(AT_EXECFN)), fault);
   }
   // One that hands over to itself, as a copy of this program under the other's name would, for

@@ -99,6 +99,8 @@ std::vector<std::string> schema_faults(const LabelSchema& stored, const LabelSch
 Outcome<Annotation> read_annotation(const Dataset& dataset, const std::string& label_key) {
   try {
     return dataset.annotation(label_key);
+  } catch (const LimitReached&) {  // which says nothing of the label
+    throw;
   } catch (const std::exception& error) {  // a key that the source does not know any more
     return SampleFault{error_line(error)};
   }

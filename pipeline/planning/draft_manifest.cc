@@ -22,9 +22,9 @@
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
-#include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
 #include "pipeline/planning/make_plan.h"
+#include "pipeline/planning/outline_masks.h"
 #include "pipeline/planning/spread.h"
 #include "stages/frames/dataset.h"
 #include "stages/frames/dataset_kinds.h"
@@ -375,60 +375,6 @@ bool each_is_a_window(SourceSpec spec, const fs::path& folder, const Dataset& re
   return false;
 }
 
-double overlap_over_union(const Rectangle& a, const Rectangle& b) {
-  const auto area = [](const Rectangle& box) {
-    return std::max(box.right - box.left, 0.0) * std::max(box.bottom - box.top, 0.0);
-  };
-  const double common = area({std::max(a.left, b.left), std::max(a.top, b.top),
-                              std::min(a.right, b.right), std::min(a.bottom, b.bottom)});
-  return common / std::max(area(a) + area(b) - common, 1e-9);
-}
-
-/// Why masks that lie beside boxes are not those of their objects, as far as some images tell;
-/// empty if they are: those of most images can be read, what is around their objects is about the
-/// boxes, and where there are several boxes a mask has several objects.
-std::string outlines_fault(SourceSpec spec, const fs::path& folder) try {
-  constexpr std::size_t kMost = 8;
-  constexpr double kLeast = 0.7;
-  const auto outlined = open_dataset(spec, folder);
-  spec.outlines.reset();
-  const auto plain = open_dataset(spec, folder);
-  const auto& frames = plain->labelled_frames();
-  std::vector<double> overlaps;
-  std::vector<std::string> faults;
-  std::size_t fitting = 0, most_boxes = 0, most_objects = 0;
-  for (const std::size_t i : spread(kMost, frames.size())) {
-    if (is_fault(plain->annotation(frames[i].label_key))) continue;  // of the label
-    const Outcome<Annotation> read = outlined->annotation(frames[i].label_key);
-    if (is_fault(read)) {
-      faults.push_back(read.fault().reason);
-      continue;
-    }
-    std::size_t objects = 0;
-    for (const Box& box : read->boxes) {
-      if (box.outline.empty()) continue;
-      ++objects;
-      overlaps.push_back(overlap_over_union(box.xyxy, bounds(box.outline)));
-    }
-    if (objects > 0) ++fitting;
-    most_boxes = std::max(most_boxes, read->boxes.size());
-    most_objects = std::max(most_objects, objects);
-  }
-  if (faults.size() > fitting) return faults.front();
-  if (overlaps.empty()) return "";
-  const auto middle = overlaps.begin() + std::ssize(overlaps) / 2;
-  std::ranges::nth_element(overlaps, middle);
-  if (*middle < kLeast) {
-    return fmt::format("expected pixels all over the boxes, got an overlap of {:.2g}", *middle);
-  }
-  if (most_boxes > 1 && most_objects < 2) {
-    return fmt::format("expected a number for each box, got one beside {} boxes", most_boxes);
-  }
-  return "";
-} catch (const InputError& error) {
-  return error.what();
-}
-
 /// Whether each recording has frames: then an interval between two of them is a window.
 bool all_have_frames(const Dataset& recordings) {
   std::map<std::string_view, bool> has_frames;
@@ -674,7 +620,7 @@ ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const Draf
     };
     JobManifest alone = read_draft();
     if (alone.sources.front().outlines) {
-      const std::string fault = outlines_fault(alone.sources.front(), place.folder);
+      const std::string fault = masks_fault(alone.sources.front(), place.folder);
       if (!fault.empty()) {
         source.found.remarks.push_back("masks left out, since they do not fit the boxes: " + fault);
         source.found.labels->outlines.reset();

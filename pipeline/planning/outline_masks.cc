@@ -17,6 +17,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
+#include "pipeline/planning/spread.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/images/image_file.h"
@@ -243,6 +244,61 @@ std::string to_json(const OutlineMasksReport& report) {
                                {"faults", report.faults},
                                {"sources", sources}};
   return dump_json(json) + "\n";
+}
+
+namespace {
+
+double overlap_over_union(const Rectangle& a, const Rectangle& b) {
+  const auto area = [](const Rectangle& box) {
+    return std::max(box.right - box.left, 0.0) * std::max(box.bottom - box.top, 0.0);
+  };
+  const double common = area({std::max(a.left, b.left), std::max(a.top, b.top),
+                              std::min(a.right, b.right), std::min(a.bottom, b.bottom)});
+  return common / std::max(area(a) + area(b) - common, 1e-9);
+}
+
+}  // namespace
+
+std::string masks_fault(SourceSpec spec, const fs::path& folder) try {
+  constexpr std::size_t kMost = 8;
+  constexpr double kLeast = 0.7;
+  const auto outlined = open_dataset(spec, folder);
+  spec.outlines.reset();
+  const auto plain = open_dataset(spec, folder);
+  const auto& frames = plain->labelled_frames();
+  std::vector<double> overlaps;
+  std::vector<std::string> faults;
+  std::size_t fitting = 0, most_boxes = 0, most_objects = 0;
+  for (const std::size_t i : spread(kMost, frames.size())) {
+    if (is_fault(plain->annotation(frames[i].label_key))) continue;  // of the label
+    const Outcome<Annotation> read = outlined->annotation(frames[i].label_key);
+    if (is_fault(read)) {
+      faults.push_back(read.fault().reason);
+      continue;
+    }
+    std::size_t objects = 0;
+    for (const Box& box : read->boxes) {
+      if (box.outline.empty()) continue;
+      ++objects;
+      overlaps.push_back(overlap_over_union(box.xyxy, bounds(box.outline)));
+    }
+    if (objects > 0) ++fitting;
+    most_boxes = std::max(most_boxes, read->boxes.size());
+    most_objects = std::max(most_objects, objects);
+  }
+  if (faults.size() > fitting) return faults.front();
+  if (overlaps.empty()) return "";
+  const auto middle = overlaps.begin() + std::ssize(overlaps) / 2;
+  std::ranges::nth_element(overlaps, middle);
+  if (*middle < kLeast) {
+    return fmt::format("expected pixels all over the boxes, got an overlap of {:.2g}", *middle);
+  }
+  if (most_boxes > 1 && most_objects < 2) {
+    return fmt::format("expected a number for each box, got one beside {} boxes", most_boxes);
+  }
+  return "";
+} catch (const InputError& error) {
+  return error.what();
 }
 
 }  // namespace eventgan

@@ -60,4 +60,9 @@ std::string to_json(const OutlineMasksReport& report);
 OutlineMasksReport make_outline_masks(const JobManifest& manifest,
                                       const OutlineMasksOptions& options);
 
+/// Why the masks of a source (SourceSpec::outlines) are not those of the objects in its boxes, as
+/// far as some images tell; empty if they are: those of most images can be read, what is around
+/// their objects is about the boxes, and where there are several boxes a mask has several objects.
+std::string masks_fault(SourceSpec spec, const std::filesystem::path& folder);
+
 }  // namespace eventgan

@@ -222,7 +222,7 @@ class MethodMaker {
     for (const RealismMethod method : wanted) {
       switch (method) {
         case RealismMethod::kNetwork:
-          methods.push_back(network(std::move(opened)));
+          methods.push_back(network(opened));
           break;
         case RealismMethod::kDifference:
           methods.push_back(simulated(difference_scene()));
@@ -242,7 +242,8 @@ class MethodMaker {
     return frames_;
   }
 
-  std::unique_ptr<VolumeMethod> network(NamedNetwork opened) {
+  /// Takes the generator.
+  std::unique_ptr<VolumeMethod> network(NamedNetwork& opened) {
     const auto& told = options_.network_threshold;
     std::optional<ContrastThreshold> threshold;
     if (const auto learnt = opened.generator->thresholds()) {

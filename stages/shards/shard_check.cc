@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "stages/base/files/sha256.h"
 #include "stages/shards/detail/shard_reader.h"
@@ -198,6 +199,8 @@ std::vector<std::string> check_shard(const std::filesystem::path& shard,
   Check check(shard, record);
   try {
     return check.run();
+  } catch (const LimitReached&) {  // which says nothing of the shard
+    throw;
   } catch (const std::exception& error) {
     return check.stopped_by(error);
   }

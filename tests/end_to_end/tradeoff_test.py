@@ -130,7 +130,7 @@ class Tradeoff(program.InFolder):
     def test_what_cannot_be_is_refused(self):
         for option, value, word in [("methods", "magic", "expected one of network"),
                                     ("sizes", "1,0.5,1", "expected different"),
-                                    ("reference", "8,float32,9", "expected WEIGHTS"), ("out", "", "expected a folder"),
+                                    ("reference", "8,float32,9", "expected WEIGHTS"), ("out", "", "expected a value"),
                                     ("reference", "untrained:2,int8", "expected a configuration that can be run")]:
             with self.subTest(option=option, value=value):
                 _, error = self.tradeoff(**{option: value}, expect=64)
