@@ -7,6 +7,7 @@ import sys
 
 
 def main() -> None:
+    """Becomes the program, which gets this process's arguments."""
     program = os.path.join(os.path.dirname(__file__), "bin", "eventgan")
     if not os.path.exists(program):
         from .program import find_program  # takes a while to load
