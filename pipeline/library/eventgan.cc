@@ -24,6 +24,7 @@
 #include "pipeline/runtime/memory.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/exports/sampled_events.h"
+#include "stages/shards/codec/volume_codec.h"
 
 using eventgan::CallGate;
 using eventgan::PairEngine;
@@ -333,5 +334,23 @@ int eventgan_sample_events(const float* volume, int32_t bins, int32_t height, in
 }
 
 void eventgan_free_events(eventgan_event* events) { delete[] events; }
+
+int eventgan_decode(const void* chunk, uint64_t chunk_size, int32_t number_size,
+                    int32_t is_deflated, float scale, float* volume, uint64_t size) {
+  return result_of([&] {
+    const CallGate::Pass pass;
+    constexpr std::array kTypes{StoredType::kUint8, StoredType::kFloat16, StoredType::kFloat32};
+    const auto type = std::ranges::find(kTypes, static_cast<std::size_t>(number_size), stored_size);
+    if (number_size < 0 || type == kTypes.end()) {
+      throw UsageError("expected numbers of 1, 2 or 4 bytes, got " + std::to_string(number_size));
+    }
+    const auto* const bytes = static_cast<const std::byte*>(required(chunk, "a chunk"));
+    if (!decode_volume({bytes, chunk_size}, *type, is_deflated ? 1 : 0, scale,
+                       {required(volume, "memory for a volume"), size})) {
+      throw InputError("expected an intact volume of " + std::to_string(size) +
+                       " values, got a damaged one");
+    }
+  });
+}
 
 void eventgan_end() { CallGate::instance().end(); }

@@ -143,6 +143,13 @@ EVENTGAN_API int eventgan_sample_events(const float* volume, int32_t bins, int32
 
 EVENTGAN_API void eventgan_free_events(eventgan_event* events);
 
+/* Decodes a volume of a shard: `chunk` is what events/volume holds of it (H5Dread_chunk), stored as
+ * numbers of 1 byte (uint8), 2 (float16) or 4 (float32) that went through HDF5's filters shuffle,
+ * deflate (if `is_deflated`) and fletcher32. volume[i] = scale * number i; `size`: how many there
+ * are. EVENTGAN_INPUT_MISSING if the chunk is damaged, or of another size. */
+EVENTGAN_API int eventgan_decode(const void* chunk, uint64_t chunk_size, int32_t number_size,
+                                 int32_t is_deflated, float scale, float* volume, uint64_t size);
+
 /* For a process that is about to end while other threads of it may still call: waits for the pairs
  * they are at, and holds what they call from now on for ever. The calling thread goes on. */
 EVENTGAN_API void eventgan_end(void);

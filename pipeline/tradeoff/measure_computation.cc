@@ -30,6 +30,16 @@ std::vector<float> comparable(std::vector<float> volume, bool is_counts) {
   return is_counts ? normalized(std::move(volume)) : volume;
 }
 
+/// What a chunk that was just made is read as.
+std::vector<float> decoded(std::span<const std::byte> chunk, StoredType type, int deflate_level,
+                           float scale, const VolumeShape& shape) {
+  std::vector<float> volume(shape.value_count());
+  if (!decode_volume(chunk, type, deflate_level, scale, volume)) {
+    throw std::logic_error("expected the chunk that was made, got a damaged one");
+  }
+  return volume;
+}
+
 /// A job as one configuration runs it.
 struct Runner {
   JobManifest manifest;
@@ -47,11 +57,9 @@ struct Runner {
     const VolumeShape shape{manifest.volume.bins, message.shard->volume_size};
     stages.finish(message);
     if (message.failed()) return {};
-    const StoredType type = manifest.output.dtype;
-    const auto bytes = decode_chunk(message.chunk, type, manifest.output.deflate_level,
-                                    shape.value_count() * stored_size(type));
     return comparable(
-        dequantize(bytes.value(), type, message.sample.scale),
+        decoded(message.chunk, manifest.output.dtype, manifest.output.deflate_level,
+                message.sample.scale, shape),
         !has_weights(manifest.generator.kind) && manifest.volume.normalize == Normalization::kNone);
   }
 };
@@ -254,9 +262,7 @@ std::vector<RealismScores> real_scores(const RealPart& part, const JobManifest& 
     }
     for (std::size_t k = 0; k < dtypes.size(); ++k) {
       const EncodedVolume stored = VolumeCodec(dtypes[k], 0).encode(generated);
-      const auto bytes = decode_chunk(stored.chunk, dtypes[k], 0,
-                                      own_shape.value_count() * stored_size(dtypes[k]));
-      std::vector<float> volume = dequantize(bytes.value(), dtypes[k], stored.scale);
+      std::vector<float> volume = decoded(stored.chunk, dtypes[k], 0, stored.scale, own_shape);
       if (!has_weights(job.generator.kind)) volume = normalized(std::move(volume));
       volume = on_grid(std::move(volume), shape.channels(), from, to);
       scores[k][i] =

@@ -254,19 +254,20 @@ std::vector<float> ShardReader::volume(int slot) const {
   state_->check_slot(slot);
   const ShardFile& shard = state_->shard;
   const float scale = shard.tables.events.scale[static_cast<std::size_t>(slot)];
+  std::vector<float> volume(shard.header.volume.value_count());
   // Inflated here, which threads can do side by side. Where no chunk was written, or it is not as
   // it should be, HDF5 has the word.
   try {
-    const std::vector<std::byte> chunk = state_->chunk_if_own(slot);
-    if (const auto numbers = decode_chunk(chunk, shard.header.dtype, shard.header.deflate_level,
-                                          stored_volume_size(shard.header))) {
-      return dequantize(*numbers, shard.header.dtype, scale);
+    if (decode_volume(state_->chunk_if_own(slot), shard.header.dtype, shard.header.deflate_level,
+                      scale, volume)) {
+      return volume;
     }
   } catch (const Hdf5Error&) {  // the same again, in HDF5's words
   }
   const Hdf5Lock lock;
   try {
-    return dequantize(read_stored_volume(shard, slot), shard.header.dtype, scale);
+    dequantize(read_stored_volume(shard, slot), shard.header.dtype, scale, volume);
+    return volume;
   } catch (const Hdf5Error& error) {
     throw std::runtime_error(state_->path + ": " + error.what());
   }

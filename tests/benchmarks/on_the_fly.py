@@ -68,7 +68,7 @@ def measure(bench):
         from eventgan import Generator, Shards
     except ImportError as error:
         return Section("On the fly", f"Skipped: {error}", [])
-    from eventgan.torch import FramePairs
+    from eventgan.torch import FramePairs, HalfVolumes
 
     originals, what = original_frames(bench)
     folders = {"as they are": link_frames(bench.scratch / "frames", originals, settings.pairs + 1)}
@@ -92,6 +92,8 @@ def measure(bench):
     stored = bench.scratch / "shards"
     convert(bench.program, next(iter(jobs.values())), lambda folder: shutil.copytree(folder, stored))
     datasets["Shards, uint8, deflate level 1"] = Stored(Shards(stored, fields=["volume"], partial=True))
+    datasets |= {f"{name}, HalfVolumes": HalfVolumes(dataset) for name, dataset in datasets.items()
+                 if not name.endswith("of the volume's size")}
 
     os.environ.pop("OMP_NUM_THREADS", None)  # for the workers
     contenders = {name: lambda workers, dataset=dataset: pairs_a_second(dataset, settings.batch, workers)

@@ -406,6 +406,7 @@ def main(folder):
                      b"c.png,,,,,,\r\n",
         "csv/faults": b"class,bottom,right,top,left,image\ncar,4,3,2,1,a\ncar,4,nan,2,1,b\n,,,,,a\n,4,3,2,1,c\n",
         "csv/quotes": b'image,class,left,top,right,bottom\n"a,""b\n"c,d,1,2,3,4\n',
+        "csv/nul": b"image,class,left,top,right,bottom,note\na,car,1,2,3,4,\0\n",
         "coco/instances": coco({}),
         "coco/persons": coco({"keypoints": [1, 2, 2, 0, 0, 0], "num_keypoints": 1}, {"keypoints": ["nose", "tail"]}),
         "coco/segments": coco({"segmentation": {"counts": "a", "size": [3, 4]}, "area": 1.5, "iscrowd": 1}),

@@ -35,8 +35,8 @@ from .frame_pairs import FrameAugmentation, FramePairs
 from .shards import Shards
 
 __all__ = [
-    "DetectionDataset", "EventAugmentation", "FrameAugmentation", "FramePairs", "Item", "KeypointDataset",
-    "PoseAugmentation", "PoseDataset", "collate_torchvision", "collate_yolo", "exchange_first_convolution", "fitted",
+    "DetectionDataset", "EventAugmentation", "FrameAugmentation", "FramePairs", "HalfVolumes", "Item",
+    "KeypointDataset", "PoseAugmentation", "PoseDataset", "collate_torchvision", "collate_yolo", "exchange_first_convolution", "fitted",
     "flip_pairs", "heatmaps", "inverse", "mixture", "move_boxes", "move_points", "warp",
 ]
 
@@ -126,7 +126,7 @@ def collate_yolo(items: Sequence[Item]) -> tuple[torch.Tensor, torch.Tensor, lis
     Returns
     -------
     imgs : torch.Tensor
-        float32 [N, 2B, H, W].
+        float32 [N, 2B, H, W]; float16 of HalfVolumes.
     targets : torch.Tensor
         float32 [n, 6]: number of the image in the batch, class, and centre x, centre y, width, height as shares of W
         and H, 0..1.
@@ -491,6 +491,37 @@ def heatmaps(joints: np.ndarray, annotated: np.ndarray, height: int,
     along_y = np.exp(-(y**2) / (2 * sigma**2)) * (np.abs(y) <= reach)
     maps = along_y[:, :, None] * along_x[:, None, :] * weight[:, None, None]
     return maps.astype(np.float32), weight[:, None].astype(np.float32)
+
+
+class HalfVolumes(Dataset):
+    """Another dataset with volumes of float16: half as many bytes for the workers of a DataLoader to move, which take
+    longer to move a large volume than to read it. The trainer makes them float32 again on its device: `imgs.float()`.
+
+    Volumes of shards with float16 keep their values unless they are augmented; others are rounded as in such shards:
+    to 11 bits, and to 65504 at most.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        One of these: its items are dictionaries with a `volume`, or tuples with a volume in front.
+    """
+
+    def __init__(self, dataset: Dataset) -> None:
+        self._dataset: Any = dataset
+
+    def __len__(self) -> int:
+        return len(self._dataset)
+
+    def __getitem__(self, index: int) -> Any:
+        item = self._dataset[index]
+        if isinstance(item, Mapping):
+            return {**item, "volume": _half(item["volume"])}
+        return _half(item[0]), *item[1:]
+
+
+def _half(volume: torch.Tensor) -> torch.Tensor:
+    largest = torch.finfo(torch.float16).max
+    return volume.clamp(-largest, largest).half()
 
 
 def mixture(datasets: Iterable[Dataset], shares: Sequence[float], length: int | None = None,

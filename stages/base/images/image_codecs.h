@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "manifests/values/frames.h"
@@ -80,17 +81,35 @@ ImageSize turned(ImageSize stored, int orientation);
 /// than `most` bytes. Thread safe.
 Buffer whole_file(std::FILE* file, std::size_t most);
 
-/// The same PNG with its pixel data no longer compressed (one chunk of "stored" deflate blocks, RFC
-/// 1951 section 3.2.4; other chunks that decide the pixels byte for byte, the rest gone), so that
-/// libpng has nothing left to inflate: libdeflate does that much faster than the zlib that libpng
-/// uses, but only for data that lies in memory as a whole.
+/// The pixels of a PNG: [y, x, sample], 8 or 16 bits a sample (big endian). The samples are grey,
+/// red green blue, or a number in a palette, and alpha after the first two; a palette is [colour,
+/// 3] uint8, red green blue.
+struct PngPixels {
+  ImageSize size;
+  int samples = 0;  ///< 1 to 4
+  int bits = 8;
+  bool has_palette = false;
+  Buffer palette;  ///< colours may suggest one, too
+  Buffer rows;     ///< a byte in front of each row means nothing
+
+  std::size_t pixel_bytes() const { return static_cast<std::size_t>(samples * bits / 8); }
+  std::size_t row_bytes() const { return static_cast<std::size_t>(size.width) * pixel_bytes(); }
+  std::span<std::uint8_t> row(int y) {
+    return std::span(rows).subspan(static_cast<std::size_t>(y) * (1 + row_bytes()) + 1,
+                                   row_bytes());
+  }
+};
+
+/// Decodes a PNG from memory as a whole, which takes half of libpng's time: Debian's inflates by
+/// zlib, and undoes the filters byte by byte.
 ///
-/// Empty if there is any doubt about the file, or if it or its pixel data takes more than 256 MiB:
-/// then libpng should read the file itself and judge it. Without doubt means: a header of an image
-/// within kMaxImagePixels that is not interlaced, whole chunks up to the end chunk, all pixel data
-/// in one run, every checksum (CRC-32 of each chunk that decides the pixels, Adler-32 of the pixel
+/// Nothing if there is any doubt about the file, if its samples have fewer than 8 bits, or if it or
+/// its pixels take more than 256 MiB: then libpng should read the file itself and judge it. Without
+/// doubt means: a header of an image within kMaxImagePixels that is not interlaced, whole chunks up
+/// to the end chunk, all pixel data in one run, no other chunk that decides the pixels but one
+/// palette, every checksum (CRC-32 of each chunk that decides the pixels, Adler-32 of the pixel
 /// data) right, and exactly as much data as the header says. Where the file is open at afterwards
 /// is undefined. Thread safe.
-Buffer stored_png(std::FILE* file);
+std::optional<PngPixels> whole_png(std::FILE* file);
 
 }  // namespace eventgan

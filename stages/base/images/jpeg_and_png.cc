@@ -1,4 +1,3 @@
-#include <libdeflate.h>
 #include <png.h>
 
 #include <algorithm>
@@ -182,147 +181,15 @@ std::string encode_jpeg(const ColourView& image, int quality) {
 
 namespace {
 
-constexpr std::size_t kSignatureBytes = 8;
-constexpr std::size_t kAroundData = 12;         // of a chunk: length, type, checksum
-constexpr std::size_t kMostInMemory = 1 << 28;  // beyond, libpng reads piece by piece
-constexpr std::size_t kLargestStored = 0xffff;  // bytes of one stored block
-constexpr std::size_t kMostPerByte = 1032;      // deflate cannot shrink further
-
-std::uint32_t big_endian(const std::uint8_t* bytes) {
-  return std::uint32_t{bytes[0]} << 24 | std::uint32_t{bytes[1]} << 16 |
-         std::uint32_t{bytes[2]} << 8 | std::uint32_t{bytes[3]};
-}
-
-void append_big_endian(std::uint32_t value, Buffer& bytes) {
-  for (int shift = 24; shift >= 0; shift -= 8) {
-    bytes.push_back(static_cast<std::uint8_t>(value >> shift));
-  }
-}
-
-/// What the header's 13 bytes say of the size of the pixel data: each row has a byte in front that
-/// names its filter. 0 if they are not sound, or the rows are interlaced.
-std::size_t pixel_data_bytes(const std::uint8_t* header) {
-  const std::size_t width = big_endian(header);
-  const std::size_t height = big_endian(header + 4);
-  const std::uint8_t bits = header[8];
-  const std::uint8_t kind = header[9];
-  constexpr std::array<std::uint8_t, 7> kChannels{1, 0, 3, 1, 2, 0, 4};
-  const bool interlaced = header[12] != 0;
-  if (width > kMaxImagePixels || height > kMaxImagePixels || width * height > kMaxImagePixels ||
-      bits > 16 || kind >= kChannels.size() || interlaced) {
-    return 0;
-  }
-  return height * (1 + (width * kChannels[kind] * bits + 7) / 8);
-}
-
-/// Appends a chunk IDAT whose zlib stream has the same data in stored blocks. False if `compressed`
-/// is not sound, or not `raw_bytes` when inflated.
-bool append_stored(const Buffer& compressed, std::size_t raw_bytes, Buffer& png) {
-  if (raw_bytes == 0 || raw_bytes > std::min(kMostPerByte * compressed.size(), kMostInMemory)) {
-    return false;
-  }
-  // chunk length, type | zlib header | blocks: header of 5 bytes, data | Adler-32 | CRC-32
-  const std::size_t blocks = (raw_bytes + kLargestStored - 1) / kLargestStored;
-  const std::size_t data_bytes = 2 + 5 * blocks + raw_bytes + 4;
-  append_big_endian(static_cast<std::uint32_t>(data_bytes), png);
-  for (const char byte : std::string_view("IDAT\x78\x01")) {
-    png.push_back(static_cast<std::uint8_t>(byte));
-  }
-  const std::size_t start = png.size();
-  png.resize(start + data_bytes - 2);
-
-  // Inflated behind the room for the blocks' headers, then moved forward block by block.
-  std::uint8_t* to = png.data() + start;
-  const std::uint8_t* raw = to + 5 * blocks;
-  const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)>
-      decompressor(libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
-  std::size_t used = 0;
-  if (decompressor == nullptr ||
-      libdeflate_zlib_decompress_ex(decompressor.get(), compressed.data(), compressed.size(),
-                                    to + 5 * blocks, raw_bytes, &used,
-                                    nullptr) != LIBDEFLATE_SUCCESS ||
-      used != compressed.size()) {
-    return false;
-  }
-  for (std::size_t left = raw_bytes; left > 0;) {
-    const std::size_t size = std::min(left, kLargestStored);
-    left -= size;
-    *to++ = left == 0 ? 1 : 0;  // the last block
-    for (const std::size_t length : {size, ~size}) {
-      *to++ = static_cast<std::uint8_t>(length);
-      *to++ = static_cast<std::uint8_t>(length >> 8);
-    }
-    std::memmove(to, raw, size);
-    to += size;
-    raw += size;
-  }
-  std::copy(compressed.end() - 4, compressed.end(), to);  // the same Adler-32
-  append_big_endian(libdeflate_crc32(0, png.data() + start - 6, 4 + data_bytes), png);
-  return true;
-}
-
-}  // namespace
-
-Buffer stored_png(std::FILE* stream) {
-  const Buffer file = whole_file(stream, kMostInMemory);
-  Buffer before;  // up to the pixel data
-  Buffer compressed;
-  compressed.reserve(file.size());
-  Buffer after;  // from the pixel data on
-  bool data_ended = false;
-  std::size_t raw_bytes = 0;
-  for (std::size_t at = kSignatureBytes; file.size() >= at + kAroundData;) {
-    const std::uint8_t* const chunk = file.data() + at;
-    const std::size_t length = big_endian(chunk);
-    if (length > file.size() - at - kAroundData) return {};
-    const std::string_view type(reinterpret_cast<const char*>(chunk) + 4, 4);
-    const std::uint8_t* const data = chunk + 8;
-    const bool is_first = at == kSignatureBytes;
-    at += length + kAroundData;
-    if (type == "IDAT" && data_ended) return {};  // in two runs
-    data_ended = type != "IDAT" && !compressed.empty();
-    if ((type[0] & 0x20) != 0) continue;  // says nothing of the pixels
-    if (libdeflate_crc32(0, chunk + 4, length + 4) != big_endian(data + length)) return {};
-    if (is_first != (type == "IHDR") || (is_first && length != 13)) return {};
-    if (is_first) raw_bytes = pixel_data_bytes(data);
-    if (type == "IDAT") {
-      compressed.insert(compressed.end(), data, data + length);
-      continue;
-    }
-    Buffer& part = compressed.empty() ? before : after;
-    part.insert(part.end(), chunk, data + length + 4);
-    if (type != "IEND") continue;
-    Buffer png;
-    png.reserve(file.size() - compressed.size() + raw_bytes + raw_bytes / 1024);
-    png.insert(png.end(), file.begin(), file.begin() + kSignatureBytes);
-    png.insert(png.end(), before.begin(), before.end());
-    if (!append_stored(compressed, raw_bytes, png)) return {};
-    png.insert(png.end(), after.begin(), after.end());
-    return png;
-  }
-  return {};
-}
-
-namespace {
-
 [[noreturn]] void leave_with_message(png_structp png, png_const_charp message) {
   static_cast<Escape*>(png_get_error_ptr(png))->leave(message);
 }
 
 void ignore_warning(png_structp, png_const_charp) {}
 
-void read_from_memory(png_structp png, png_bytep to, std::size_t count) {
-  auto& left = *static_cast<std::span<const std::uint8_t>*>(png_get_io_ptr(png));
-  if (count > left.size()) png_error(png, "Read Error");
-  std::memcpy(to, left.data(), count);
-  left = left.subspan(count);
-}
-
 class PngFile {
  public:
-  /// Reads `file`, or `stored` unless that is empty: the same file with its pixel data inflated.
-  explicit PngFile(std::FILE* file, Buffer stored = {})
-      : stored_(std::move(stored)), left_(stored_) {
+  explicit PngFile(std::FILE* file) {
     run_guarded(escape_, [&] {
       png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, &escape_, leave_with_message,
                                     ignore_warning);
@@ -330,10 +197,6 @@ class PngFile {
       info_ = png_create_info_struct(png_);
       if (info_ == nullptr) escape_.leave("cannot start libpng");
       png_init_io(png_, file);
-      if (!stored_.empty()) {
-        png_set_read_fn(png_, &left_, read_from_memory);
-        png_set_crc_action(png_, PNG_CRC_QUIET_USE, PNG_CRC_DEFAULT);  // compared already
-      }
       // What is said beside the pixels (colour profiles, text) may be damaged, the pixels may not.
       png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
       png_set_benign_errors(png_, 0);
@@ -464,25 +327,89 @@ class PngFile {
     png_set_interlace_handling(png_);
   }
 
-  Buffer stored_;
-  std::span<const std::uint8_t> left_;  ///< of it
   Escape escape_;
   png_structp png_ = nullptr;
   png_infop info_ = nullptr;
 };
 
+/// The colours of pixels, the upper 8 bits of each sample: sample k * kNext of every pixel of
+/// kPixelBytes is red, green, blue.
+template <int kPixelBytes, int kNext>
+ColourFrame take_colours(PngPixels& pixels) {
+  ColourFrame frame{pixels.size, {}};
+  frame.bgr.resize(3 * pixels.size.pixel_count());
+  std::uint8_t* to = frame.bgr.data();
+  for (int y = 0; y < pixels.size.height; ++y) {
+    const std::uint8_t* from = pixels.row(y).data();
+    for (int x = 0; x < pixels.size.width; ++x, from += kPixelBytes, to += 3) {
+      for (int channel = 0; channel < 3; ++channel) to[2 - channel] = from[channel * kNext];
+    }
+  }
+  return frame;
+}
+
+/// Nothing if a pixel is a colour that the palette does not have.
+std::optional<ColourFrame> look_up_colours(PngPixels& pixels) {
+  ColourFrame frame = take_colours<1, 0>(pixels);
+  for (std::size_t i = 0; i < frame.bgr.size(); i += 3) {
+    const std::size_t colour = 3 * std::size_t{frame.bgr[i]};
+    if (colour >= pixels.palette.size()) return std::nullopt;
+    for (std::size_t k = 0; k < 3; ++k) frame.bgr[i + 2 - k] = pixels.palette[colour + k];
+  }
+  return frame;
+}
+
+std::optional<ColourFrame> colours_of(PngPixels& pixels) {
+  if (pixels.has_palette) return look_up_colours(pixels);
+  switch (10 * pixels.samples + pixels.bits / 8) {
+    case 11:
+      return take_colours<1, 0>(pixels);
+    case 12:
+    case 21:
+      return take_colours<2, 0>(pixels);
+    case 22:
+      return take_colours<4, 0>(pixels);
+    case 31:
+      return take_colours<3, 1>(pixels);
+    case 32:
+      return take_colours<6, 2>(pixels);
+    case 41:
+      return take_colours<4, 1>(pixels);
+    default:
+      return take_colours<8, 2>(pixels);
+  }
+}
+
+/// Nothing of colours without a palette.
+std::optional<IndexImage> indices_of(PngPixels& pixels) {
+  if (pixels.samples > 2) return std::nullopt;
+  IndexImage image{pixels.size, {}, pixels.bits, pixels.has_palette};
+  image.indices.reserve(pixels.size.pixel_count());
+  for (int y = 0; y < pixels.size.height; ++y) {
+    const std::span<const std::uint8_t> row = pixels.row(y);
+    for (std::size_t x = 0; x < row.size(); x += pixels.pixel_bytes()) {
+      image.indices.push_back(pixels.bits == 8 ? row[x] : std::uint16_t(256 * row[x] + row[x + 1]));
+    }
+  }
+  return image;
+}
+
 }  // namespace
 
 ColourFrame decode_png(std::FILE* file) {
-  Buffer stored = stored_png(file);
+  if (auto pixels = whole_png(file)) {
+    if (auto frame = colours_of(*pixels)) return std::move(*frame);
+  }
   std::rewind(file);
-  return PngFile(file, std::move(stored)).read();
+  return PngFile(file).read();
 }
 
 IndexImage decode_index_png(std::FILE* file) {
-  Buffer stored = stored_png(file);
+  if (auto pixels = whole_png(file)) {
+    if (auto image = indices_of(*pixels)) return std::move(*image);
+  }
   std::rewind(file);
-  return PngFile(file, std::move(stored)).read_indices();
+  return PngFile(file).read_indices();
 }
 
 std::optional<WideFrame> decode_wide_png(std::FILE* file) { return PngFile(file).read_wide(); }

@@ -225,8 +225,12 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
     Outcome<ImageRows>& image = images[std::string(row[kImage])];
     if (is_fault(image)) continue;
     auto& rows = *image;
-    rows.labels().original.append(record->bytes);
     try {
+      // Some columns are not read, but all are kept.
+      if (record->bytes.find('\0') != std::string::npos) {
+        throw BadLabel("expected text, got a NUL in it");
+      }
+      rows.labels().original.append(record->bytes);
       rows.add(row, has_sides, separator);
       if (rows.labels().boxes.empty()) continue;
       const Rectangle& box = rows.labels().boxes.back().box.xyxy;

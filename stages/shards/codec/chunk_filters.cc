@@ -30,6 +30,19 @@ void split(std::span<const Number> numbers, std::byte* planes, std::size_t plane
   }
 }
 
+template <class Number>
+void join(const std::byte* planes, std::size_t plane_size, std::span<Number> numbers) {
+  Number* __restrict out = numbers.data();
+  for (std::size_t byte = 0; byte < sizeof(Number); ++byte) {
+    const std::byte* __restrict in = planes + byte * plane_size;
+    const int shift = static_cast<int>(8 * byte);
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const auto part = static_cast<Number>(static_cast<Number>(in[i]) << shift);
+      out[i] = byte == 0 ? part : static_cast<Number>(out[i] | part);
+    }
+  }
+}
+
 }  // namespace
 
 EVENTGAN_CLONES void split_into_planes(std::span<const std::uint16_t> numbers, std::byte* planes,
@@ -40,6 +53,16 @@ EVENTGAN_CLONES void split_into_planes(std::span<const std::uint16_t> numbers, s
 EVENTGAN_CLONES void split_into_planes(std::span<const std::uint32_t> numbers, std::byte* planes,
                                        std::size_t plane_size) {
   split(numbers, planes, plane_size);
+}
+
+EVENTGAN_CLONES void join_planes(const std::byte* planes, std::size_t plane_size,
+                                 std::span<std::uint16_t> numbers) {
+  join(planes, plane_size, numbers);
+}
+
+EVENTGAN_CLONES void join_planes(const std::byte* planes, std::size_t plane_size,
+                                 std::span<std::uint32_t> numbers) {
+  join(planes, plane_size, numbers);
 }
 
 Deflater::Deflater(int level) {

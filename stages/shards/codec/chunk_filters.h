@@ -22,6 +22,11 @@ void split_into_planes(std::span<const std::uint16_t> numbers, std::byte* planes
 void split_into_planes(std::span<const std::uint32_t> numbers, std::byte* planes,
                        std::size_t plane_size);
 
+/// The other way: numbers from the bytes at planes[b * plane_size + i].
+void join_planes(const std::byte* planes, std::size_t plane_size, std::span<std::uint16_t> numbers);
+
+void join_planes(const std::byte* planes, std::size_t plane_size, std::span<std::uint32_t> numbers);
+
 /// Compresses into zlib's format, again and again with the same memory: at level 1 by runs of zeros
 /// alone (run_deflate.h), above with libdeflate. What comes out depends on the bytes and the level
 /// alone. Thread safety: one thread at a time.

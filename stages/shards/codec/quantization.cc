@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
-#include <stdexcept>
 
 #include "stages/base/processor_clones.h"
 #include "stages/shards/codec/chunk_filters.h"
@@ -56,6 +55,17 @@ __attribute__((target("avx,f16c"))) std::size_t convert_eights(std::span<const f
   return i;
 }
 
+/// Converts the largest multiple of 8 halves with F16C; returns how many.
+__attribute__((target("avx,f16c"))) std::size_t convert_eights(
+    std::span<const std::uint16_t> halves, float* values) {
+  std::size_t i = 0;
+  for (; i + 8 <= halves.size(); i += 8) {
+    const auto* const eight = reinterpret_cast<const __m128i*>(halves.data() + i);
+    _mm256_storeu_ps(values + i, _mm256_cvtph_ps(_mm_loadu_si128(eight)));
+  }
+  return i;
+}
+
 /// Not by __builtin_cpu_supports alone: Clang learnt the word "f16c" late.
 bool has_f16c() {
   unsigned a = 0, b = 0, c = 0, d = 0;
@@ -92,6 +102,17 @@ float from_half(std::uint16_t half) {
     bits = std::bit_cast<std::uint32_t>(static_cast<float>(magnitude) * 0x1p-24f);
   }
   return std::bit_cast<float>(bits | sign);
+}
+
+void from_halves(std::span<const std::uint16_t> halves, float* values) {
+#if defined(__x86_64__)
+  if (kHasConversion) {
+    const std::size_t done = convert_eights(halves, values);
+    halves = halves.subspan(done);
+    values += done;
+  }
+#endif
+  for (const std::uint16_t half : halves) *values++ = from_half(half);
 }
 
 namespace {
@@ -132,17 +153,11 @@ float uint8_scale(float largest) {
   return std::max(largest / 255, std::numeric_limits<float>::min());
 }
 
-template <class Code, class Decode>
-std::vector<float> decode_each(std::span<const std::byte> bytes, Decode decode) {
-  std::vector<float> values(bytes.size() / sizeof(Code));
-  const std::byte* in = bytes.data();
-  for (float& value : values) {
-    Code code;
-    std::memcpy(&code, in, sizeof(Code));
-    value = decode(code);
-    in += sizeof(Code);
-  }
-  return values;
+EVENTGAN_CLONES void dequantize_uint8(const std::byte* codes, float scale,
+                                      std::span<float> values) {
+  const auto* __restrict in = reinterpret_cast<const std::uint8_t*>(codes);
+  float* __restrict out = values.data();
+  for (std::size_t i = 0; i < values.size(); ++i) out[i] = scale * in[i];
 }
 
 }  // namespace
@@ -177,16 +192,20 @@ void quantize(std::span<const float> values, const Quantization& how, std::byte*
   }
 }
 
-std::vector<float> dequantize(std::span<const std::byte> bytes, StoredType type, float scale) {
-  switch (type) {
-    case StoredType::kFloat32:
-      return decode_each<float>(bytes, [](float value) { return value; });
-    case StoredType::kFloat16:
-      return decode_each<std::uint16_t>(bytes, from_half);
-    case StoredType::kUint8:
-      return decode_each<std::uint8_t>(bytes, [scale](std::uint8_t code) { return scale * code; });
+void dequantize(std::span<const std::byte> numbers, StoredType type, float scale,
+                std::span<float> values) {
+  if (type == StoredType::kFloat32) {
+    std::memcpy(values.data(), numbers.data(), values.size_bytes());
+  } else if (type == StoredType::kUint8) {
+    dequantize_uint8(numbers.data(), scale, values);
+  } else {
+    std::array<std::uint16_t, kBlock> halves;
+    for (std::size_t i = 0; i < values.size(); i += kBlock) {
+      const std::span block(halves.data(), std::min(kBlock, values.size() - i));
+      std::memcpy(block.data(), numbers.data() + i * sizeof(std::uint16_t), block.size_bytes());
+      from_halves(block, values.data() + i);
+    }
   }
-  throw std::logic_error("unknown stored type");
 }
 
 }  // namespace eventgan

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "manifests/values/job.h"
 
@@ -23,6 +22,9 @@ void to_halves(std::span<const float> values, std::uint16_t* halves);
 /// Exact value of a half; infinities and NaN too.
 float from_half(std::uint16_t half);
 
+/// values[i] = from_half(halves[i]), likewise.
+void from_halves(std::span<const std::uint16_t> halves, float* values);
+
 /// How the values of one volume become stored numbers.
 struct Quantization {
   StoredType type = StoredType::kFloat32;
@@ -41,7 +43,9 @@ Quantization quantization(StoredType type, float largest);
 void quantize(std::span<const float> values, const Quantization& how, std::byte* planes,
               std::size_t plane_size);
 
-/// The values again. `bytes` holds whole stored numbers, little endian, not shuffled.
-std::vector<float> dequantize(std::span<const std::byte> bytes, StoredType type, float scale);
+/// The values again: of values.size() whole stored numbers, little endian, not shuffled. Thread
+/// safe.
+void dequantize(std::span<const std::byte> numbers, StoredType type, float scale,
+                std::span<float> values);
 
 }  // namespace eventgan

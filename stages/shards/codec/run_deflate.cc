@@ -18,11 +18,13 @@
 namespace eventgan {
 namespace {
 
-constexpr std::size_t kCoded = std::size_t{1} << 18;  // bytes that share their codes
-constexpr std::size_t kHeader = 512;                  // more than a block's codes and end take
-constexpr std::size_t kStored = 65535;                // the most that a stored block holds
-constexpr std::size_t kLongest = 258;                 // match
-constexpr std::size_t kRun = kLongest + 1;            // a zero and the longest match after it
+constexpr std::size_t kStep = std::size_t{1} << 18;     // bytes that are looked at together
+constexpr std::size_t kEnough = std::size_t{1} << 15;   // literals for codes of their own
+constexpr std::size_t kLargest = std::size_t{1} << 24;  // block: a literal's place has 24 bits
+constexpr std::size_t kHeader = 512;                    // more than a block's codes and end take
+constexpr std::size_t kStored = 65535;                  // the most that a stored block holds
+constexpr std::size_t kLongest = 258;                   // match
+constexpr std::size_t kRun = kLongest + 1;              // a zero and the longest match after it
 
 }  // namespace
 
@@ -101,11 +103,12 @@ std::uint64_t nonzero_of_64(const std::byte* bytes) {
 
 constexpr int kAtOnce = 16;
 
-/// Adds the literals of a block from a place on to `found`, which has room for kCoded + kAtOnce;
+/// Adds the literals of a block from a place on to `found`, which has room for kStep + kAtOnce
+/// more;
 /// returns where the next one goes. Some are taken at once, needed or not: a loop that ends with
 /// the last one of each 64 bytes is hard to predict.
-EVENTGAN_CLONES Literal* find_literals(std::span<const std::byte> block, std::size_t place,
-                                       Literal* found) {
+EVENTGAN_CLONES Literal* find_rest(std::span<const std::byte> block, std::size_t place,
+                                   Literal* found) {
   const auto take = [&](const std::byte* bytes) {
     std::uint64_t nonzero = nonzero_of_64(bytes);
     const int count = std::popcount(nonzero);
@@ -126,21 +129,28 @@ EVENTGAN_CLONES Literal* find_literals(std::span<const std::byte> block, std::si
 }
 
 #if defined(__x86_64__)
-/// The same, 16 bytes at a time, for as many of them as there are; `place` is then after these.
-__attribute__((target("avx512f,popcnt"))) Literal* find_sixteens(std::span<const std::byte> block,
-                                                                 std::size_t& place,
-                                                                 Literal* found) {
-  const __m512i step = _mm512_set1_epi32(16 << 8);
+/// The same for all whole 64 bytes; `place` is then after these.
+__attribute__((target("avx512f,popcnt"))) Literal* find_with_avx512(
+    std::span<const std::byte> block, std::size_t& place, Literal* found) {
   std::array<Literal, 16> first;
   for (Literal i = 0; i < 16; ++i) first[i] = static_cast<Literal>(place + i) << 8;
   __m512i places = _mm512_loadu_si512(first.data());
-  for (; place + 16 <= block.size(); place += 16, places = _mm512_add_epi32(places, step)) {
-    const __m512i bytes = _mm512_maskz_cvtepu8_epi32(
-        0xffff, _mm_loadu_si128(reinterpret_cast<const __m128i*>(block.data() + place)));
-    const __mmask16 nonzero = _mm512_test_epi32_mask(bytes, bytes);
-    const __m512i some = _mm512_maskz_compress_epi32(nonzero, _mm512_or_si512(bytes, places));
-    _mm512_storeu_si512(found, some);
-    found += std::popcount(static_cast<unsigned>(nonzero));
+  const __m512i step = _mm512_set1_epi32(16 << 8);
+  for (; place + 64 <= block.size(); place += 64) {
+    const std::byte* const here = block.data() + place;
+    const __m512i all = _mm512_loadu_si512(here);
+    if (_mm512_test_epi32_mask(all, all) == 0) {
+      places = _mm512_add_epi32(places, _mm512_set1_epi32(64 << 8));
+      continue;
+    }
+    for (int i = 0; i < 64; i += 16, places = _mm512_add_epi32(places, step)) {
+      const __m512i bytes = _mm512_maskz_cvtepu8_epi32(
+          0xffff, _mm_loadu_si128(reinterpret_cast<const __m128i*>(here + i)));
+      const __mmask16 nonzero = _mm512_test_epi32_mask(bytes, bytes);
+      const __m512i some = _mm512_maskz_compress_epi32(nonzero, _mm512_or_si512(bytes, places));
+      _mm512_storeu_si512(found, some);
+      found += std::popcount(static_cast<unsigned>(nonzero));
+    }
   }
   return found;
 }
@@ -148,13 +158,13 @@ __attribute__((target("avx512f,popcnt"))) Literal* find_sixteens(std::span<const
 const bool kHasAvx512 = __builtin_cpu_supports("avx512f");
 #endif
 
-std::size_t find_literals(std::span<const std::byte> block, Literal* found) {
-  std::size_t place = 0;
+/// All that there are from a place on; returns how many.
+std::size_t find_literals(std::span<const std::byte> block, std::size_t place, Literal* found) {
   Literal* end = found;
 #if defined(__x86_64__)
-  if (kHasAvx512) end = find_sixteens(block, place, end);
+  if (kHasAvx512) end = find_with_avx512(block, place, end);
 #endif
-  return static_cast<std::size_t>(find_literals(block, place, end) - found);
+  return static_cast<std::size_t>(find_rest(block, place, end) - found);
 }
 
 /// The symbol of a match's length, 3..258 (RFC 1951, 3.2.5): 8 lengths have one each, then four
@@ -182,7 +192,8 @@ void split_run(std::size_t zeros, Run run, Longest longest) {
 
 /// The literals of a block, and codes for them and the runs of zeros between them.
 struct RunDeflater::Codes {
-  std::unique_ptr<Literal[]> found = std::make_unique_for_overwrite<Literal[]>(kCoded + kAtOnce);
+  std::unique_ptr<Literal[]> found =
+      std::make_unique_for_overwrite<Literal[]>(kEnough + kStep + kAtOnce);
   std::size_t count = 0;
   isal_huff_histogram histogram{};
   isal_hufftables tables{};
@@ -328,7 +339,7 @@ RunDeflater::RunDeflater() : codes_(std::make_unique<Codes>()) {}
 RunDeflater::~RunDeflater() = default;
 
 std::size_t RunDeflater::bound(std::size_t bytes) {
-  return 2 * bytes + kHeader * (bytes / kCoded + 2);
+  return 2 * bytes + kHeader * (bytes / kStep + 2);
 }
 
 std::size_t RunDeflater::deflate(std::span<const std::byte> bytes, std::byte* room) {
@@ -336,9 +347,15 @@ std::size_t RunDeflater::deflate(std::span<const std::byte> bytes, std::byte* ro
   writer.write({0x0178, 16});  // deflate with a window of 32 KiB, the quickest (RFC 1950)
   std::span<const std::byte> rest = bytes;
   do {
-    const std::span<const std::byte> block = rest.first(std::min(rest.size(), kCoded));
-    rest = rest.subspan(block.size());
-    codes_->count = find_literals(block, codes_->found.get());
+    std::size_t size = 0;
+    codes_->count = 0;
+    do {
+      const std::size_t from = size;
+      size += std::min(rest.size() - from, kStep);
+      codes_->count += find_literals(rest.first(size), from, codes_->found.get() + codes_->count);
+    } while (size < std::min(rest.size(), kLargest) && codes_->count < kEnough);
+    const std::span<const std::byte> block = rest.first(size);
+    rest = rest.subspan(size);
     codes_->choose(block.size());
     const BitWriter before = writer;
     const std::byte* const begin = writer.begun();

@@ -8,10 +8,10 @@ namespace eventgan {
 
 /// Compresses bytes that are mostly zero into zlib's format (RFC 1950 and 1951), which any inflater
 /// reads. All that it looks for is runs of zeros: they become matches of distance 1, every other
-/// byte a literal. The planes of a volume's numbers have little else that repeats, and 256 KiB at a
-/// time have codes of its own, so the result is smaller than that of a search for matches, in a
-/// fraction of the time. What comes out depends on the bytes alone. Thread safety: one thread at a
-/// time.
+/// byte a literal. The planes of a volume's numbers have little else that repeats, and some tens of
+/// thousands of literals at a time have codes of their own, so the result is smaller than that of a
+/// search for matches, in a fraction of the time. What comes out depends on the bytes alone. Thread
+/// safety: one thread at a time.
 class RunDeflater {
  public:
   RunDeflater();

@@ -3,7 +3,9 @@
 #include <libdeflate.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <mutex>
 #include <new>
 #include <stdexcept>
@@ -149,33 +151,77 @@ EncodedVolume VolumeCodec::encode(std::span<const float> values, const VolumeWin
   return {chunk(count, write_planes), how.scale, how.saturated, how.vanished};
 }
 
+namespace {
+
+/// The planes of a chunk; none if it is not sound.
+std::unique_ptr<std::byte[]> planes_of(std::span<const std::byte> chunk, int deflate_level,
+                                       std::size_t size_bytes) {
+  if (!ends_in_fletcher32(chunk)) return nullptr;
+  const std::span<const std::byte> stored = chunk.first(chunk.size() - kChecksumBytes);
+  auto planes = std::make_unique_for_overwrite<std::byte[]>(size_bytes);
+  if (deflate_level == 0) {
+    if (stored.size() != size_bytes) return nullptr;
+    std::ranges::copy(stored, planes.get());
+    return planes;
+  }
+  const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> inflater(
+      libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
+  if (!inflater) throw std::bad_alloc();
+  // Without room for its answer it takes nothing but the expected size.
+  const libdeflate_result result = libdeflate_zlib_decompress(
+      inflater.get(), stored.data(), stored.size(), planes.get(), size_bytes, nullptr);
+  return result == LIBDEFLATE_SUCCESS ? std::move(planes) : nullptr;
+}
+
+/// Calls take(first, bytes) for the numbers of `count` values in order, from value `first` on.
+template <class Number, class Take>
+void join_blocks(const std::byte* planes, std::size_t count, Take take) {
+  std::array<Number, 1024> numbers;  // which stay in the first-level cache
+  for (std::size_t i = 0; i < count; i += numbers.size()) {
+    const std::span block(numbers.data(), std::min(numbers.size(), count - i));
+    join_planes(planes + i, count, block);
+    take(i, std::as_bytes(block));
+  }
+}
+
+template <class Take>
+void join_blocks(const std::byte* planes, StoredType type, std::size_t count, Take take) {
+  switch (stored_size(type)) {
+    case 1:
+      return take(std::size_t{0}, std::span(planes, count));
+    case 2:
+      return join_blocks<std::uint16_t>(planes, count, take);
+    default:
+      return join_blocks<std::uint32_t>(planes, count, take);
+  }
+}
+
+}  // namespace
+
 std::optional<std::vector<std::byte>> decode_chunk(std::span<const std::byte> chunk,
                                                    StoredType type, int deflate_level,
                                                    std::size_t size_bytes) {
-  if (!ends_in_fletcher32(chunk)) return std::nullopt;
-  const std::span<const std::byte> stored = chunk.first(chunk.size() - kChecksumBytes);
-  std::vector<std::byte> planes(size_bytes);
-  if (deflate_level == 0) {
-    if (stored.size() != size_bytes) return std::nullopt;
-    std::ranges::copy(stored, planes.begin());
-  } else {
-    const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)>
-        inflater(libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
-    if (!inflater) throw std::bad_alloc();
-    // Without room for its answer it takes nothing but the expected size.
-    if (libdeflate_zlib_decompress(inflater.get(), stored.data(), stored.size(), planes.data(),
-                                   size_bytes, nullptr) != LIBDEFLATE_SUCCESS) {
-      return std::nullopt;
-    }
-  }
-  const std::size_t width = stored_size(type);
-  if (width == 1) return planes;
+  const auto planes = planes_of(chunk, deflate_level, size_bytes);
+  if (!planes) return std::nullopt;
   std::vector<std::byte> numbers(size_bytes);
-  const std::size_t count = size_bytes / width;
-  for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t b = 0; b < width; ++b) numbers[i * width + b] = planes[b * count + i];
-  }
+  const std::size_t width = stored_size(type);
+  join_blocks(planes.get(), type, size_bytes / width,
+              [&](std::size_t first, std::span<const std::byte> block) {
+                std::ranges::copy(block, numbers.data() + first * width);
+              });
   return numbers;
+}
+
+bool decode_volume(std::span<const std::byte> chunk, StoredType type, int deflate_level,
+                   float scale, std::span<float> volume) {
+  const std::size_t width = stored_size(type);
+  const auto planes = planes_of(chunk, deflate_level, volume.size() * width);
+  if (!planes) return false;
+  join_blocks(planes.get(), type, volume.size(),
+              [&](std::size_t first, std::span<const std::byte> block) {
+                dequantize(block, type, scale, volume.subspan(first, block.size() / width));
+              });
+  return true;
 }
 
 }  // namespace eventgan

@@ -77,10 +77,14 @@ class VolumeCodec {
 };
 
 /// The stored numbers of a chunk that went through those filters, little endian and in their order
-/// (as `dequantize` takes them): `size_bytes` of them. Nothing if it is no such chunk: another
+/// (as `dequantize` takes them): `size_bytes` bytes. Nothing if it is no such chunk: another
 /// checksum, damaged or of another size. Thread safe.
 std::optional<std::vector<std::byte>> decode_chunk(std::span<const std::byte> chunk,
                                                    StoredType type, int deflate_level,
                                                    std::size_t size_bytes);
+
+/// Likewise the volume.size() values, scale x number; false for what is no such chunk.
+bool decode_volume(std::span<const std::byte> chunk, StoredType type, int deflate_level,
+                   float scale, std::span<float> volume);
 
 }  // namespace eventgan

@@ -66,6 +66,38 @@ def test_volumes_are_decoded(example, kind, tolerance):
     np.testing.assert_allclose(volume, expected, rtol=0, atol=tolerance)
 
 
+def test_the_library_decodes_what_h5py_reads(example, monkeypatch):
+    engine = shards_module._engine_if_any()
+    assert engine is not None
+    for kind in (f"{dtype}-{level}" for dtype in ("float32", "float16", "uint8") for level in (0, 1, 9)):
+        path = example.path(kind)
+        with h5py.File(path) as file:
+            stored, scale = file["events/volume"][:], file["events/scale"][:]
+        shards = Shards(path)
+        for sample in shards:
+            expected = stored[sample["slot"]].astype(np.float32) * scale[sample["slot"]]
+            assert sample["volume"].tobytes() == expected.tobytes()
+            assert shards._files[path]._decoded(sample["slot"], 1.0) is not None
+        with monkeypatch.context() as without:
+            without.setattr(shards_module, "_engine_if_any", lambda: None)
+            for sample, other in zip(shards, Shards(path)):
+                assert sample["volume"].tobytes() == other["volume"].tobytes()
+
+
+def test_volumes_with_other_filters_are_read_by_hdf5(folder):
+    path = folder / NAME
+    before = [sample["volume"] for sample in Shards(path)]
+    with h5py.File(path, "r+") as file:  # as h5repack would leave it
+        stored = file["events/volume"][:]
+        attributes = dict(file["events/volume"].attrs)
+        del file["events/volume"]
+        again = file.create_dataset("events/volume", data=stored, chunks=(1, *stored.shape[1:]), compression="lzf")
+        again.attrs.update(attributes)
+    shards = Shards(path)
+    assert shards._files[path]._decoded(0, 1.0) is None
+    assert [sample["volume"].tobytes() for sample in shards] == [volume.tobytes() for volume in before]
+
+
 def test_volumes_as_they_are_stored(example):
     expected = np.array(example.volumes[3], "float32").reshape(4, 6, 8)
     sample = Shards(example.path("uint8-1"), decode=False)[2]

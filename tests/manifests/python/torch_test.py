@@ -14,7 +14,7 @@ torch = pytest.importorskip("torch")
 from torch.utils.data import DataLoader
 
 from eventgan import Shards
-from eventgan.torch import (DetectionDataset, EventAugmentation, KeypointDataset, PoseAugmentation,
+from eventgan.torch import (DetectionDataset, EventAugmentation, HalfVolumes, KeypointDataset, PoseAugmentation,
                             PoseDataset, collate_torchvision, collate_yolo, exchange_first_convolution, fitted,
                             flip_pairs, heatmaps, inverse, mixture, move_boxes, move_points, warp)
 
@@ -505,6 +505,19 @@ def test_crops_and_heatmaps_are_those_of_simple_baselines(monkeypatch):
     maps, weight = heatmaps(joints[:, :2] / 4, visible[:, 0] > 0, 64, 64, 2)
     assert weight.tolist() == expected_weight.tolist()
     np.testing.assert_allclose(maps[visible[:, 0] > 0], expected[visible[:, 0] > 0], rtol=1e-6)
+
+
+def test_half_volumes_are_rounded_and_stay_finite(shards):
+    cars = DetectionDataset(shards)
+    whole, half = cars[0], HalfVolumes(cars)[0]
+    assert half["volume"].dtype == torch.float16 and len(HalfVolumes(cars)) == len(cars)
+    assert torch.equal(half["volume"], whole["volume"].half())
+    assert whole.keys() == half.keys() and torch.equal(half["boxes"], whole["boxes"])
+    values = torch.tensor([0, 1e-9, 1 + 2**-11, 2049, 65504, 1e9, -1e9])    # ties to even, the smallest half is 6e-8
+    volume, target = HalfVolumes(torch.utils.data.TensorDataset(values[None], torch.ones(1)))[0]
+    assert volume.tolist() == [0, 0, 1, 2048, 65504, 65504, -65504] and target == 1
+    imgs, targets, _ = next(iter(DataLoader(HalfVolumes(cars), 2, collate_fn=collate_yolo, num_workers=1)))
+    assert imgs.dtype == torch.float16 and targets.dtype == torch.float32
 
 
 def test_datasets_are_mixed_by_share():

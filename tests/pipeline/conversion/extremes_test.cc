@@ -285,10 +285,9 @@ class Extremes : public ::testing::TestWithParam<EngineCase> {
   /// What a reader of the shard gets: finite numbers >= 0, as near to the volume as the type is.
   static void expect_sound_chunk(const SampleMessage& message, const std::vector<float>& volume,
                                  StoredType type) {
-    const auto bytes = decode_chunk(message.chunk, type, JobManifest().output.deflate_level,
-                                    volume.size() * stored_size(type));
-    ASSERT_TRUE(bytes);
-    const std::vector<float> read = dequantize(*bytes, type, message.sample.scale);
+    std::vector<float> read(volume.size());
+    ASSERT_TRUE(decode_volume(message.chunk, type, JobManifest().output.deflate_level,
+                              message.sample.scale, read));
     ASSERT_TRUE(std::ranges::all_of(read, [](float x) { return std::isfinite(x) && x >= 0; }));
     const float largest = std::ranges::max(volume);
     if (type == StoredType::kFloat32) {

@@ -70,9 +70,9 @@ class SampleStagesTest : public ::testing::Test {
   /// What is stored of it, in float32.
   std::vector<float> volume(const SampleMessage& message) {
     EXPECT_FALSE(message.failed()) << message.sample.fault;
-    const std::size_t bytes = VolumeShape{9, shard_.volume_size}.value_count() * sizeof(float);
-    const auto stored = decode_chunk(message.chunk, StoredType::kFloat32, 1, bytes);
-    return dequantize(stored.value(), StoredType::kFloat32, 1);
+    std::vector<float> volume(VolumeShape{9, shard_.volume_size}.value_count());
+    EXPECT_TRUE(decode_volume(message.chunk, StoredType::kFloat32, 1, 1, volume));
+    return volume;
   }
 
   testing::TemporaryFolder folder_;

@@ -140,6 +140,31 @@ TEST_F(Calls, RefuseWhatDoesNotFit) {
       EVENTGAN_USAGE);
 }
 
+/// Fletcher's sums of one 16-bit word that is not zero, behind what is zero, are that word.
+TEST(Decoding, GivesTheValuesOfAChunk) {
+  // The halves 1 and 2, 0x3c00 and 0x4000, shuffled.
+  std::vector<std::uint8_t> chunk{0x00, 0x00, 0x3c, 0x40, 0x40, 0x3c, 0x40, 0x3c};
+  std::vector<float> volume(2);
+  const auto decode = [&](std::int32_t number_size, std::int32_t is_deflated, float scale) {
+    return eventgan_decode(chunk.data(), chunk.size(), number_size, is_deflated, scale,
+                           volume.data(), volume.size());
+  };
+  ASSERT_EQ(decode(2, 0, 1), EVENTGAN_COMPLETE) << eventgan_error();
+  EXPECT_EQ(volume, (std::vector<float>{1, 2}));
+  EXPECT_EQ(decode(1, 0, 1), EVENTGAN_INPUT_MISSING);
+  EXPECT_STREQ(eventgan_error(), "expected an intact volume of 2 values, got a damaged one");
+  EXPECT_EQ(decode(2, 1, 1), EVENTGAN_INPUT_MISSING);
+  for (const std::int32_t size : {0, -1, 3, 8}) EXPECT_EQ(decode(size, 0, 1), EVENTGAN_USAGE);
+  chunk[2] ^= 1;
+  EXPECT_EQ(decode(2, 0, 1), EVENTGAN_INPUT_MISSING);
+  chunk = {3, 5, 5, 3, 5, 3};
+  ASSERT_EQ(decode(1, 0, 0.5f), EVENTGAN_COMPLETE);
+  EXPECT_EQ(volume, (std::vector<float>{1.5f, 2.5f}));
+  chunk.clear();
+  EXPECT_NE(decode(1, 0, 1), EVENTGAN_COMPLETE);
+  EXPECT_EQ(eventgan_decode(nullptr, 6, 1, 0, 1, volume.data(), 2), EVENTGAN_USAGE);
+}
+
 TEST_F(Calls, MakeNoMoreThanTheyAreAskedFor) {
   std::vector<float> made(expected_.size(), -1);
   std::int64_t next = 0;

@@ -73,8 +73,22 @@ TEST(RunDeflater, RunsOfEveryLength) {
 TEST(RunDeflater, EmptyVolumesAreNearlyNothing) {
   RunDeflater deflater;
   const Bytes zeros(8'000'000);
-  // A match of 258 zeros takes no less than 2 bits: 7,752 bytes; and 31 times the codes.
-  EXPECT_LT(deflated(deflater, zeros).size(), 7'752u + 31 * 200u);
+  // A match of 258 zeros takes no less than 2 bits: 7,752 bytes; and the codes.
+  EXPECT_LT(deflated(deflater, zeros).size(), 7'752u + 200u);
+}
+
+/// A block ends with the 256 KiB that give it 32,768 literals, or after 16 MiB.
+TEST(RunDeflater, BlocksOfEverySize) {
+  RunDeflater deflater;
+  for (const std::size_t size : {(1u << 18) - 1, 1u << 18, (1u << 18) + 1, (1u << 24) - 1, 1u << 24,
+                                 (1u << 24) + 1, (1u << 24) + (1u << 18) + 65}) {
+    Bytes bytes(size);
+    bytes.front() = bytes.back() = bytes[size / 2] = std::byte{3};
+    EXPECT_EQ(inflated(deflated(deflater, bytes), size), bytes) << size;
+    const Bytes dense = random_bytes(300'000, 200, 7);  // behind what is nearly empty
+    bytes.insert(bytes.end(), dense.begin(), dense.end());
+    EXPECT_EQ(inflated(deflated(deflater, bytes), bytes.size()), bytes) << size;
+  }
 }
 
 /// Bytes without a pattern get no smaller: five bytes more for each 65,535, and a few for all.

@@ -291,6 +291,11 @@ TEST_P(VolumeCodecLevels, AChunkIsDecodedToTheNumbersThatHdf5Reads) {
       keep(decoded_by_hdf5<std::uint8_t>(chunk, values.size(), H5T_STD_U8LE, level));
     }
     EXPECT_EQ(*numbers, expected);
+    constexpr float kScale = 0.375;
+    std::vector<float> volume(values.size()), of_numbers(values.size());
+    EXPECT_TRUE(decode_volume(chunk, type, level, kScale, volume));
+    dequantize(expected, type, kScale, of_numbers);
+    EXPECT_EQ(volume, of_numbers);
 
     // Another size; a flipped bit; a sound checksum over what does not inflate, or to less.
     EXPECT_FALSE(decode_chunk(chunk, type, level, size - stored_size(type)));
@@ -302,6 +307,7 @@ TEST_P(VolumeCodecLevels, AChunkIsDecodedToTheNumbersThatHdf5Reads) {
     append_fletcher32(damaged);
     EXPECT_FALSE(decode_chunk(damaged, type, level, size));
     EXPECT_FALSE(decode_chunk({}, type, level, size));
+    EXPECT_FALSE(decode_volume(damaged, type, level, kScale, volume));
   }
 }
 

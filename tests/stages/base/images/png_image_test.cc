@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "stages/base/images/image_codecs.h"
@@ -29,15 +30,17 @@ std::string why_png_refused(const std::filesystem::path& file) {
   return testing::why_refused(file, decode_png);
 }
 
-/// Writes what OpenCV cannot: any kind of PNG with pixels of `bits` bits, all rows counting up.
+/// Writes what OpenCV cannot: any kind of PNG with pixels of `bits` bits and any filter of its
+/// rows, whose bytes count up.
 void write_png(const std::filesystem::path& path, ImageSize size, int kind, int bits, int interlace,
-               bool pixels = true) {
+               bool pixels = true, int filters = PNG_ALL_FILTERS) {
   std::FILE* file = std::fopen(path.c_str(), "wb");
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
   png_infop info = png_create_info_struct(png);
   png_init_io(png, file);
   png_set_IHDR(png, info, size.width, size.height, bits, kind, interlace,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_set_filter(png, PNG_FILTER_TYPE_BASE, filters);
   const std::array<png_color, 4> palette{{{1, 2, 3}, {40, 50, 60}, {200, 100, 0}, {255, 254, 253}}};
   const std::array<png_byte, 2> transparent{0, 128};
   if (kind == PNG_COLOR_TYPE_PALETTE) {
@@ -74,10 +77,19 @@ class PngKinds : public ::testing::TestWithParam<PngKind> {};
 TEST_P(PngKinds, DecodesToTheSamePixelsAsOpenCv) {
   const TemporaryFolder folder;
   const auto file = folder / "image.png";
-  for (const ImageSize size : {ImageSize{11, 13}, ImageSize{1, 1}}) {
-    write_png(file, size, GetParam().kind, GetParam().bits, GetParam().interlace);
-    EXPECT_TRUE(same_pixels(with_open(file, decode_png), opencv_read(file)));
-    EXPECT_EQ(with_open(file, png_size), size);
+  for (const ImageSize size : {ImageSize{11, 13}, ImageSize{1, 1}, ImageSize{3, 1}}) {
+    for (const int filter : {PNG_FILTER_NONE, PNG_FILTER_SUB, PNG_FILTER_UP, PNG_FILTER_AVG,
+                             PNG_FILTER_PAETH, PNG_ALL_FILTERS}) {
+      write_png(file, size, GetParam().kind, GetParam().bits, GetParam().interlace, true, filter);
+      EXPECT_TRUE(same_pixels(with_open(file, decode_png), opencv_read(file))) << filter;
+      EXPECT_EQ(with_open(file, png_size), size);
+      const auto whole = with_open(file, whole_png);
+      const bool is_left = GetParam().bits < 8 || GetParam().interlace != 0;
+      EXPECT_EQ(whole.has_value(), !is_left);
+      if (whole) {
+        EXPECT_EQ(std::pair(whole->size, whole->bits), std::pair(size, GetParam().bits));
+      }
+    }
   }
 }
 
@@ -90,6 +102,8 @@ INSTANTIATE_TEST_SUITE_P(, PngKinds,
                                            PngKind{"grey_1_bit", PNG_COLOR_TYPE_GRAY, 1, 0},
                                            PngKind{"grey_16_bit", PNG_COLOR_TYPE_GRAY, 16, 0},
                                            PngKind{"grey_alpha", PNG_COLOR_TYPE_GRAY_ALPHA, 8, 0},
+                                           PngKind{"grey_alpha_16", PNG_COLOR_TYPE_GRAY_ALPHA, 16,
+                                                   0},
                                            PngKind{"palette", PNG_COLOR_TYPE_PALETTE, 2, 0},
                                            PngKind{"interlaced", PNG_COLOR_TYPE_RGB, 8, 1}),
                          [](const auto& param) { return param.param.name; });
@@ -203,19 +217,16 @@ TEST(PngImage, RealFramesEqualOpenCv) {
   }
 }
 
-class StoredPngTest : public ::testing::Test {
+class WholePngTest : public ::testing::Test {
  protected:
   std::string write(const cv::Mat& image) {
     cv::imwrite(file_.string(), image);
     return read_file(file_);
   }
-  std::string stored() const {
-    const auto bytes = testing::with_open(file_, stored_png);
-    return {bytes.begin(), bytes.end()};
-  }
-  std::string stored(const std::string& bytes) const {
+  bool is_taken() const { return testing::with_open(file_, whole_png).has_value(); }
+  bool is_taken(const std::string& bytes) const {
     write_file(file_, bytes);
-    return stored();
+    return is_taken();
   }
 
   const TemporaryFolder folder_;
@@ -239,122 +250,122 @@ std::string chunk(const std::string& type, const std::string& data) {
   return text(data.size()) + body + text(libdeflate_crc32(0, body.data(), body.size()));
 }
 
-TEST_F(StoredPngTest, IsAPngOfTheSamePixelsWhoseDataIsStored) {
-  // 75 rows of 1 + 3 * 400 bytes fill one stored block of 65535 bytes and a part of a second.
-  const cv::Mat image = gradient_image({75, 400});
+TEST_F(WholePngTest, HasThePixelsAsTheyAreStored) {
+  const cv::Mat image = gradient_image({5, 11});
   write(image);
-  const std::string bytes = stored();
-  const std::size_t raw = 75 * (1 + 3 * 400);
-  const std::size_t data = bytes.find("IDAT");
-  ASSERT_NE(data, std::string::npos);
-  EXPECT_EQ(number_at(bytes, data - 4), 2 + 2 * 5 + raw + 4);
-  write_file(file_, bytes);
-  EXPECT_EQ(cv::norm(opencv_read(file_), image, cv::NORM_INF), 0);
-}
-
-TEST_F(StoredPngTest, FillsStoredBlocksToTheLastByte) {
-  // Rows of 255 bytes: 257 of them are one block of 65535 bytes exactly.
-  for (const int rows : {256, 257, 258}) {
-    const cv::Mat image(rows, 254, CV_8UC1, cv::Scalar(rows - 100));
-    write(image);
-    const std::string bytes = stored();
-    const std::size_t blocks = rows <= 257 ? 1 : 2;
-    EXPECT_EQ(number_at(bytes, bytes.find("IDAT") - 4), 2 + 5 * blocks + 255u * rows + 4);
-    write_file(file_, bytes);
-    EXPECT_EQ(cv::imread(file_.string(), cv::IMREAD_UNCHANGED).at<std::uint8_t>(rows - 1, 253),
-              rows - 100);
+  auto pixels = testing::with_open(file_, whole_png);
+  ASSERT_TRUE(pixels);
+  EXPECT_EQ(pixels->size, (ImageSize{5, 11}));
+  EXPECT_EQ(std::pair(pixels->samples, pixels->bits), std::pair(3, 8));
+  EXPECT_FALSE(pixels->has_palette);
+  for (int y = 0; y < 5; ++y) {
+    ASSERT_EQ(pixels->row(y).size(), 33u);
+    for (int x = 0; x < 11; ++x) {
+      const auto& bgr = image.at<cv::Vec3b>(y, x);
+      for (int k = 0; k < 3; ++k) ASSERT_EQ(pixels->row(y)[3 * x + k], bgr[2 - k]);
+    }
   }
 }
 
-TEST_F(StoredPngTest, LibpngTakesItBeyondItsLimitForOtherChunks) {
-  // 9 MB of pixels; libpng refuses chunks of more than 8 MB, except of pixel data that fills them.
-  const cv::Mat image(1000, 3000, CV_8UC3, cv::Scalar(1, 2, 3));
-  write(image);
-  write_file(file_, stored());
-  EXPECT_GT(std::filesystem::file_size(file_), 9'000'000u);
-  const ColourFrame frame = testing::with_open(file_, decode_png);
-  EXPECT_TRUE(testing::same_pixels(frame, image));
-}
-
-TEST_F(StoredPngTest, OnlyWhatDecidesThePixelsStays) {
-  std::string bytes = write(gradient_image({16, 24}));
-  const std::string whole = stored();
+TEST_F(WholePngTest, OnlyWhatDecidesThePixelsCounts) {
+  const cv::Mat image = gradient_image({16, 24});
+  std::string bytes = write(image);
   const std::string early = chunk("tEXt", std::string("a\0b", 3));
-  const std::string late = chunk("tIME", std::string("\7\xd0\1\1\0\0\0", 7));
+  std::string late = chunk("tIME", std::string("\7\xd0\1\1\0\0\0", 7));
+  late.back() ^= 1;                                     // a wrong checksum
   const std::string palette = chunk("PLTE", "rgbRGB");  // which colour images may suggest
   bytes.insert(33, early + palette);                    // after the signature (8) and IHDR (25)
   bytes.insert(bytes.size() - 12, late);
-  EXPECT_EQ(stored(bytes), whole.substr(0, 33) + palette + whole.substr(33));
+  EXPECT_TRUE(is_taken(bytes + "behind the end"));
+  EXPECT_TRUE(same_pixels(testing::with_open(file_, decode_png), image));
 }
 
-TEST_F(StoredPngTest, DataInManyChunksIsJoined) {
-  const std::string bytes = write(gradient_image({16, 24}));
-  const std::string whole = stored();
+TEST_F(WholePngTest, DataInManyChunksIsJoined) {
+  const cv::Mat image = gradient_image({16, 24});
+  const std::string bytes = write(image);
   const std::size_t at = bytes.find("IDAT");
   const std::string data = bytes.substr(at + 4, number_at(bytes, at - 4));
-  std::string pieces;
+  std::string pieces = chunk("IDAT", "");
   for (std::size_t i = 0; i < data.size(); i += 10) pieces += chunk("IDAT", data.substr(i, 10));
-  const std::string cut = bytes.substr(0, at - 4) + pieces + chunk("IEND", "");
-  EXPECT_EQ(stored(cut), whole);
-  EXPECT_FALSE(whole.empty());
+  EXPECT_TRUE(is_taken(bytes.substr(0, at - 4) + pieces + chunk("IEND", "")));
+  EXPECT_TRUE(same_pixels(testing::with_open(file_, decode_png), image));
 
   // In two runs it is against the standard: left to libpng.
   const std::string apart = bytes.substr(0, at - 4) + chunk("IDAT", data.substr(0, 10)) +
                             chunk("tEXt", std::string("a\0b", 3)) + chunk("IDAT", data.substr(10)) +
                             chunk("IEND", "");
-  EXPECT_EQ(stored(apart), "");
+  EXPECT_FALSE(is_taken(apart));
 }
 
-TEST_F(StoredPngTest, AnyDoubtLeavesTheFileToLibpng) {
+/// A zlib stream of the rows' bytes.
+std::string zlib_stream(const std::string& rows) {
+  libdeflate_compressor* const compressor = libdeflate_alloc_compressor(6);
+  std::string stream(libdeflate_zlib_compress_bound(compressor, rows.size()), ' ');
+  stream.resize(
+      libdeflate_zlib_compress(compressor, rows.data(), rows.size(), stream.data(), stream.size()));
+  libdeflate_free_compressor(compressor);
+  return stream;
+}
+
+TEST_F(WholePngTest, AnyDoubtLeavesTheFileToLibpng) {
   const std::string bytes = write(gradient_image({16, 24}));
   const std::size_t at = bytes.find("IDAT");
   const std::string before = bytes.substr(0, at - 4);
   const std::string data = bytes.substr(at + 4, number_at(bytes, at - 4));
+  const std::string pixels = chunk("IDAT", data);
   const std::string end = chunk("IEND", "");
-  ASSERT_NE(stored(before + chunk("IDAT", data) + end), "");
+  ASSERT_TRUE(is_taken(before + pixels + end));
 
-  EXPECT_EQ(stored(before + chunk("IDAT", data + "x") + end), "") << "more data than pixels";
-  EXPECT_EQ(stored(before + chunk("IDAT", data.substr(0, data.size() - 1)) + end), "") << "less";
-  EXPECT_EQ(stored(before + chunk("IDAT", "") + end), "") << "none";
-  EXPECT_EQ(stored(before + end), "") << "no chunk of it";
-  EXPECT_EQ(stored(""), "");
+  EXPECT_FALSE(is_taken(before + chunk("IDAT", data + "x") + end)) << "more data than pixels";
+  EXPECT_FALSE(is_taken(before + chunk("IDAT", data.substr(0, data.size() - 1)) + end)) << "less";
+  EXPECT_FALSE(is_taken(before + chunk("IDAT", "") + end)) << "none";
+  EXPECT_FALSE(is_taken(before + end)) << "no chunk of it";
+  EXPECT_FALSE(is_taken(before + chunk("ABCD", "") + pixels + end)) << "what may decide pixels";
+  EXPECT_FALSE(is_taken(before + pixels + chunk("PLTE", "rgb") + end)) << "a late palette";
+  EXPECT_FALSE(is_taken(before + chunk("PLTE", "rg") + pixels + end)) << "a part of a colour";
+  EXPECT_FALSE(is_taken(bytes.substr(0, 8) + pixels + end)) << "no header";
+  EXPECT_FALSE(is_taken(""));
+  for (const auto& [byte, bit] : {std::pair{0, 1}, {0, 128}, {1, 1}, {1, 32}, {2, 2}}) {
+    std::string changed = data;
+    changed[byte] = static_cast<char>(changed[byte] ^ bit);
+    EXPECT_FALSE(is_taken(before + chunk("IDAT", changed) + end)) << "zlib's byte " << byte;
+  }
   std::string changed = data;
   changed.back() = static_cast<char>(changed.back() ^ 1);
-  EXPECT_EQ(stored(before + chunk("IDAT", changed) + end), "") << "Adler-32 wrong, CRC-32 right";
-  for (const std::size_t header_byte : {16, 20, 24, 25, 28, 29}) {  // sizes, bits, kind, checksum
-    std::string damaged = bytes;
+  EXPECT_FALSE(is_taken(before + chunk("IDAT", changed) + end)) << "Adler-32 wrong, CRC-32 right";
+  for (const std::size_t header_byte : {16, 20, 24, 25, 26, 27, 28, 29}) {
+    std::string damaged = bytes;  // sizes, bits, kind, methods, checksum
     damaged[header_byte] = static_cast<char>(damaged[header_byte] ^ 4);
-    EXPECT_EQ(stored(damaged), "") << header_byte;
+    EXPECT_FALSE(is_taken(damaged)) << header_byte;
+    const std::string header = damaged.substr(16, 13);
+    if (header_byte == 29) continue;
+    EXPECT_FALSE(is_taken(bytes.substr(0, 8) + chunk("IHDR", header) + damaged.substr(33)))
+        << header_byte;
   }
   for (std::size_t length = 0; length < bytes.size(); length += 5) {
-    EXPECT_EQ(stored(bytes.substr(0, length)), "") << length;
+    EXPECT_FALSE(is_taken(bytes.substr(0, length))) << length;
   }
 }
 
-TEST_F(StoredPngTest, EveryKindOfPixelsIsTakenUnlessInterlaced) {
-  const cv::Mat colour = gradient_image({5, 11});
-  std::vector<cv::Mat> channels;
-  cv::split(colour, channels);
-  cv::Mat wide, transparent;
-  colour.convertTo(wide, CV_16U, 257);
-  cv::merge(std::vector<cv::Mat>{channels[0], channels[1], channels[2], channels[0]}, transparent);
-  for (const cv::Mat& image : {colour, channels[0], wide, transparent}) {
-    const std::string bytes = write(image);
-    const std::string result = stored();
-    ASSERT_NE(result, "") << image.type();
-    write_file(file_, result);
-    EXPECT_EQ(cv::norm(cv::imread(file_.string(), cv::IMREAD_UNCHANGED), image, cv::NORM_INF), 0);
-
-    std::string header = bytes.substr(16, 13);
-    EXPECT_EQ(stored(bytes.substr(0, 8) + chunk("IHDR", header) + bytes.substr(33)), result);
-    header.back() = 1;
-    EXPECT_EQ(stored(bytes.substr(0, 8) + chunk("IHDR", header) + bytes.substr(33)), "");
-  }
-  cv::imwrite(file_.string(), channels[0], {cv::IMWRITE_PNG_BILEVEL, 1});
-  EXPECT_EQ(number_at(stored(), stored().find("IDAT") - 4), 2 + 5 + 5 * (1 + 2) + 4u);  // 11 bits
+TEST_F(WholePngTest, RowsHaveOneOfFiveFilters) {
+  // Two rows of two grey pixels. Those of the first become 1, 3, as the one above it is 0; under it
+  // 10 + (0 + 1) / 2, then 10 + (10 + 3) / 2.
+  const std::string header("\0\0\0\2\0\0\0\2\x08\0\0\0\0", 13);
+  const auto with = [&](const std::string& rows) {
+    return "\x89PNG\r\n\x1a\n" + chunk("IHDR", header) + chunk("IDAT", zlib_stream(rows)) +
+           chunk("IEND", "");
+  };
+  ASSERT_TRUE(is_taken(with("\1\1\2\3\x0a\x0a")));
+  auto pixels = testing::with_open(file_, whole_png);
+  EXPECT_EQ(std::vector(pixels->row(0).begin(), pixels->row(0).end()),
+            (std::vector<std::uint8_t>{1, 3}));
+  EXPECT_EQ(std::vector(pixels->row(1).begin(), pixels->row(1).end()),
+            (std::vector<std::uint8_t>{10, 16}));
+  EXPECT_FALSE(is_taken(with("\1\1\2\5\x0a\x0a"))) << "no such filter";
+  EXPECT_NE(why_png_refused(file_), "");
 }
 
-TEST_F(StoredPngTest, LibpngJudgesASecondHeaderAsItDoesInTheFile) {
+TEST_F(WholePngTest, LibpngJudgesASecondHeaderAsItDoesInTheFile) {
   const std::string bytes = write(gradient_image({16, 24}));
   const std::string header = bytes.substr(8, 25);
   std::string twice = bytes;
@@ -365,11 +376,11 @@ TEST_F(StoredPngTest, LibpngJudgesASecondHeaderAsItDoesInTheFile) {
   EXPECT_NE(testing::why_refused(file_, decode_png), "");
 }
 
-TEST_F(StoredPngTest, AnAnnouncedSizeThatTheDataCannotFillTakesNoMemory) {
+TEST_F(WholePngTest, AnAnnouncedSizeThatTheDataCannotFillTakesNoMemory) {
   const std::string bytes = write(gradient_image({16, 24}));
   // 8000x8000 is within the limit, but a few hundred bytes cannot hold it.
   const std::string header("\0\0\x1f\x40\0\0\x1f\x40\x08\2\0\0\0", 13);
-  EXPECT_EQ(stored(bytes.substr(0, 8) + chunk("IHDR", header) + bytes.substr(33)), "");
+  EXPECT_FALSE(is_taken(bytes.substr(0, 8) + chunk("IHDR", header) + bytes.substr(33)));
 }
 
 }  // namespace

@@ -105,6 +105,13 @@ TEST(CsvLabels, ABadRowSpoilsItsImageAlone) {
             "expected left < right and top < bottom, got 3.5, 2, 3, 4" + place);
   EXPECT_EQ(csv_fault("a.png,car,1,5,3,4,\n"),
             "expected left < right and top < bottom, got 1, 5, 3, 4" + place);
+  using std::string_literals::operator""s;  // in a column that is not read, but kept with the rows
+  EXPECT_EQ(parse_csv_labels("image,class,left,top,right,bottom,note\na.png,car,1,2,3,4,a\0b\n"s,
+                             "labels.csv")
+                .at("a.png")
+                .fault()
+                .reason,
+            "expected text, got a NUL in it" + place);
   for (const char* track : {"-1", "1.5", "x", "9223372036854775808"}) {
     EXPECT_EQ(csv_fault("a.png,car,1,2,3,4," + std::string(track) + "\n"),
               "expected a whole number from 0 as track, got '" + std::string(track) + "'" + place);
