@@ -39,6 +39,7 @@ class Script(unittest.TestCase):
             if system:
                 (top / "os-release").write_text(SYSTEMS[system])
             commands = {"dpkg-query": "echo install ok installed" if installed else "exit 1", "id": "echo 0",
+                        "git": "echo ' M README.md'",
                         **{name: f'echo "{name} $*" >>{top}/called' for name in ("apt-get", "cmake", "ctest", "cpack")}}
             (top / "bin").mkdir()
             (top / "build" / "release").mkdir(parents=True)
@@ -79,6 +80,10 @@ class Script(unittest.TestCase):
         self.assertEqual([line.split()[0] for line in called], ["cmake", "cmake", "cpack"])
         self.assertEqual(errors.count("expected Debian 12 or 13"), 2)  # what builds, what packs
         self.assertEqual(self.run_on("unstable", "packages", installed=True), (0, [], ""))
+
+    def test_a_release_is_of_what_is_committed(self):
+        self.assertEqual(self.run_on("debian 12", "release"),
+                         (1, [], "expected no change since the last commit: git status\n"))
 
     def test_unknown_words(self):
         self.assertEqual(self.run_on("debian 13", "packages", "nothing")[0], 64)
