@@ -7,6 +7,7 @@
 #include <span>
 
 #include "stages/base/archives/cdf_matrix.h"
+#include "stages/base/images/image_file.h"
 #include "stages/frames/events/recording_labels.h"
 #include "stages/frames/index_mask.h"
 #include "stages/frames/mpii/detail/mat_json.h"
@@ -37,7 +38,7 @@ INSTANTIATE_TEST_SUITE_P(
                       testing::read_safetensors_input, testing::read_mat_input,
                       testing::read_cdf_input, testing::read_voc_input, testing::read_mot_input,
                       testing::read_csv_input, testing::read_coco_input, testing::read_yolo_input,
-                      testing::read_mask_input, testing::read_table_input,
+                      testing::read_mask_input, testing::read_png_input, testing::read_table_input,
                       testing::read_aedat4_input, testing::read_prophesee_input));
 
 TEST_P(FuzzCorpus, IsReadOrRefused) {
@@ -110,6 +111,13 @@ TEST(FuzzCorpusSeeds, AreReadWhereTheyAreSound) {
     const auto mask = IndexMask::read(corpus / "mask" / name, name);
     ASSERT_FALSE(is_fault(mask)) << mask.fault().reason;
     EXPECT_EQ(std::ssize(mask->indices()), objects) << name;
+  }
+  const testing::TemporaryFolder folder;
+  for (const char* name : {"colours", "average", "palette", "wide", "bits", "interlaced"}) {
+    const std::string input = labels((std::string("png/") + name).c_str());
+    testing::read_png_input({reinterpret_cast<const std::uint8_t*>(input.data()), input.size()},
+                            folder / "image");
+    EXPECT_NO_THROW(decode_image_file(folder / "image")) << name;
   }
   for (const char* name : {"plain", "lz4", "zstd"}) {
     const StoredParts parts = open_aedat4(corpus / "aedat4" / name);

@@ -225,6 +225,12 @@ def coco(annotation, category=None):
                        "categories": [{"id": 3, "name": "person", **(category or {})}]}).encode()
 
 
+def png(width, height, kind, bits, rows, palette=b"", interlaced=0):
+    """What read_png_input makes a file of."""
+    header = struct.pack(">IIBBBBB", width, height, bits, kind, 0, 0, interlaced)
+    return header + bytes([len(palette) // 3]) + palette + rows
+
+
 def index_png(bits, rows, palette=False):
     """A PNG of numbers, grey or of a palette, 8 or 16 bits each."""
     def chunk(kind, data):
@@ -422,6 +428,13 @@ def main(folder):
         "mask/wide": index_png(16, [[0, 1001, 1001, 0], [2002, 0, 10000, 10000]]),
         "mask/white": index_png(8, [[0, 255], [255, 0]]),
         "mask/cut": index_png(8, [[0, 1, 2, 3]])[:-9],
+        "png/colours": png(2, 2, 2, 8, b"\1abcdef\2ABCDEF"),
+        "png/average": png(3, 2, 0, 8, b"\3abc\4ABC"),
+        "png/palette": png(2, 2, 3, 8, b"\0\0\1\0\1\0", b"rgbRGB"),
+        "png/beyond": png(2, 1, 3, 8, b"\0\0\2", b"rgbRGB"),
+        "png/wide": png(2, 1, 4, 16, b"\4abcdefgh"),
+        "png/bits": png(9, 1, 0, 1, b"\0ab"),
+        "png/interlaced": png(1, 1, 2, 8, b"\0abc", interlaced=1),
         "yolo/data": b"path: ../x\nnames:\n  0: person\n  1: 'a b'\nkpt_shape: [17, 3]\nflip_idx: [0, 2, 1]\n",
         "yolo/aliases": b"a: &a [x, y]\nb: &b [*a, *a]\nnames: *a\n",
         "yolo/boxes": b"0 0.5 0.5 0.25 1e-1\r\n1 0.1 0.2 0.2 0.4\n",

@@ -1,5 +1,7 @@
 #include "tests/fuzz/readers.h"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -9,6 +11,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/outlines.h"
 #include "stages/base/archives/cdf_matrix.h"
+#include "stages/base/images/image_file.h"
 #include "stages/frames/events/recording_labels.h"
 #include "stages/frames/index_mask.h"
 #include "stages/frames/label_name.h"
@@ -262,6 +265,44 @@ void read_mask_input(std::span<const std::uint8_t> input, const std::filesystem:
   annotation.boxes.resize(2, Box{.xyxy = {0, 0, 4, 3}});
   annotation.left_out_at = {1};
   give_outlines(scratch, "input", mask->size(), "labels", annotation);
+}
+
+void read_png_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {
+  constexpr std::size_t kHeader = 13;
+  if (input.size() <= kHeader) return;
+  const auto chunk = [](const std::string& kind_and_data) {
+    const auto big_endian = [](std::uint64_t value) {
+      std::string bytes;
+      for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift);
+      return bytes;
+    };
+    const auto* const bytes = reinterpret_cast<const Bytef*>(kind_and_data.data());
+    return big_endian(kind_and_data.size() - 4) + kind_and_data +
+           big_endian(crc32(0, bytes, static_cast<uInt>(kind_and_data.size())));
+  };
+  const std::span<const std::uint8_t> after = input.subspan(kHeader + 1);
+  const std::size_t palette = std::min<std::size_t>(3 * input[kHeader], after.size());
+  const std::span<const std::uint8_t> rows = after.subspan(palette);
+  std::string stream(compressBound(rows.size()), '\0');
+  uLongf size = stream.size();
+  if (compress(reinterpret_cast<Bytef*>(stream.data()), &size, rows.data(), rows.size()) != Z_OK) {
+    std::abort();
+  }
+  std::ofstream(scratch, std::ios::binary)
+      << "\x89PNG\r\n\x1a\n"
+      << chunk("IHDR" + text_of(input.first(kHeader)))
+      << (palette > 0 ? chunk("PLTE" + text_of(after.first(palette))) : "")
+      << chunk("IDAT" + stream.substr(0, size)) << chunk("IEND");
+  try {
+    const ColourFrame frame = decode_image_file(scratch);
+    if (frame.bgr.size() != 3 * frame.size.pixel_count()) std::abort();
+  } catch (const std::runtime_error&) {
+  }
+  try {
+    const IndexImage image = decode_index_image(InputFile(scratch));
+    if (image.indices.size() != image.size.pixel_count()) std::abort();
+  } catch (const std::runtime_error&) {
+  }
 }
 
 void read_aedat4_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {

@@ -55,6 +55,14 @@ void read_csv_input(std::span<const std::uint8_t> input, const std::filesystem::
 void read_coco_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
 void read_mask_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
 void read_yolo_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
+
+/// What reading an image may take: a header may announce kMaxImagePixels.
+constexpr std::uint64_t most_png_memory(std::uint64_t) { return std::uint64_t{512} << 20; }
+
+/// 13 bytes of a PNG's header, the number of colours in its palette, these, and its rows, put into
+/// a file with sound checksums: its colours and its numbers.
+void read_png_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
+
 /// What reading a recording in AEDAT 4.0 may take: of what is unpacked, at most 256 MiB and as much
 /// again while that grows, its events and its XML, and what the unpackers keep.
 constexpr std::uint64_t most_aedat4_memory(std::uint64_t) { return std::uint64_t{1536} << 20; }

@@ -77,7 +77,7 @@ TEST(RunDeflater, EmptyVolumesAreNearlyNothing) {
   EXPECT_LT(deflated(deflater, zeros).size(), 7'752u + 200u);
 }
 
-/// A block ends with the 256 KiB that give it 32,768 literals, or after 16 MiB.
+/// A block ends with the 256 KiB that give it 65,536 literals, or after 16 MiB.
 TEST(RunDeflater, BlocksOfEverySize) {
   RunDeflater deflater;
   for (const std::size_t size : {(1u << 18) - 1, 1u << 18, (1u << 18) + 1, (1u << 24) - 1, 1u << 24,
