@@ -98,9 +98,22 @@ class Pack(unittest.TestCase):
                 self.assertEqual((digest, int(size)), (f"sha256={expected}", len(data)))
             self.assertIn("\nVersion: 1.2.3\n", wheel.read("eventgan-1.2.3.dist-info/METADATA").decode())
 
+    def test_tar_reads_the_archive_as_one(self):
+        self.build()
+        (self.tree / "lib").mkdir()
+        for name in ("a", "libeventgan-weights.so.1", "z"):
+            (self.tree / "lib" / name).write_bytes(name.encode() * 1000)
+        out = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-"))
+        self.addCleanup(shutil.rmtree, out)
+        subprocess.run(["tar", "-xf", pack.write_archive(self.tree, out, "1.2.3"), "-C", out], check=True)
+        (unpacked,) = out.glob("eventgan-1.2.3-linux-*/")
+        subprocess.run(["diff", "--recursive", self.tree, unpacked], check=True)
+        self.assertTrue(os.access(unpacked / "bin" / "program", os.X_OK))
+        self.assertFalse(os.access(unpacked / "lib" / "a", os.X_OK))
+
 
 if __name__ == "__main__":
-    missing = [name for name in ("cc", "objdump") if not shutil.which(name)]
+    missing = [name for name in ("cc", "objdump", "xz") if not shutil.which(name)]
     if missing or sys.version_info < (3, 11):
         print(f"skipped: no {', '.join(missing) or 'Python 3.11'}")
         sys.exit(SKIPPED)
