@@ -15,6 +15,8 @@
 #include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/conversion/convert.h"
+#include "pipeline/dataset/dataset_description.h"
+#include "pipeline/dataset/finalize.h"
 #include "pipeline/generators/load_generator.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"
@@ -28,6 +30,7 @@ struct ConvertArguments {
   std::optional<std::string> shards;
   std::optional<std::string> sensor;
   std::optional<std::int64_t> limit;
+  bool no_finalize = false;
   double grace_s = ConversionOptions().grace_s;
   std::optional<std::string> profile;
 };
@@ -50,7 +53,19 @@ std::string trial_text(const JobOptions& job, const ConversionReport& report) {
                      count_text(report.plan_pairs, "pair"), job.manifest);
 }
 
-int convert_and_report(const JobOptions& job, const GivenJob& given, ConversionOptions options) {
+/// As `eventgan finalize` does; returns an exit code.
+int complete_dataset(const JobOptions& job, const fs::path& folder) {
+  FinalizationOptions options;
+  options.show_phase = show_phases(job.progress);
+  const FinalizationReport report = finalize(folder, options);
+  if (report.complete()) return kComplete;
+  tell_error("a shard is gone since it was made:\n" + to_text(report));
+  return kFailed;
+}
+
+int convert_and_report(const ConvertArguments& arguments, const GivenJob& given,
+                       ConversionOptions options) {
+  const JobOptions& job = arguments.job;
   const JobManifest& manifest = given.manifest;
   const LoadedGenerator loaded = [&] {
     const TraceSpan span(options.trace, "load generator", "job");
@@ -66,10 +81,19 @@ int convert_and_report(const JobOptions& job, const GivenJob& given, ConversionO
   };
   const ConversionReport report =
       convert(manifest, *loaded.generator, loaded.weights_hash, options);
-  std::cout << (job.as_json() ? to_json(report) : to_text(report));
+  if (!job.as_json()) std::cout << to_text(report) << std::flush;
+  int code = judge(report, manifest.errors);
+  // A worker with a part of the plan cannot know when the others are done.
+  if (code == kComplete && options.part.count == 1 && !arguments.no_finalize) {
+    code = complete_dataset(job, *options.output);
+    if (code == kComplete && !job.as_json()) {
+      std::cout << fmt::format("complete: {}, {}\n", kDescriptionName, kViewName);
+    }
+  }
   if (options.limit && !job.as_json()) std::cout << trial_text(job, report);
+  if (job.as_json()) std::cout << to_json(report);
   std::cout << std::flush;
-  return judge(report, manifest.errors);
+  return code;
 }
 
 /// OUT-trial-20 beside OUT.
@@ -97,7 +121,7 @@ int run(const ConvertArguments& arguments) {
   options.note = [](const std::string& text) { tell(text); };
   return run_profiled({arguments.profile, "convert", folder}, [&](TraceRecorder* trace) {
     options.trace = trace;
-    return convert_and_report(job, given, options);
+    return convert_and_report(arguments, given, options);
   });
 }
 
@@ -107,8 +131,10 @@ void add_convert_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "convert",
       "Convert labelled frames into shards\nTurns each pair of frames into an event volume "
-      "(a voxel grid of events) with the labels of its labelled frame. Run the same command again "
-      "to resume. Several workers can share the output folder. On SIGTERM, SIGINT or SIGUSR1 the "
+      "(a voxel grid of events) with the labels of its labelled frame, and completes the dataset "
+      "as "
+      "`finalize` does. Run the same command again to resume. Several workers can share the output "
+      "folder. On SIGTERM, SIGINT or SIGUSR1 the "
       "current shard is finished or dropped, and the exit code is 75.");
   const auto arguments = std::make_shared<ConvertArguments>();
   add_job_options(*command, arguments->job, kGivenJob, kGivenJobText,
@@ -124,6 +150,8 @@ void add_convert_command(CLI::App& app, int& exit_code) {
                    "OUTPUT-trial-N beside the manifest's output folder, or into --output")
       ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()))
       ->option_text("N");
+  command->add_flag("--no-finalize", arguments->no_finalize,
+                    "Leave dataset.json and dataset.h5 to `eventgan finalize`; so does a part");
   command->add_option(kSensorOption, arguments->sensor, kSensorText)->option_text("WIDTHxHEIGHT");
   add_grace_option(*command, arguments->grace_s);
   add_profile_option(*command, arguments->profile);
