@@ -84,7 +84,9 @@ class CommandLine(program.InFolder):
             done = subprocess.run([installed, *arguments], capture_output=True, text=True)
             self.assertEqual(done.returncode, 1, done.stderr)
             self.assertEqual(done.stderr, "error: expected eventgan-torch, got none in "
-                             f"{self.folder}/libexec/eventgan: install the package eventgan-torch\n")
+                             f"{self.folder}/libexec/eventgan: install the Debian package "
+                             "eventgan-torch, take the image with LibTorch, or build it (docker/bootstrap.sh package, "
+                             "docker build --target torch, docker/bootstrap.sh build)\n")
             self.assertEqual(done.stdout, "")
         self.assertFalse((self.folder / "out").exists())
         with_torch = self.folder / "libexec" / "eventgan" / "eventgan-torch"

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .representations import signed_channel
     from .shards import FIELDS, InvalidSample, Sample, Shards, open_shard, read_description
 
-__version__ = "0.2.0"
+__version__ = "1.0.0"
 
 _MODULE_OF = {
     "Generator": "generator", "sample_events": "generator",

@@ -167,8 +167,8 @@ def find_program() -> str:
             raise FileNotFoundError(f"expected the program eventgan, got none, in {named} (EVENTGAN_PROGRAM)")
         return named
     package = os.path.dirname(__file__)
-    # From PREFIX/lib/python3/dist-packages/eventgan, and from build/release/python/eventgan.
-    for name in ("../../../../bin/eventgan", "../../eventgan", "eventgan"):
+    # In the wheel; from PREFIX/lib/python3/dist-packages/eventgan, and from build/release/python/eventgan.
+    for name in ("./bin/eventgan", "../../../../bin/eventgan", "../../eventgan", "eventgan"):
         found = shutil.which(os.path.normpath(os.path.join(package, name)) if "/" in name else name)
         if found:
             return found
