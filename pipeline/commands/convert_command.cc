@@ -15,7 +15,6 @@
 #include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/conversion/convert.h"
-#include "pipeline/dataset/dataset_description.h"
 #include "pipeline/dataset/finalize.h"
 #include "pipeline/generators/load_generator.h"
 #include "pipeline/runtime/errors.h"
@@ -53,14 +52,16 @@ std::string trial_text(const JobOptions& job, const ConversionReport& report) {
                      count_text(report.plan_pairs, "pair"), job.manifest);
 }
 
-/// As `eventgan finalize` does; returns an exit code.
-int complete_dataset(const JobOptions& job, const fs::path& folder) {
+/// Completes the dataset as `eventgan finalize` does; false, and says why, if a shard is gone
+/// again.
+bool is_finalized(const JobOptions& job, const fs::path& folder) try {
   FinalizationOptions options;
   options.show_phase = show_phases(job.progress);
   const FinalizationReport report = finalize(folder, options);
-  if (report.complete()) return kComplete;
-  tell_error("a shard is gone since it was made:\n" + to_text(report));
-  return kFailed;
+  if (!report.complete()) tell_error(to_text(report));
+  return report.complete();
+} catch (const InputError& error) {  // of the shards, which are no input here
+  throw std::runtime_error(error.what());
 }
 
 int convert_and_report(const ConvertArguments& arguments, const GivenJob& given,
@@ -79,21 +80,25 @@ int convert_and_report(const ConvertArguments& arguments, const GivenJob& given,
     if (!loaded.choice.empty()) tell(loaded.choice);
     for (const std::string& warning : loaded.warnings) tell_warning(warning);
   };
-  const ConversionReport report =
-      convert(manifest, *loaded.generator, loaded.weights_hash, options);
-  if (!job.as_json()) std::cout << to_text(report) << std::flush;
-  int code = judge(report, manifest.errors);
+  ConversionReport report = convert(manifest, *loaded.generator, loaded.weights_hash, options);
+  const int code = judge(report, manifest.errors);
+  const auto print = [&] {
+    std::cout << (job.as_json() ? to_json(report) : to_text(report));
+    if (options.limit && !job.as_json()) std::cout << trial_text(job, report);
+    std::cout << std::flush;
+  };
   // A worker with a part of the plan cannot know when the others are done.
-  if (code == kComplete && options.part.count == 1 && !arguments.no_finalize) {
-    code = complete_dataset(job, *options.output);
-    if (code == kComplete && !job.as_json()) {
-      std::cout << fmt::format("complete: {}, {}\n", kDescriptionName, kViewName);
+  const bool finalizes = options.part.count == 1 && !arguments.no_finalize;
+  if (code == kComplete && finalizes) {
+    try {
+      report.finalized = is_finalized(job, *options.output);
+    } catch (...) {
+      print();
+      throw;
     }
   }
-  if (options.limit && !job.as_json()) std::cout << trial_text(job, report);
-  if (job.as_json()) std::cout << to_json(report);
-  std::cout << std::flush;
-  return code;
+  print();
+  return code == kComplete && !report.finalized && finalizes ? kFailed : code;
 }
 
 /// OUT-trial-20 beside OUT.
