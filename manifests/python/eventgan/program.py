@@ -74,7 +74,7 @@ def init(*paths: PathLike, out: PathLike = "manifest.json") -> pathlib.Path:
 
 def convert(manifest: PathLike | Mapping[str, Any], output: PathLike | None = None, *, threads: int | None = None,
             progress: Literal[False] | Callable[[Event], object] | None = None) -> Shards:
-    """Makes the shards of a manifest and completes the dataset, as `eventgan convert` and then `eventgan finalize` do.
+    """Makes the shards of a manifest and completes the dataset, as `eventgan convert` does.
 
     A second call keeps what is finished and makes the rest. KeyboardInterrupt (Ctrl-C, a notebook's stop button) stops
     the program cleanly: it finishes or drops the current shard, then the exception is raised. A second interrupt drops
@@ -113,7 +113,8 @@ def convert(manifest: PathLike | Mapping[str, Any], output: PathLike | None = No
     on_event: Callable[[Event], object] = progress or shown
     with contextlib.closing(shown), _manifest_file(manifest) as file:
         # All shards, even in a cluster's job: the whole folder is returned.
-        report = _follow(on_event, "convert", "--progress", "json", "--shards", "all", *given, "--", file)
+        report = _follow(on_event, "convert", "--progress", "json", "--shards", "all", "--no-finalize", *given, "--",
+                         file)
         if "folder" not in report:
             raise ProgramError(f"expected a report of the program eventgan, got {json.dumps(report)[:1000]}, from "
                                f"{find_program()}", 1)
