@@ -21,7 +21,8 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Literal
 
-from .shards import PathLike, Shards
+from .open_shards import PathLike
+from .shards import Shards
 
 Event = dict[str, Any]
 

@@ -74,7 +74,7 @@ class ShardFormatPage(unittest.TestCase):
         rows = re.findall(r"(?m)^\| `(\w+)` \| (.*) \|$", PAGE.read_text(encoding="utf-8").split("## Versions")[1])
         features = [name for name, _ in rows]
         self.assertEqual(list(self.file.attrs["features"]), features)  # this shard has everything
-        self.assertEqual(eventgan.shards.FEATURES, set(features))
+        self.assertEqual(eventgan.open_shards.FEATURES, set(features))
         told = {path for _, what in rows for path in re.findall(r"`(/[\w/]+)`", what)}
         optional = {path for path, _, _, what in self.datasets
                     if what.startswith(("optional", "1 = tile", "share of the sample"))}
