@@ -3,9 +3,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string_view>
+#include <vector>
 
 #include "stages/base/images/image_codecs.h"
 #include "stages/base/images/image_file.h"
