@@ -59,9 +59,11 @@ class OpenShard:
         self.volumes = f"{' x '.join(map(str, self._volume.shape[1:]))}, {self._volume.dtype}"
 
     def fit(self) -> str:
+        """How images came to the size of the volumes, as in the manifest."""
         return json.loads(self.file.attrs["preprocessing"])["fit"]
 
     def volume(self, slot: int, decode: bool) -> Sample:
+        """`volume`, float32 [2B, H, W]; not decoded as it is stored, with its `scale`."""
         scale = self.column("events/scale")[slot]
         if not decode:
             return {"volume": self._volume[slot], "scale": scale}
@@ -99,14 +101,17 @@ class OpenShard:
         return columns[name]
 
     def has(self, name: str) -> bool:
+        """Whether there is an object of this path."""
         if not self._kept.paths:
             self.file.visit(self._kept.paths.add)
         return name in self._kept.paths
 
     def row(self, group: str, slot: int) -> Sample:
+        """A sample's value in each column of a group."""
         return {name: column[slot] for name, column in self._group(group)}
 
     def rows(self, group: str, slot: int) -> Sample:
+        """A sample's rows in each column of a group of labels."""
         first, last = self.column(group + "/offsets")[slot : slot + 2]
         rows = {name: column[first:last] for name, column in self._group(group) if name != "offsets"}
         if "outline" in rows:
@@ -114,12 +119,14 @@ class OpenShard:
         return rows
 
     def names(self, item: str, attribute: str) -> list[str]:
+        """The names in an attribute; none where it is not."""
         names = self._kept.names
         if (item, attribute) not in names:
             names[item, attribute] = list(self.file[item].attrs.get(attribute, ()))
         return names[item, attribute]
 
     def joint_places(self, names: Iterable[str]) -> list[int]:
+        """The places of joints among the shard's, by name or alias."""
         known, aliases = self.names("labels/poses", "joint_names"), self.names("labels/poses", "joint_aliases")
         places = {**{alias: i for i, alias in enumerate(aliases) if alias}, **{name: i for i, name in enumerate(known)}}
         unknown = [name for name in names if name not in places]
@@ -159,6 +166,7 @@ class OpenShards:
         return self._open[path]
 
     def close(self) -> None:
+        """Closes the files; they are opened again when they are needed."""
         if self._process == os.getpid():
             for shard in self._open.values():
                 shard.file.close()
