@@ -4,6 +4,8 @@
 #   docker/bootstrap.sh test         the whole test suite
 #   docker/bootstrap.sh build        only the program, build/release/eventgan
 #   docker/bootstrap.sh package      Debian packages, build/release/*.deb: eventgan, eventgan-torch adds LibTorch, libeventgan1, its -dev, python3-eventgan
+#   docker/bootstrap.sh wheel        for any Linux, on Debian 12: build/wheel/*.whl for pip and *.tar.xz to unpack, without LibTorch
+#   docker/bootstrap.sh release      on Debian 12: build/files, what a release has: packages, wheel, archive, sources, SHA-256 sums
 #   docker/bootstrap.sh packages [LIST...]   only installs what is missing of docker/packages/LIST.txt (default: build test)
 # Run again, it does only what is left to do. JOBS sets the number of compilers at a time (default: all cores).
 set -euo pipefail
@@ -17,17 +19,21 @@ listed() { sed -e 's/#.*//' -e '/^[[:space:]]*$/d' "$@"; }
 
 installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q 'ok installed'; }
 
-# Whether this is a Debian that has the packages under the names of docker/packages; says what helps where it is not.
+# Whether apt may have the packages under the names of docker/packages; says what helps where it has not.
 is_supported() (
   ID='' VERSION_ID='' PRETTY_NAME=$(uname)
   [ ! -r /etc/os-release ] || . /etc/os-release
-  [[ "$ID $VERSION_ID" == "debian 12" || "$ID $VERSION_ID" == "debian 13" ]] && return
-  echo "expected Debian 12 or 13, got $PRETTY_NAME: install yourself what Debian calls $*," \
+  case "$ID $VERSION_ID" in
+    "debian 12" | "debian 13") return ;;
+    "ubuntu 22.04" | "ubuntu 24.04") echo "$PRETTY_NAME is untested: trying apt under Debian's names" >&2; return ;;
+  esac
+  echo "expected Debian 12 or 13, got $PRETTY_NAME: install yourself what Debian calls as follows, or take the wheel," \
     "or build the image: docker build --file docker/Dockerfile --tag eventgan ." >&2
+  printf '%s\n' "$@" >&2
   return 1
 )
 
-# Installs the packages of the given lists that are missing; asks for rights only if there are any. On another system all
+# Installs the packages of the given lists that are missing; asks for rights only if there are any. Where apt cannot, all
 # but `packages` goes on: what is there under another name does, and CMake names what is not there.
 install_packages() {
   local missing=() package
@@ -66,6 +72,35 @@ package() {
   install_packages docker/packages/package.txt
   say "packing"
   (cd build/release && cpack)
+}
+
+# On Debian 12, the oldest of the tag: what is built there asks for no newer glibc.
+wheel() {
+  install_packages docker/packages/build.txt docker/packages/package.txt docker/packages/wheel.txt
+  say "building FFmpeg"
+  JOBS=$jobs docker/wheel/ffmpeg.sh build/wheel/ffmpeg
+  say "building"
+  PKG_CONFIG_PATH=$PWD/build/wheel/ffmpeg/lib/pkgconfig \
+    cmake --preset release -B build/wheel -DEVENTGAN_TESTS=OFF -DEVENTGAN_PORTABLE=ON
+  cmake --build build/wheel -j "$jobs" --target eventgan libeventgan
+  say "packing"
+  docker/wheel/pack.py build/wheel
+}
+
+# What .github/workflows/release.yml attaches to a tag. The sources are those of the last commit, so nothing may differ.
+release() {
+  local git=(git -c safe.directory='*')  # a container's root may not own the checkout
+  [ -z "$("${git[@]}" status --porcelain)" ] || { echo "expected no change since the last commit: git status" >&2; exit 1; }
+  package
+  wheel
+  local version
+  version=$(sed -n 's/^CMAKE_PROJECT_VERSION:STATIC=//p' build/wheel/CMakeCache.txt)
+  say "collecting"
+  rm -rf build/files
+  mkdir -p build/files
+  cp build/release/*"$version"*.deb build/wheel/eventgan-"$version"-* build/files
+  "${git[@]}" archive --prefix "eventgan-$version/" HEAD | xz >"build/files/eventgan-$version.tar.xz"
+  (cd build/files && sha256sum -- * >SHA256SUMS && cat SHA256SUMS)
 }
 
 demo() {
@@ -110,6 +145,8 @@ case "$task" in
   test) run_tests ;;
   build) build_program ;;
   package) package ;;
+  wheel) wheel ;;
+  release) release ;;
   packages) packages "${@:2}" ;;
-  *) sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 64 ;;
+  *) sed -n '2,11s/^# \{0,1\}//p' "$0" >&2; exit 64 ;;
 esac

@@ -9,7 +9,11 @@ namespace eventgan {
 namespace {
 
 [[noreturn]] void hand_over() {
-  throw HandOver{"eventgan-torch", "install the package eventgan-torch"};
+  throw HandOver{
+      "eventgan-torch",
+      "install the Debian package eventgan-torch, take the image with LibTorch, or build "
+      "it (docker/bootstrap.sh package, docker build --target torch, "
+      "docker/bootstrap.sh build)"};
 }
 
 }  // namespace

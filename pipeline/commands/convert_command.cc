@@ -15,6 +15,7 @@
 #include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/conversion/convert.h"
+#include "pipeline/dataset/finalize.h"
 #include "pipeline/generators/load_generator.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"
@@ -28,6 +29,7 @@ struct ConvertArguments {
   std::optional<std::string> shards;
   std::optional<std::string> sensor;
   std::optional<std::int64_t> limit;
+  bool no_finalize = false;
   double grace_s = ConversionOptions().grace_s;
   std::optional<std::string> profile;
 };
@@ -50,7 +52,21 @@ std::string trial_text(const JobOptions& job, const ConversionReport& report) {
                      count_text(report.plan_pairs, "pair"), job.manifest);
 }
 
-int convert_and_report(const JobOptions& job, const GivenJob& given, ConversionOptions options) {
+/// Completes the dataset as `eventgan finalize` does; false, and says why, if a shard is gone
+/// again.
+bool is_finalized(const JobOptions& job, const fs::path& folder) try {
+  FinalizationOptions options;
+  options.show_phase = show_phases(job.progress);
+  const FinalizationReport report = finalize(folder, options);
+  if (!report.complete()) tell_error(to_text(report));
+  return report.complete();
+} catch (const InputError& error) {  // of the shards, which are no input here
+  throw std::runtime_error(error.what());
+}
+
+int convert_and_report(const ConvertArguments& arguments, const GivenJob& given,
+                       ConversionOptions options) {
+  const JobOptions& job = arguments.job;
   const JobManifest& manifest = given.manifest;
   const LoadedGenerator loaded = [&] {
     const TraceSpan span(options.trace, "load generator", "job");
@@ -64,12 +80,25 @@ int convert_and_report(const JobOptions& job, const GivenJob& given, ConversionO
     if (!loaded.choice.empty()) tell(loaded.choice);
     for (const std::string& warning : loaded.warnings) tell_warning(warning);
   };
-  const ConversionReport report =
-      convert(manifest, *loaded.generator, loaded.weights_hash, options);
-  std::cout << (job.as_json() ? to_json(report) : to_text(report));
-  if (options.limit && !job.as_json()) std::cout << trial_text(job, report);
-  std::cout << std::flush;
-  return judge(report, manifest.errors);
+  ConversionReport report = convert(manifest, *loaded.generator, loaded.weights_hash, options);
+  const int code = judge(report, manifest.errors);
+  const auto print = [&] {
+    std::cout << (job.as_json() ? to_json(report) : to_text(report));
+    if (options.limit && !job.as_json()) std::cout << trial_text(job, report);
+    std::cout << std::flush;
+  };
+  // A worker with a part of the plan cannot know when the others are done.
+  const bool finalizes = options.part.count == 1 && !arguments.no_finalize;
+  if (code == kComplete && finalizes) {
+    try {
+      report.finalized = is_finalized(job, *options.output);
+    } catch (...) {
+      print();
+      throw;
+    }
+  }
+  print();
+  return code == kComplete && !report.finalized && finalizes ? kFailed : code;
 }
 
 /// OUT-trial-20 beside OUT.
@@ -97,7 +126,7 @@ int run(const ConvertArguments& arguments) {
   options.note = [](const std::string& text) { tell(text); };
   return run_profiled({arguments.profile, "convert", folder}, [&](TraceRecorder* trace) {
     options.trace = trace;
-    return convert_and_report(job, given, options);
+    return convert_and_report(arguments, given, options);
   });
 }
 
@@ -107,8 +136,10 @@ void add_convert_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "convert",
       "Convert labelled frames into shards\nTurns each pair of frames into an event volume "
-      "(a voxel grid of events) with the labels of its labelled frame. Run the same command again "
-      "to resume. Several workers can share the output folder. On SIGTERM, SIGINT or SIGUSR1 the "
+      "(a voxel grid of events) with the labels of its labelled frame, and completes the dataset "
+      "as "
+      "`finalize` does. Run the same command again to resume. Several workers can share the output "
+      "folder. On SIGTERM, SIGINT or SIGUSR1 the "
       "current shard is finished or dropped, and the exit code is 75.");
   const auto arguments = std::make_shared<ConvertArguments>();
   add_job_options(*command, arguments->job, kGivenJob, kGivenJobText,
@@ -124,6 +155,8 @@ void add_convert_command(CLI::App& app, int& exit_code) {
                    "OUTPUT-trial-N beside the manifest's output folder, or into --output")
       ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()))
       ->option_text("N");
+  command->add_flag("--no-finalize", arguments->no_finalize,
+                    "Leave dataset.json and dataset.h5 to `eventgan finalize`; so does a part");
   command->add_option(kSensorOption, arguments->sensor, kSensorText)->option_text("WIDTHxHEIGHT");
   add_grace_option(*command, arguments->grace_s);
   add_profile_option(*command, arguments->profile);

@@ -106,7 +106,8 @@ std::string to_text(const ConversionReport& report) {
                         report.quarantined.size() - listed);
   }
   if (report.stopped) text += "\nstopped on request; run the same command again to resume";
-  text += "\n" + notes_text(report.notes) + report.folder + "\n";
+  text += "\n" + notes_text(report.notes) + report.folder;
+  text += report.finalized ? ": dataset.json, dataset.h5\n" : "\n";
   if (!report.quarantined.empty()) {
     text += "next, once the inputs are fixed:  eventgan retry " + report.folder + "\n";
   }
@@ -139,6 +140,7 @@ std::string to_json(const ConversionReport& report) {
                                {"plan_shards", report.plan_shards},
                                {"quarantined_elsewhere", report.quarantined_elsewhere},
                                {"stopped", report.stopped},
+                               {"finalized", report.finalized},
                                {"complete", report.complete()},
                                {"stored_bytes", report.stored_bytes},
                                {"volume_bytes", report.volume_bytes},

@@ -30,7 +30,8 @@ struct ConversionReport {
   std::int64_t volume_bytes = 0;  ///< size of their volumes uncompressed, in the stored type
   std::map<std::string, double> stage_seconds;  ///< busy time by stage, of this run
   double wall_seconds = 0;
-  bool stopped = false;  ///< a request to stop came before the part was complete
+  bool stopped = false;    ///< a request to stop came before the part was complete
+  bool finalized = false;  ///< the dataset is complete, too (see finalize)
 
   std::int64_t plan_pairs = 0;  ///< of the whole plan
   int plan_shards = 0;

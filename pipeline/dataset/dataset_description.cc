@@ -17,6 +17,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "pipeline/folder/shard_guard.h"
+#include "stages/base/files/sha256.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_tables.h"
 
@@ -326,6 +327,12 @@ std::string describe_dataset(const DatasetParts& parts, const std::vector<Datase
                   {"views", Json::array()}};
   for (const DatasetView& view : views) json["view"]["views"].push_back(view_entry(view));
   return text_of(json);
+}
+
+std::string describe_present_view(const fs::path& folder, const DatasetParts& parts) {
+  const fs::path view = folder / kViewName;
+  return describe_dataset(parts, views_of(parts),
+                          {sha256_of_file(view), static_cast<std::int64_t>(fs::file_size(view))});
 }
 
 std::string describe_dataset(const DatasetParts& parts) { return text_of(description(parts)); }

@@ -84,6 +84,9 @@ void add(const CommitRecord& record, DatasetCounts& counts);
 std::string describe_dataset(const DatasetParts& parts, const std::vector<DatasetView>& views,
                              const ViewReceipt& receipt);
 
+/// What dataset.json must be beside the view that is in the folder.
+std::string describe_present_view(const std::filesystem::path& folder, const DatasetParts& parts);
+
 /// The same before there is a view: without "view".
 std::string describe_dataset(const DatasetParts& parts);
 

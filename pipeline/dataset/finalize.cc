@@ -12,8 +12,11 @@
 #include "pipeline/dataset/dataset_description.h"
 #include "pipeline/folder/shard_backup.h"
 #include "stages/base/files/atomic_file.h"
+#include "stages/base/files/input_file.h"
 
 namespace eventgan {
+
+namespace fs = std::filesystem;
 
 FinalizationReport finalize(const std::filesystem::path& folder,
                             const FinalizationOptions& options) {
@@ -35,10 +38,15 @@ FinalizationReport finalize(const std::filesystem::path& folder,
   if (parts.done.empty() || (!report.complete() && !options.partial)) return report;
 
   const std::vector<DatasetView> views = views_of(parts);
-  const ViewReceipt receipt = write_dataset_view(folder / kViewName, views);
-  write_file_atomically(folder / kDescriptionName, describe_dataset(parts, views, receipt));
   report.views = static_cast<int>(views.size());
   report.written = true;
+  const fs::path description = folder / kDescriptionName;
+  if (fs::exists(description) && fs::exists(folder / kViewName) &&
+      read_text_file(description) == describe_present_view(folder, parts)) {
+    return report;  // the same shards: nothing is touched
+  }
+  const ViewReceipt receipt = write_dataset_view(folder / kViewName, views);
+  write_file_atomically(description, describe_dataset(parts, views, receipt));
   return report;
 }
 

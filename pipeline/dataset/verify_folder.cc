@@ -120,8 +120,7 @@ std::vector<std::string> dataset_faults(const fs::path& folder, FrozenOutline fr
       return {description.string() +
               ": expected an intact shard of each source to compare it with, got damaged ones"};
     }
-    const ViewReceipt receipt{sha256_of_file(view), static_cast<std::int64_t>(fs::file_size(view))};
-    const std::string expected = describe_dataset(parts, views_of(parts), receipt);
+    const std::string expected = describe_present_view(folder, parts);
     const std::string got = read_text_file(description);
     if (got == expected) return {};
     return {description.string() + ": expected what the commit records and " + kViewName +

@@ -350,8 +350,9 @@ bool outdate_dataset(const fs::path& folder, const std::string& shard) {
       })) {
     return false;
   }
-  fs::remove(description);
+  // The view first: killed in between, the next run finds the description and removes it, too.
   fs::remove(folder / "dataset.h5");
+  fs::remove(description);
   return true;
 }
 

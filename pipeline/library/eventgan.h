@@ -72,7 +72,7 @@ typedef struct eventgan_event {
   int8_t p; /* 1 positive, 0 negative */
 } eventgan_event;
 
-/* "0.2.0" */
+/* "1.0.0" */
 EVENTGAN_API const char* eventgan_version(void);
 
 /* Why the last call of this thread that failed did so: "expected X, got Y, in PATH", a line a

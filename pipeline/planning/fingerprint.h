@@ -28,7 +28,7 @@ std::map<std::string, std::string> make_fingerprint(
 /// How frames are prepared, as compact JSON; is in the fingerprint and in every shard.
 std::string preprocessing_json(const ImageSpec& image);
 
-/// Name and version of this program: "eventgan 0.2.0".
+/// Name and version of this program: "eventgan 1.0.0".
 std::string program_version();
 
 /// That and what else decides over a shard's bytes: the libraries that are loaded, the engines, the

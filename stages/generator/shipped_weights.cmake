@@ -23,12 +23,22 @@ file(CONFIGURE OUTPUT ${assembly} @ONLY CONTENT
   .section .data.rel.ro, \"aw\"
   .balign 8
   .globl eventgan_shipped_begin
+  .type eventgan_shipped_begin, %object
 eventgan_shipped_begin:
-@table@  .globl eventgan_shipped_end
+@table@  .size eventgan_shipped_begin, . - eventgan_shipped_begin
+  .globl eventgan_shipped_end
+  .type eventgan_shipped_end, %object
+  .size eventgan_shipped_end, 0
 eventgan_shipped_end:
   .section .rodata
 @content@  .section .note.GNU-stack, \"\", %progbits
 ")
 set_source_files_properties(${assembly} PROPERTIES OBJECT_DEPENDS "${weights_files}")
 # Apart from the library, whose warnings are for C++.
-add_library(eventgan_shipped_weights OBJECT ${assembly})
+if(EVENTGAN_PORTABLE)  # beside the program and libeventgan, for both
+  add_library(eventgan_shipped_weights SHARED ${assembly})
+  set_target_properties(eventgan_shipped_weights PROPERTIES
+    OUTPUT_NAME eventgan-weights LINKER_LANGUAGE C LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR})
+else()
+  add_library(eventgan_shipped_weights OBJECT ${assembly})
+endif()

@@ -44,7 +44,7 @@ def demo_shards(bench, settings, dtype):
     (demo / "reading.json").write_text(json.dumps(manifest))
     subprocess.run([bench.program, "convert", demo / "reading.json", "--progress", "none"], check=True,
                    capture_output=True)
-    first = min((demo / dtype).glob("*.h5"))
+    first = min((demo / dtype).glob("*-of-*.h5"))
     return [shutil.copy(first, demo / f"{dtype}-{number:02}.h5") for number in range(settings.shards)]
 
 

@@ -40,7 +40,7 @@ class Read:
     seconds: float = 0
 
     def __call__(self, folder):
-        shard, = pathlib.Path(folder).glob("*.h5")
+        shard, = pathlib.Path(folder).glob("*-of-*.h5")
         with h5py.File(shard) as file:
             start = time.process_time()
             stored = file["events/volume"][:]

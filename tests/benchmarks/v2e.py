@@ -172,7 +172,7 @@ def cost_of_job(bench, folders, job):
     counted = []
 
     def count(output):
-        shard, = pathlib.Path(output).glob("*.h5")
+        shard, = pathlib.Path(output).glob("*-of-*.h5")
         with h5py.File(shard) as file:
             counted.append(sum(file[f"events/statistics/sum_{polarity}"][:].mean()
                                for polarity in ("positive", "negative")))

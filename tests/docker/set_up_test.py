@@ -16,7 +16,8 @@ README = (SOURCE / "README.md").read_text(encoding="utf-8")
 SYSTEMS = {"debian 12": 'ID=debian\nVERSION_ID="12"\nPRETTY_NAME="Debian GNU/Linux 12 (bookworm)"\n',
            "debian 13": 'ID=debian\nVERSION_ID="13"\nPRETTY_NAME="Debian GNU/Linux 13 (trixie)"\n',
            "unstable": 'ID=debian\nPRETTY_NAME="Debian GNU/Linux forky/sid"\n',
-           "ubuntu": 'ID=ubuntu\nID_LIKE=debian\nVERSION_ID="24.04"\nPRETTY_NAME="Ubuntu 24.04.2 LTS"\n'}
+           "ubuntu 24.04": 'ID=ubuntu\nID_LIKE=debian\nVERSION_ID="24.04"\nPRETTY_NAME="Ubuntu 24.04.2 LTS"\n',
+           "ubuntu 20.04": 'ID=ubuntu\nID_LIKE=debian\nVERSION_ID="20.04"\nPRETTY_NAME="Ubuntu 20.04.6 LTS"\n'}
 
 
 def listed(name):
@@ -38,6 +39,7 @@ class Script(unittest.TestCase):
             if system:
                 (top / "os-release").write_text(SYSTEMS[system])
             commands = {"dpkg-query": "echo install ok installed" if installed else "exit 1", "id": "echo 0",
+                        "git": "echo ' M README.md'",
                         **{name: f'echo "{name} $*" >>{top}/called' for name in ("apt-get", "cmake", "ctest", "cpack")}}
             (top / "bin").mkdir()
             (top / "build" / "release").mkdir(parents=True)
@@ -57,20 +59,31 @@ class Script(unittest.TestCase):
             self.assertTrue(
                 called[1].endswith(" ".join(["--no-install-recommends", *listed("slurm"), *listed("package")])))
 
+    def test_ubuntu_is_tried_and_called_untested(self):
+        code, called, errors = self.run_on("ubuntu 24.04", "packages", "slurm")
+        self.assertEqual((code, errors), (0, "Ubuntu 24.04.2 LTS is untested: trying apt under Debian's names\n"))
+        self.assertTrue(called[1].endswith(" ".join(["--no-install-recommends", *listed("slurm")])))
+
     def test_elsewhere_packages_says_what_to_do(self):
-        names = {"ubuntu": "Ubuntu 24.04.2 LTS", "unstable": "Debian GNU/Linux forky/sid", None: os.uname().sysname}
+        names = {"ubuntu 20.04": "Ubuntu 20.04.6 LTS", "unstable": "Debian GNU/Linux forky/sid",
+                 None: os.uname().sysname}
         for system, name in names.items():
             code, called, errors = self.run_on(system, "packages", "slurm")
             self.assertEqual((code, called), (1, []))
-            self.assertRegex(errors, rf"\Aexpected Debian 12 or 13, got {re.escape(name)}: .* munge slurm-wlm, "
-                             r".*docker build .*\n\Z")
+            what, *packages = errors.splitlines()
+            self.assertRegex(what, rf"\Aexpected Debian 12 or 13, got {re.escape(name)}: .*docker build ")
+            self.assertEqual(packages, listed("slurm"))
 
     def test_elsewhere_what_is_there_is_built(self):
-        code, called, errors = self.run_on("ubuntu", "package")
+        code, called, errors = self.run_on("unstable", "package")
         self.assertEqual(code, 0)
         self.assertEqual([line.split()[0] for line in called], ["cmake", "cmake", "cpack"])
         self.assertEqual(errors.count("expected Debian 12 or 13"), 2)  # what builds, what packs
-        self.assertEqual(self.run_on("ubuntu", "packages", installed=True), (0, [], ""))
+        self.assertEqual(self.run_on("unstable", "packages", installed=True), (0, [], ""))
+
+    def test_a_release_is_of_what_is_committed(self):
+        self.assertEqual(self.run_on("debian 12", "release"),
+                         (1, [], "expected no change since the last commit: git status\n"))
 
     def test_unknown_words(self):
         self.assertEqual(self.run_on("debian 13", "packages", "nothing")[0], 64)
@@ -162,6 +175,15 @@ class Workflow(unittest.TestCase):
         self.assertTrue(os.access(SOURCE / ".ci" / "run", os.X_OK))
         for step in debian["steps"] + checks["steps"] + image["steps"]:
             self.assertRegex(step.get("uses", "actions/checkout@v4"), r"@v\d+$")
+
+    def test_a_release_is_what_bootstrap_makes_on_the_oldest_debian(self):
+        workflow = yaml.safe_load((SOURCE / ".github" / "workflows" / "release.yml").read_text())
+        self.assertEqual(workflow[True], {"push": {"tags": ["v*"]}})  # YAML 1.1 takes `on` for a truth value
+        files = workflow["jobs"]["files"]
+        self.assertEqual(files["container"]["image"], "debian:bookworm")
+        commands = [step.get("run", "") for step in files["steps"]]
+        self.assertIn("docker/bootstrap.sh release", commands)
+        self.assertIn("tests/docker/portable.py build/wheel", commands)
 
 
 if __name__ == "__main__":

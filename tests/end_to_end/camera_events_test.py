@@ -38,7 +38,7 @@ def events_manifest(source, **changes):
 def rows(out):
     """The valid samples by id: volume, times, difficulty, ignore, boxes."""
     samples = {}
-    for path in sorted(pathlib.Path(out).glob("*.h5")):
+    for path in sorted(pathlib.Path(out).glob("*-of-*.h5")):
         with h5py.File(path) as shard:
             offsets = shard["labels/boxes/offsets"][:] if "labels/boxes" in shard else None
             for i, name in enumerate(shard["pairs/sample_id"][:]):
@@ -142,7 +142,7 @@ class Recordings(program.InFolder):
             {"dataset": "recording", "root": "drive.hdf5", "camera": camera} for camera in ("left", "right")]
         run("convert", self.write_manifest({**events_manifest({}, output={"directory": "out", "samples_per_shard": 9}),
                                             "sources": sources}))
-        shards = sorted(self.out.glob("*.h5"))
+        shards = sorted(self.out.glob("*-of-*.h5"))
         self.assertEqual(len(shards), 3)
         frame = HEIGHT * WIDTH
         for shard, own in zip(shards, (1, 0, 2)):  # the place of the source's grey
@@ -465,7 +465,7 @@ class WithoutFrames(program.InFolder):
             window = self.events[(self.events[:, 2] > end - 0.05) & (self.events[:, 2] <= end)]
             np.testing.assert_allclose(sample["volume"], volume_of(window), rtol=0, atol=1e-4)
         self.assertEqual(samples["drive_td/0000000020.100000"]["xyxy"].tolist(), [[2, 3, 12.5, 10], [4, 4, 8, 8]])
-        with h5py.File(next(self.out.glob("*.h5"))) as shard:
+        with h5py.File(next(self.out.glob("*-of-*.h5"))) as shard:
             names = [text(name) for name in shard["labels/boxes/class_id"].attrs["class_names"]]
             self.assertEqual([names[k] for k in shard["labels/boxes/class_id"][:]], ["pedestrian", "car", "car"])
             self.assertEqual(shard["labels/boxes/track_id"][:].tolist(), [5, 6, 6])
@@ -576,7 +576,7 @@ class WithoutFrames(program.InFolder):
         manifest = self.write_manifest(events_manifest(source))
         shutil.rmtree(self.out)
         run("convert", manifest)
-        with h5py.File(next(self.out.glob("*.h5"))) as shard:
+        with h5py.File(next(self.out.glob("*-of-*.h5"))) as shard:
             names = [text(name) for name in shard["labels/boxes/class_id"].attrs["class_names"]]
             self.assertEqual([names[k] for k in shard["labels/boxes/class_id"][:]], ["person", "dog"])
             self.assertEqual(bytes(shard["labels/original"][0]).decode(), texts[0])
@@ -643,7 +643,7 @@ class WithoutFrames(program.InFolder):
             self.assertIn("--sensor: expected WIDTHxHEIGHT",
                           run("convert", self.folder / "camera.dat", "--sensor", wrong, expect=64)[1])
         run("convert", self.folder / "camera.dat", "--output", out, "--sensor", "640x480")
-        with h5py.File(next(out.glob("*.h5"))) as shard:
+        with h5py.File(next(out.glob("*-of-*.h5"))) as shard:
             self.assertEqual(shard["events/volume"].shape[2:], (480, 640))
             self.assertAlmostEqual(float(shard["events/volume"][:].astype(float).sum()), 3000, delta=2)
         run("convert", self.folder / "camera.dat", "--output", out)
@@ -672,7 +672,7 @@ class Dhp19(program.InFolder):
         manifest = self.write_manifest(events_manifest({"dataset": "dhp19", "root": "dhp19"}))
         run("convert", manifest)
         count = 0
-        for path in sorted((self.folder / "out").glob("*.h5")):
+        for path in sorted((self.folder / "out").glob("*-of-*.h5")):
             with h5py.File(path) as shard:
                 self.assertEqual([text(name) for name in shard["labels/poses"].attrs["joint_names"]], DHP19_JOINTS)
                 for i, name in enumerate(shard["pairs/sample_id"][:]):

@@ -84,7 +84,9 @@ class CommandLine(program.InFolder):
             done = subprocess.run([installed, *arguments], capture_output=True, text=True)
             self.assertEqual(done.returncode, 1, done.stderr)
             self.assertEqual(done.stderr, "error: expected eventgan-torch, got none in "
-                             f"{self.folder}/libexec/eventgan: install the package eventgan-torch\n")
+                             f"{self.folder}/libexec/eventgan: install the Debian package "
+                             "eventgan-torch, take the image with LibTorch, or build it (docker/bootstrap.sh package, "
+                             "docker build --target torch, docker/bootstrap.sh build)\n")
             self.assertEqual(done.stdout, "")
         self.assertFalse((self.folder / "out").exists())
         with_torch = self.folder / "libexec" / "eventgan" / "eventgan-torch"
@@ -170,7 +172,7 @@ class CommandLine(program.InFolder):
         (folder / "cars\x1b[31m" / "image_2" / "000000.png").write_bytes(b"no image")
         out = folder / "out"
         run("convert", path)
-        shards = sorted(out.glob("*.h5"))
+        shards = sorted(out.glob("*-of-*.h5"))
         shown = [*run("convert", path), *run("status", out), *run("verify", out), *run("finalize", out),
                  *run("report", out), *run("plan", path), *run("preview", out, "--out", folder / "p", "--count", 1),
                  *run("init", folder / "cars\x1b[31m", "--out", folder / "new.json"),
@@ -186,7 +188,7 @@ class CommandLine(program.InFolder):
         (self.folder / "small" / "cars" / "image_2" / "000000.png").write_bytes(b"no image")
         run("convert", path)
         folder = path.parent / "out"
-        shards = sorted(folder.glob("*.h5"))
+        shards = sorted(folder.glob("*-of-*.h5"))
         lines = run("verify", folder, "--deep")[0].splitlines()
         told = [line for line in lines if line.startswith("small-train-")]
         self.assertEqual([line.split(":")[0] for line in told], [shard.name for shard in shards])
@@ -202,7 +204,7 @@ class CommandLine(program.InFolder):
         self.assertEqual([shard["condition"] for shard in report["shards"]],
                          ["done", "of another size", "missing", "done", "done"])
         self.assertEqual([len(shard["faults"]) for shard in report["shards"]], [0, 1, 1, 0, 0])
-        self.assertEqual(len(report["faults"]), 2)
+        self.assertEqual(len(report["faults"]), 3)  # and dataset.json tells of the others
         self.assertEqual(report["shards"][0]["size_bytes"], shards[0].stat().st_size)
         self.assertEqual(json.loads(run("verify", folder, "--progress", "json", expect=1)[0]), report)
 
@@ -382,7 +384,7 @@ class CommandLine(program.InFolder):
         path = small_job(self.folder / "small")
         folder = path.parent / "out"
         run("convert", path)
-        shard = sorted(folder.glob("*.h5"))[0]
+        shard = sorted(folder.glob("*-of-*.h5"))[0]
         before = program.shard_bytes(folder)
         for redirection in [">/dev/full", ">&-"]:
             for arguments in [["--help"], ["--version"], ["plan", "--help"], ["plan", path], ["plan", path, "--json"],

@@ -12,8 +12,8 @@ from small_job import LENIENT, broken_cars, small_job
 
 
 class Crash(program.InFolder):
-    def convert(self, out, rule=None, threads=1):
-        arguments = ("convert", self.manifest, "--output", out, "--threads", threads, "--progress", "none")
+    def convert(self, out, rule=None, threads=1, more=()):
+        arguments = ("convert", self.manifest, "--output", out, "--threads", threads, "--progress", "none", *more)
         return failing_files.run(out, rule, *arguments) if rule is not None else run(*arguments)
 
     def undisturbed(self, **job):
@@ -43,7 +43,7 @@ class Crash(program.InFolder):
 
     def test_convert_killed_around_each_step_of_a_commit(self):
         calls = self.undisturbed(cars=2, people=1)
-        shard = sorted(path.name for path in self.expected.glob("*.h5"))[0]
+        shard = sorted(path.name for path in self.expected.glob("*-of-*.h5"))[0]
         record = shard.replace(".h5", ".json")
         steps = [(call.kind, n) for n, call in enumerate(calls, 1)
                  if record in call.path.name or (shard in call.path.name and call.kind != "write")]
@@ -128,7 +128,7 @@ class Crash(program.InFolder):
         broken = self.folder / "broken"
         with broken_cars(self.folder / "job", [1]):
             self.convert(broken)
-        before = content(broken)
+        before = {name: bytes for name, bytes in content(broken).items() if not name.startswith("dataset.")}
         spoiled, = (shard for shard, record in records(broken).items() if record["quarantined"])
         whole = self.folder / "whole"
         shutil.copytree(broken, whole)
@@ -169,7 +169,7 @@ class Crash(program.InFolder):
             self.assertEqual(killed.code, -9, killed.err)
             # before that, it would refuse the inputs that have changed
             if n % 2 and (out / "amendments.json").exists():
-                self.convert(out)
+                self.convert(out, more=["--no-finalize"])
             run("retry", out, "--threads", "1")
             same_content(content(out), expected, out)
             shutil.rmtree(out)

@@ -395,7 +395,7 @@ class EveryColumn(program.InFolder):
     def test_a_changed_value_is_named_by_its_column(self):
         self.assertIn("labels of 15 samples compared", run("verify", self.out, "--deep")[0])
         places = {}  # column: the shards that have rows of it
-        for path in sorted(self.out.glob("*.h5")):
+        for path in sorted(self.out.glob("*-of-*.h5")):
             with h5py.File(path) as shard:
                 names = []
                 shard.visit(names.append)

@@ -27,7 +27,7 @@ def tearDownModule():
 
 def rows(folder):
     """Each sample of a folder's shards: (shard, slot, sample id)."""
-    for path in sorted(pathlib.Path(folder).glob("*.h5")):
+    for path in sorted(pathlib.Path(folder).glob("*-of-*.h5")):
         with h5py.File(path) as shard:
             for slot, sample in enumerate(shard["pairs/sample_id"][:]):
                 yield path, slot, text(sample)
@@ -44,7 +44,7 @@ class Demo(program.InFolder):
         self.assertRegex(err, r"warning: shipped:\d+ are stand-in weights")
         self.assertIn("0 quarantined", out)
         self.assertIn("sound", run("verify", self.folder / "out")[0])
-        shards = sorted((self.folder / "out").glob("*.h5"))
+        shards = sorted((self.folder / "out").glob("*-of-*.h5"))
         self.assertGreaterEqual(len(shards), 3)
         for shard in shards:
             images, err = run("preview", shard, "--out", self.folder / "p", "--count", "2")
@@ -60,7 +60,7 @@ class Demo(program.InFolder):
             folder = self.folder / f"scenes-{scenes}"
             run("make-demo", folder, "--scenes", scenes)
             run("convert", folder / "manifest.json", "--limit", 5, "--progress", "none")
-            splits = {path.name.split("-")[1] for path in (folder / "events-trial-5").glob("*.h5")}
+            splits = {path.name.split("-")[1] for path in (folder / "events-trial-5").glob("*-of-*.h5")}
             self.assertEqual(splits, {"train", "val"})
 
     def test_made_in_part_nothing_of_it_is_left(self):
@@ -80,7 +80,7 @@ class Demo(program.InFolder):
         self.assertEqual(sorted(demo.rglob("*")), before)
         self.convert()
         self.assertEqual(planned["pairs"], len(list(rows(self.folder / "out"))))
-        self.assertEqual(planned["shards"], len(list((self.folder / "out").glob("*.h5"))))
+        self.assertEqual(planned["shards"], len(list((self.folder / "out").glob("*-of-*.h5"))))
 
     def test_threads_do_not_change_bytes(self):
         self.convert("one", "--threads", "1")

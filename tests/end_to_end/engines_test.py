@@ -108,7 +108,7 @@ class Engines(program.InFolder):
         """The volumes, and what was said."""
         _, err = run("convert", self.manifest(f"{name}.json", **generator), "--progress", "none", "--overwrite",
                      environment=environment)
-        with h5py.File(next((self.job / name).glob("*.h5"))) as shard:
+        with h5py.File(next((self.job / name).glob("*-of-*.h5"))) as shard:
             self.assertTrue(shard["valid"][:].all())
             return shard["events/volume"][:], err
 
@@ -121,7 +121,7 @@ class Engines(program.InFolder):
                 # Nothing differs by more than 255 grey levels.
                 volumes, _ = self.convert(scope, engine=engine, scope=scope, motion_threshold=255, label_margin_px=0,
                                           tile_px=8)
-                with h5py.File(next((self.job / scope).glob("*.h5"))) as shard:
+                with h5py.File(next((self.job / scope).glob("*-of-*.h5"))) as shard:
                     tiles = shard["events/tiles"]
                     self.assertEqual((tiles.attrs["scope"], tiles.attrs["tile_px"]), (scope, 8))
                     kept = np.repeat(np.repeat(tiles[:], 8, 1), 8, 2)[:, None, :whole.shape[2], :whole.shape[3]]
@@ -146,7 +146,7 @@ class Engines(program.InFolder):
         farthest = [torch.tensor([9.0, angle / defaults.rotation]) for angle in (-45, 45)]
         torch.manual_seed(7)
         not_larger = 0
-        for path in sorted((self.folder / "out").glob("*.h5")):
+        for path in sorted((self.folder / "out").glob("*-of-*.h5")):
             with h5py.File(path) as shard:
                 self.assertTrue(shard["valid"][:].all())
                 tiles = dict(zip(shard["pairs/sample_id"].asstr()[:], shard["events/tiles"][:].astype(bool)))

@@ -33,7 +33,7 @@ def setUpModule():
     folder = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-finalize-"))
     manifest = with_validation(small_job(folder / "job"))
     done = folder / "done"
-    convert(done)
+    convert(done, "--no-finalize")
     run("finalize", done)
 
 
@@ -70,6 +70,19 @@ class Finalize(unittest.TestCase):
 
     def description(self, out=None):
         return json.loads(((out or done) / "dataset.json").read_text())
+
+    def test_convert_completes_the_dataset(self):
+        told, _ = convert(self.out)
+        self.assertIn(f"{self.out}: dataset.json, dataset.h5", told.splitlines())
+        same_folder(self.out, done)
+        self.assertEqual(content(self.out)["dataset.h5"], content(done)["dataset.h5"])
+        for part in ["--shards", "0/1"], ["--shards", "0/2"], ["--no-finalize"]:
+            (self.out / "dataset.json").unlink(missing_ok=True)
+            told, _ = convert(self.out, *part)
+            self.assertEqual((self.out / "dataset.json").exists(), part == ["--shards", "0/1"], part)
+        report = json.loads(run("convert", manifest, "--output", self.out, "--progress", "json")[0].splitlines()[-1])
+        self.assertTrue(report["finalized"])
+        same_folder(self.out, done)
 
     def test_the_description_fits_the_files(self):
         description = self.description()

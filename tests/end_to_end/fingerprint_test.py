@@ -89,7 +89,7 @@ class OpenedFiles(program.InFolder):
     def used(self, inputs):
         """The frames of all pairs."""
         frames = set()
-        for shard in (self.out).glob("*.h5"):
+        for shard in (self.out).glob("*-of-*.h5"):
             with h5py.File(shard) as file:
                 frames.update(inputs / text(path) for key in ("prev_path", "next_path") for path in file["pairs"][key])
         self.assertTrue(frames)

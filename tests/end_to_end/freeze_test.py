@@ -25,7 +25,7 @@ class Freeze(program.InFolder):
         run("convert", self.manifest, "--output", self.out, "--threads", 1)
         self.assertEqual({path: path.read_bytes() for path in files}, files)
         self.assertEqual(frozen["shards"], 5)
-        self.assertEqual(len(list(self.out.glob("*.h5"))), 5)
+        self.assertEqual(len(list(self.out.glob("*-of-*.h5"))), 5)
         committed = records(self.out).values()
         self.assertEqual({record["plan_hash"] for record in committed}, {frozen["plan_hash"]})
         self.assertEqual(sum(record["samples"] for record in committed), frozen["samples"])

@@ -247,7 +247,7 @@ class Names(program.InFolder):
 
         for command in ("plan", "convert"):
             check(command, manifest)
-        shard = next(out.glob("*.h5"))
+        shard = next(out.glob("*-of-*.h5"))
         for command in [("status", out), ("retry", out), ("verify", out, "--deep"), ("inspect", shard),
                         ("inspect", shard, "--sample", 0),
                         ("finalize", out), ("report", out), ("preview", out, "--out", self.folder / "images"),
@@ -279,7 +279,7 @@ class SixteenBits(program.InFolder):
                                name=folder, image=image, output={"directory": f"out-{folder}"},
                                generator={"kind": "difference"})
         _, errors = run("convert", self.write_manifest(job, f"{folder}.json"), "--overwrite")
-        with h5py.File(next((self.folder / f"out-{folder}").glob("*.h5"))) as shard:
+        with h5py.File(next((self.folder / f"out-{folder}").glob("*-of-*.h5"))) as shard:
             return errors, shard["events/volume"][()], json.loads(shard.attrs["preprocessing"])
 
     def test_a_narrow_range_is_named_and_can_be_spread(self):

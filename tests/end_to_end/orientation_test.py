@@ -59,7 +59,7 @@ class Orientation(program.InFolder):
             with self.subTest(image_format):
                 out = self.convert([1, 3, 6, 8], image_format)
                 found = 0
-                for file in sorted(out.glob("*.h5")):
+                for file in sorted(out.glob("*-of-*.h5")):
                     with h5py.File(file) as shard:
                         for i in range(len(shard["valid"])):
                             self.assertTrue(shard["valid"][i])

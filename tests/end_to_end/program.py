@@ -62,7 +62,7 @@ def text(value):
 
 
 def shard_bytes(folder):
-    return {path.name: path.read_bytes() for path in sorted(pathlib.Path(folder).glob("*.h5"))}
+    return {path.name: path.read_bytes() for path in sorted(pathlib.Path(folder).glob("*-of-*.h5"))}
 
 
 def main(needs_shared_data=False):

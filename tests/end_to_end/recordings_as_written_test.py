@@ -36,7 +36,7 @@ class AsWritten(program.InFolder):
     def samples(self):
         """Of each its id, whether it is valid, its times and its volume."""
         found = []
-        for path in sorted(pathlib.Path(self.out).glob("*.h5")):
+        for path in sorted(pathlib.Path(self.out).glob("*-of-*.h5")):
             with h5py.File(path) as shard:
                 pairs = shard["pairs"]
                 found += zip(map(program.text, pairs["sample_id"][:]), shard["valid"][:] == 1,

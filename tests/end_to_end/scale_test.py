@@ -108,7 +108,7 @@ class Scale(program.InFolder):
         for shard in [0, SHARDS - 1]:
             done = Measured("convert", self.manifest, "--threads", 1, environment={"SHARD_INDEX": str(shard)})
             self.assertLess(done.peak_bytes, FREEZE_LIMIT_BYTES)
-        self.assertEqual(len(list(self.out.glob("*.h5"))), 2)
+        self.assertEqual(len(list(self.out.glob("*-of-*.h5"))), 2)
 
     def make_commit_records(self):
         """Links and commit records for the other shards; every hundredth has a quarantined sample. Three commit records

@@ -22,7 +22,7 @@ class SharedData(program.InFolder):
         out, _ = run("convert", path, "--progress", "none", expect=expect)
         if expect == 0:
             run("verify", self.folder / "out")
-        return out, [h5py.File(shard) for shard in sorted((self.folder / "out").glob("*.h5"))]
+        return out, [h5py.File(shard) for shard in sorted((self.folder / "out").glob("*-of-*.h5"))]
 
     def test_volumes_equal_the_published_network_through_convert(self):
         imported = {}
@@ -53,7 +53,7 @@ class SharedData(program.InFolder):
                                generator={"weights": str(weights), "precision": "float32"},
                                output={"directory": output, "dtype": "float32"})
                 run("convert", self.write_manifest(job), "--progress", "none")
-                with h5py.File(next((self.folder / output).glob("*.h5"))) as shard:
+                with h5py.File(next((self.folder / output).glob("*-of-*.h5"))) as shard:
                     volume, expected = shard["events/volume"][0], case["volume"][:]
                 self.assertLessEqual(np.abs(volume - expected).max(), 1e-4 * expected.max(), name)
                 cases += 1

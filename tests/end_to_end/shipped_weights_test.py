@@ -77,7 +77,7 @@ class ShippedWeights(program.InFolder):
             job["generator"] = {"weights": CANDIDATE}
         _, err = run("convert", self.write_manifest(job), "--progress", "none")
         self.assertNotIn("UNTRAINED", err)
-        shard, = (self.folder / "out").glob("*.h5")
+        shard, = (self.folder / "out").glob("*-of-*.h5")
         return h5py.File(shard)
 
     def test_events_come_with_motion(self):
@@ -130,7 +130,7 @@ class ShippedWeights(program.InFolder):
                "generator": {"weights": str(TOLD), "sensor": {"threshold": threshold}},
                "image": {"preset": "mpii"}, "output": {"directory": f"out-{threshold}", "samples_per_shard": 512}}
         run("convert", self.write_manifest(job), "--progress", "none")
-        shard, = (self.folder / f"out-{threshold}").glob("*.h5")
+        shard, = (self.folder / f"out-{threshold}").glob("*-of-*.h5")
         with h5py.File(shard) as file:
             self.assertTrue((file["pairs/threshold"][:] == threshold).all())
             still = np.array(["still" in text(path) for path in file["pairs/prev_path"]])

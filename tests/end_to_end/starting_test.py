@@ -53,7 +53,7 @@ class Init(program.InFolder):
         trial, = (manifest.parent / "out").iterdir()
         run("verify", trial)
         counted = 0
-        for shard in trial.glob("*.h5"):
+        for shard in trial.glob("*-of-*.h5"):
             with h5py.File(shard) as opened:
                 counted += int(opened["valid"][:].sum())
         self.assertEqual(counted, min(limit, pairs))
@@ -373,7 +373,7 @@ class Trial(program.InFolder):
 
     def ids(self, name):
         ids = []
-        for path in sorted((self.folder / name).glob("*.h5")):
+        for path in sorted((self.folder / name).glob("*-of-*.h5")):
             with h5py.File(path) as shard:
                 ids += map(text, shard["pairs/sample_id"][:])
         return ids

@@ -53,7 +53,7 @@ class Stop(program.InFolder):
         self.assertEqual(outcome.code, STOPPED if done < 3 else 0, f"{rule}\n{outcome.err}")
         if out.exists():
             self.assertEqual(temporaries(out), [], rule)
-            self.assertEqual(len(list(out.glob("*.h5"))), done, rule)
+            self.assertEqual(len(list(out.glob("*-of-*.h5"))), done, rule)
         self.completes(out)
         return done
 

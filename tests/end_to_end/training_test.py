@@ -278,7 +278,7 @@ class TrainedWeights(program.InFolder):
                        output={"directory": name, "dtype": "float32", "samples_per_shard": 64})
         run("convert", self.write_manifest(job), "--progress", "none")
         run("verify", self.folder / name)
-        shard, = (self.folder / name).glob("*.h5")
+        shard, = (self.folder / name).glob("*-of-*.h5")
         return h5py.File(shard)
 
     def test_a_network_and_both_models_make_the_same_shards_but_for_the_volumes(self):

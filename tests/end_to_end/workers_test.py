@@ -70,6 +70,7 @@ class Workers(unittest.TestCase):
         self.out = self.folder / "out"
 
     def assert_as_alone(self):
+        run("finalize", self.out)  # which workers with a part leave to be done
         same_folder(self.out, alone)
         self.assertIn("sound", run("verify", self.out)[0])
 
@@ -164,6 +165,7 @@ class Workers(unittest.TestCase):
         winner, = [job for job in jobs if job.read_text() == frozen]
         by_winner = self.folder / "by_winner"
         finish(start(by_winner, job=winner))
+        run("finalize", self.out)
         same_folder(self.out, by_winner)
         self.assertIn("sound", run("verify", self.out)[0])
 

@@ -22,19 +22,20 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from . import evaluate, reconstruction, shards, torch
     from .generator import Generator, sample_events
+    from .open_shards import Sample, open_shard
     from .outlines import mask, rings
     from .plotting import show
     from .program import ProgramError, convert, init, open
     from .representations import signed_channel
-    from .shards import FIELDS, InvalidSample, Sample, Shards, open_shard, read_description
+    from .shards import FIELDS, InvalidSample, Shards, read_description
 
-__version__ = "0.2.0"
+__version__ = "1.0.0"
 
 _MODULE_OF = {
-    "Generator": "generator", "sample_events": "generator",
-    "FIELDS": "shards", "InvalidSample": "shards", "Sample": "shards", "Shards": "shards", "open_shard": "shards",
-    "read_description": "shards", "ProgramError": "program", "convert": "program", "init": "program", "open": "program",
-    "mask": "outlines", "rings": "outlines", "show": "plotting", "signed_channel": "representations",
+    "Generator": "generator", "sample_events": "generator", "FIELDS": "shards", "InvalidSample": "shards",
+    "Sample": "open_shards", "Shards": "shards", "open_shard": "open_shards", "read_description": "shards",
+    "ProgramError": "program", "convert": "program", "init": "program", "open": "program", "mask": "outlines",
+    "rings": "outlines", "show": "plotting", "signed_channel": "representations",
 }
 _MODULES = ("evaluate", "reconstruction", "shards", "torch")
 

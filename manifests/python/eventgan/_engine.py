@@ -12,9 +12,10 @@ _NAME = "libeventgan.so.1"
 
 
 def _library() -> ctypes.CDLL:
-    """Beside this file, as pip and a build lay it; behind lib/python3/dist-packages; else the system's."""
+    """Beside this file, as pip and a build lay it; below, in the wheel with a program; behind python3/dist-packages;
+    else the system's."""
     here = os.path.dirname(os.path.abspath(__file__))
-    for place in (here, os.path.join(here, "..", "..", "..")):
+    for place in (here, os.path.join(here, "lib"), os.path.join(here, "..", "..", "..")):
         if os.path.exists(os.path.join(place, _NAME)):
             return ctypes.CDLL(os.path.join(place, _NAME))
     return ctypes.CDLL(_NAME)

@@ -34,7 +34,8 @@ import numpy as np
 from .detection_scores import (DONT_CARE, KITTI_CLASSES, KITTI_LEVELS, Detections, GroundTruth, curve, detection_scores,
                                kitti_average_precision, match_as_voc, non_maximum_suppression, read_boxes)
 from .pose_scores import Persons, pose_scores, read_persons
-from .shards import PathLike, Shards, open_shard
+from .open_shards import PathLike, open_shard
+from .shards import Shards
 
 IMAGES = 12  # samples to draw
 PAPER_COLUMNS = {"precision": "precision", "recall_easy": "easy recall", "recall_hard": "hard recall",

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
 # red, green, blue, as in stages/events/images/time_panel.cc and preview_image.cc
 EARLY_TO_LATE = np.array([[40, 60, 255], [0, 220, 230], [40, 220, 60], [255, 220, 0], [255, 30, 30]], np.float32)
-CLASSES = [(60, 220, 80), (30, 160, 255), (255, 170, 60), (255, 80, 60), (220, 90, 255), (240, 230, 80), (60, 220, 230),
-           (160, 130, 190)]
+CLASSES = [(255, 60, 255), (255, 255, 255)]  # no colours of times
 IGNORED, JOINT = (235, 235, 235), (120, 230, 80)
 SCREEN = 10.0  # inches: the longer side of a figure that is made for a volume
 
@@ -68,8 +67,8 @@ def show(volume: npt.ArrayLike | Mapping[str, Any], boxes: npt.ArrayLike | None 
     Parameters
     ----------
     volume : array_like, float [2B, H, W], or dict
-        A volume; or a sample of `Shards` or of `Generator.sample`, which is drawn with its labels: a colour for each
-        class, ignored boxes dashed, outlines thin, hidden joints hollow.
+        A volume; or a sample of `Shards` or of `Generator.sample`, which is drawn with its labels: boxes
+        magenta or white by class, ignored ones dashed, outlines thin, hidden joints hollow.
     boxes : array_like, [n, 4], optional
         Instead of a sample's: left, top, right, bottom in volume pixels, by edges; the whole volume is 0, 0, W, H.
     joints : array_like, [J, 2] or [P, J, 2], optional
@@ -88,6 +87,7 @@ def show(volume: npt.ArrayLike | Mapping[str, Any], boxes: npt.ArrayLike | None 
         The volume, the boxes or the joints have another shape.
     """
     import matplotlib.patches
+    import matplotlib.patheffects
     import matplotlib.pyplot
 
     sample: Mapping[str, Any] = volume if isinstance(volume, Mapping) else {"volume": volume}
@@ -100,6 +100,7 @@ def show(volume: npt.ArrayLike | Mapping[str, Any], boxes: npt.ArrayLike | None 
         ax = matplotlib.pyplot.subplots(figsize=(max(size * width, 2), max(size * height, 2)), layout="constrained")[1]
     ax.imshow(image, interpolation="nearest")
     ax.set_axis_off()
+    edge = matplotlib.patheffects.withStroke(linewidth=4, foreground="black")
     for (left, top, right, bottom), colour, ignore, outline in _boxes_of(sample, boxes):
         for ring in rings(outline):
             ax.add_patch(matplotlib.patches.Polygon(ring - 0.5, fill=False, edgecolor=np.divide(colour, 255)))
@@ -108,7 +109,8 @@ def show(volume: npt.ArrayLike | Mapping[str, Any], boxes: npt.ArrayLike | None 
         if ignore:
             ax.add_patch(matplotlib.patches.Rectangle(**place, edgecolor="black", linewidth=1))
         ax.add_patch(matplotlib.patches.Rectangle(**place, edgecolor=np.divide(colour, 255),
-                                                  linewidth=1 if ignore else 2, linestyle="--" if ignore else "-"))
+                                                  linewidth=1 if ignore else 2, linestyle="--" if ignore else "-",
+                                                  path_effects=None if ignore else [edge]))
     points, hidden = _joints_of(sample, joints)
     ax.scatter(*points[~hidden].T, s=40, zorder=3, linewidths=1, facecolors=[np.divide(JOINT, 255)], edgecolors="black")
     ax.scatter(*points[hidden].T, s=40, zorder=3, linewidths=1, facecolors="none", edgecolors=[np.divide(JOINT, 255)])

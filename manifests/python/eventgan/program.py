@@ -21,7 +21,8 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Literal
 
-from .shards import PathLike, Shards
+from .open_shards import PathLike
+from .shards import Shards
 
 Event = dict[str, Any]
 
@@ -74,7 +75,7 @@ def init(*paths: PathLike, out: PathLike = "manifest.json") -> pathlib.Path:
 
 def convert(manifest: PathLike | Mapping[str, Any], output: PathLike | None = None, *, threads: int | None = None,
             progress: Literal[False] | Callable[[Event], object] | None = None) -> Shards:
-    """Makes the shards of a manifest and completes the dataset, as `eventgan convert` and then `eventgan finalize` do.
+    """Makes the shards of a manifest and completes the dataset, as `eventgan convert` does.
 
     A second call keeps what is finished and makes the rest. KeyboardInterrupt (Ctrl-C, a notebook's stop button) stops
     the program cleanly: it finishes or drops the current shard, then the exception is raised. A second interrupt drops
@@ -113,7 +114,8 @@ def convert(manifest: PathLike | Mapping[str, Any], output: PathLike | None = No
     on_event: Callable[[Event], object] = progress or shown
     with contextlib.closing(shown), _manifest_file(manifest) as file:
         # All shards, even in a cluster's job: the whole folder is returned.
-        report = _follow(on_event, "convert", "--progress", "json", "--shards", "all", *given, "--", file)
+        report = _follow(on_event, "convert", "--progress", "json", "--shards", "all", "--no-finalize", *given, "--",
+                         file)
         if "folder" not in report:
             raise ProgramError(f"expected a report of the program eventgan, got {json.dumps(report)[:1000]}, from "
                                f"{find_program()}", 1)
@@ -166,8 +168,8 @@ def find_program() -> str:
             raise FileNotFoundError(f"expected the program eventgan, got none, in {named} (EVENTGAN_PROGRAM)")
         return named
     package = os.path.dirname(__file__)
-    # From PREFIX/lib/python3/dist-packages/eventgan, and from build/release/python/eventgan.
-    for name in ("../../../../bin/eventgan", "../../eventgan", "eventgan"):
+    # In the wheel; from PREFIX/lib/python3/dist-packages/eventgan, and from build/release/python/eventgan.
+    for name in ("./bin/eventgan", "../../../../bin/eventgan", "../../eventgan", "eventgan"):
         found = shutil.which(os.path.normpath(os.path.join(package, name)) if "/" in name else name)
         if found:
             return found

@@ -36,8 +36,9 @@ from .shards import Shards
 
 __all__ = [
     "DetectionDataset", "EventAugmentation", "FrameAugmentation", "FramePairs", "HalfVolumes", "Item",
-    "KeypointDataset", "PoseAugmentation", "PoseDataset", "collate_torchvision", "collate_yolo", "exchange_first_convolution", "fitted",
-    "flip_pairs", "heatmaps", "inverse", "mixture", "move_boxes", "move_points", "warp",
+    "KeypointDataset", "PoseAugmentation", "PoseDataset", "collate_torchvision", "collate_yolo",
+    "exchange_first_convolution", "fitted", "flip_pairs", "heatmaps", "inverse", "mixture", "move_boxes", "move_points",
+    "warp",
 ]
 
 

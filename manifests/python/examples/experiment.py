@@ -111,7 +111,7 @@ def run(*command: Any, **options: Any) -> None:
 
 def convert(args: argparse.Namespace, scenes: pathlib.Path, name: str, sources: list[dict[str, Any]],
             generator: Mapping[str, Any]) -> pathlib.Path:
-    """SCENES/NAME, finalized: volumes made by the generator, divided by their 98th percentile as in the paper."""
+    """SCENES/NAME, complete: volumes made by the generator, divided by their 98th percentile as in the paper."""
     folder = scenes / name
     if (folder / "dataset.json").exists():
         return folder
@@ -125,7 +125,6 @@ def convert(args: argparse.Namespace, scenes: pathlib.Path, name: str, sources: 
     path = scenes / f"{name}.json"
     path.write_text(json.dumps(manifest, indent=1), encoding="utf-8")
     run(args.program, "convert", path, "--progress", "none")
-    run(args.program, "finalize", folder)
     return folder
 
 

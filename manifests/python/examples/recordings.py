@@ -112,8 +112,7 @@ def real_volumes(program: PathLike, path: PathLike, folder: PathLike) -> np.ndar
                     "output": {"directory": folder.name, "dtype": "float32"}}
         file = folder.with_name(f"{folder.name}.json")
         file.write_text(json.dumps(manifest, indent=1), encoding="utf-8")
-        for command in (["convert", file], ["finalize", folder]):
-            subprocess.run([program, *command, "--progress", "none"], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([program, "convert", file, "--progress", "none"], check=True, stdout=subprocess.DEVNULL)
     with Shards(folder) as shards:
         volumes = np.stack([shards.sample(i, {"volume"})["volume"] for i in range(len(shards))])
     expected = len(frames_of(path)[0]) - 1

@@ -100,8 +100,8 @@ struct PngPixels {
   }
 };
 
-/// Decodes a PNG from memory as a whole, which takes half of libpng's time: Debian's inflates by
-/// zlib, and undoes the filters byte by byte.
+/// Decodes a PNG from memory as a whole, which takes half of libpng's time or less: Debian's
+/// inflates by zlib, and undoes the filters byte by byte.
 ///
 /// Nothing if there is any doubt about the file, if its samples have fewer than 8 bits, or if it or
 /// its pixels take more than 256 MiB: then libpng should read the file itself and judge it. Without

@@ -3,9 +3,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string_view>
+#include <vector>
 
 #include "stages/base/images/image_codecs.h"
 #include "stages/base/images/image_file.h"
@@ -19,8 +24,10 @@ constexpr std::size_t kMostInMemory = 1 << 28;   // beyond, libpng reads piece b
 constexpr std::size_t kMostPerByte = 1032;       // deflate cannot shrink further
 constexpr std::size_t kLongestSide = 1'000'000;  // libpng's limit
 
-enum Kind : std::uint8_t { kGrey = 0, kColour = 2, kPalette = 3 };  // and alpha beside these: 4
-constexpr std::uint8_t kAlpha = 4;
+// Colour types, and how many samples a pixel has: grey, colours, palette, grey and colours with
+// alpha.
+constexpr std::uint8_t kPalette = 3;
+constexpr std::array<int, 7> kSamples{1, 0, 3, 1, 2, 0, 4};
 
 std::uint32_t big_endian(const std::uint8_t* bytes) {
   return std::uint32_t{bytes[0]} << 24 | std::uint32_t{bytes[1]} << 16 |
@@ -34,7 +41,6 @@ std::optional<PngPixels> read_header(const std::uint8_t* header) {
   const std::uint8_t bits = header[8];
   const std::uint8_t kind = header[9];
   const bool is_usual = header[10] == 0 && header[11] == 0 && header[12] == 0;  // not interlaced
-  constexpr std::array<int, 7> kSamples{1, 0, 3, 1, 2, 0, 4};
   if (!is_usual || std::min(width, height) == 0 || std::max(width, height) > kLongestSide ||
       width * height > kMaxImagePixels || kind >= kSamples.size() || kSamples[kind] == 0 ||
       (bits != 8 && (bits != 16 || kind == kPalette))) {
@@ -49,8 +55,8 @@ std::optional<PngPixels> read_header(const std::uint8_t* header) {
 }
 
 /// Inflates a zlib stream into bytes of which it must have exactly as many; false if it is not
-/// sound. ISA-L, which takes three quarters of libdeflate's time and 2/5 of zlib's, inflates, but
-/// does not sum: its sum leaves the upper halves of the vector registers in use.
+/// sound. ISA-L inflates photographs faster than libdeflate, but does not sum: its sum leaves the
+/// upper halves of the vector registers in use.
 bool inflate(std::span<const std::uint8_t> stream, std::span<std::uint8_t> bytes) {
   constexpr std::size_t kHeader = 2;
   constexpr std::size_t kSum = 4;
@@ -82,8 +88,8 @@ std::uint8_t paeth(int left, int above, int corner) {
   return static_cast<std::uint8_t>(std::min(to_left, to_above) <= to_corner ? nearer : corner);
 }
 
-/// Adds to each byte of a row what `predict` makes of the one before it in its pixel's left
-/// neighbour, the one above, and the one left of that, all of them done.
+/// Adds to each byte of a row what `predict` makes of its left neighbour, a pixel before it, the
+/// one above, and the one left of that, all of them done.
 template <std::size_t kPixelBytes, class Predict>
 void add_predictions(std::span<std::uint8_t> row, const std::uint8_t* above, Predict predict) {
   std::array<std::uint8_t, kPixelBytes> left{};

@@ -21,6 +21,7 @@ namespace {
 constexpr int kTitleHeight = 24;
 constexpr int kCaptionHeight = 20;
 constexpr int kTileGap = 6;
+constexpr int kPanels = 4;  // previous frame, next frame, times, polarities
 
 }  // namespace
 
@@ -29,8 +30,8 @@ PreviewLayout preview_layout(ImageSize volume) {
   constexpr int kLargest = 8;
   PreviewLayout best{{1}, 1};
   int largest = 0;
-  for (const int columns : {3, 2, 1}) {
-    const int rows = (3 + columns - 1) / columns;
+  for (const int columns : {4, 2, 1}) {
+    const int rows = kPanels / columns;
     const int in_width = (kSide - (columns + 1) * kTileGap) / columns / std::max(volume.width, 1);
     const int in_height =
         ((kSide - kTitleHeight) / rows - kCaptionHeight) / std::max(volume.height, 1);
@@ -52,12 +53,9 @@ const cv::Scalar kIgnored(235, 235, 235);
 const cv::Scalar kHeadBox(0, 215, 255);
 const cv::Scalar kShadow(0, 0, 0);
 
+/// No colour of times or polarities. The class's name is beside the box.
 cv::Scalar class_colour(int class_id) {
-  static const std::array<cv::Scalar, 8> colours{
-      cv::Scalar(80, 220, 60),  cv::Scalar(255, 160, 30), cv::Scalar(60, 170, 255),
-      cv::Scalar(60, 80, 255),  cv::Scalar(255, 90, 220), cv::Scalar(80, 230, 240),
-      cv::Scalar(230, 220, 60), cv::Scalar(190, 130, 160)};
-  return colours[static_cast<std::size_t>(std::max(class_id, 0)) % colours.size()];
+  return class_id % 2 == 0 ? cv::Scalar(255, 60, 255) : cv::Scalar(255, 255, 255);
 }
 
 cv::Scalar side_colour(BodySide side) {
@@ -98,7 +96,8 @@ void draw_dashes(cv::Mat& panel, Point from, Point to, const cv::Scalar& colour)
   }
 }
 
-/// kShadowedDashes: dashes alone are lost on a ground of their own colour.
+/// kShadowedDashes: dashes alone are lost on a ground of their own colour, and so are lines without
+/// a dark edge.
 enum class LineStyle { kSolid, kThin, kShadowedDashes, kDashes };
 
 void draw_rectangle(cv::Mat& panel, const Rectangle& box, PanelScale scale,
@@ -110,23 +109,28 @@ void draw_rectangle(cv::Mat& panel, const Rectangle& box, PanelScale scale,
   };
   const std::array<Point, 4> corners{corner(box.left, box.top), corner(box.right, box.top),
                                      corner(box.right, box.bottom), corner(box.left, box.bottom)};
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Point from = corners[i], to = corners[(i + 1) % 4];
-    if (style == LineStyle::kSolid || style == LineStyle::kThin) {
-      draw_line(panel, from, to, colour, style == LineStyle::kSolid ? 2 : 1);
-      continue;
+  const auto draw_sides = [&](const cv::Scalar& line, int thickness) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      draw_line(panel, corners[i], corners[(i + 1) % 4], line, thickness);
     }
-    if (style == LineStyle::kShadowedDashes) draw_line(panel, from, to, kShadow, 1);
-    draw_dashes(panel, from, to, colour);
+  };
+  if (style == LineStyle::kSolid || style == LineStyle::kThin) {
+    const int thickness = style == LineStyle::kSolid ? 2 : 1;
+    draw_sides(kShadow, thickness + 2);
+    draw_sides(colour, thickness);
+    return;
   }
+  if (style == LineStyle::kShadowedDashes) draw_sides(kShadow, 1);
+  for (std::size_t i = 0; i < 4; ++i) draw_dashes(panel, corners[i], corners[(i + 1) % 4], colour);
 }
 
-/// Thin, in contrast to its box.
+/// Thin, in contrast to its box, and on a shadow, since ignored ones are nearly white.
 void draw_outline(cv::Mat& panel, const Outline& outline, PanelScale scale,
                   const cv::Scalar& colour) {
   for (const auto& ring : outline.rings) {
     std::vector<cv::Point> corners;
     for (const Point& corner : ring) corners.push_back(fixed(scale.corner(corner.x, corner.y)));
+    cv::polylines(panel, corners, /*isClosed=*/true, kShadow, 3, cv::LINE_AA, kShift);
     cv::polylines(panel, corners, /*isClosed=*/true, colour, 1, cv::LINE_AA, kShift);
   }
 }
@@ -171,11 +175,12 @@ std::optional<cv::Rect> caption_place(const cv::Rect& box, cv::Size caption, cv:
   return least < 0.5 ? std::optional(best) : std::nullopt;
 }
 
-constexpr double kNameSize = 0.4;
 constexpr int kNameBorder = 2;
 
-/// The names of the boxes that are no ignored regions, when all boxes are drawn.
-void draw_names(const PreviewContent& content, PanelScale scale, cv::Mat& panel) {
+/// The names of the boxes that are no ignored regions, when all boxes are drawn; on a small panel,
+/// of those alone that are as wide as their names.
+void draw_names(const PreviewContent& content, PanelScale scale, bool small, cv::Mat& panel) {
+  const double font_size = small ? 0.3 : 0.4;
   const auto& names = content.schema.class_names;
   std::vector<cv::Rect> taken;
   for (const VolumeBox& box : content.labels.boxes) {
@@ -189,13 +194,14 @@ void draw_names(const PreviewContent& content, PanelScale scale, cv::Mat& panel)
     if (class_id < 0 || static_cast<std::size_t>(class_id) >= names.size()) continue;
     int baseline = 0;
     const cv::Size text =
-        cv::getTextSize(names[class_id], cv::FONT_HERSHEY_SIMPLEX, kNameSize, 1, &baseline);
+        cv::getTextSize(names[class_id], cv::FONT_HERSHEY_SIMPLEX, font_size, 1, &baseline);
+    if (small && text.width > box.width) continue;
     const auto at = caption_place(
         box, {text.width + 2 * kNameBorder, text.height + 3 * kNameBorder}, panel.size(), taken);
     if (!at) continue;
     cv::rectangle(panel, *at, class_colour(class_id), cv::FILLED);
     cv::putText(panel, names[class_id], {at->x + kNameBorder, at->y + at->height - 3},
-                cv::FONT_HERSHEY_SIMPLEX, kNameSize, kShadow, 1, cv::LINE_AA);
+                cv::FONT_HERSHEY_SIMPLEX, font_size, kShadow, 1, cv::LINE_AA);
     taken.push_back(*at);
   }
 }
@@ -206,7 +212,7 @@ void draw_joint(cv::Mat& panel, Point at, int radius_px, bool hidden, const cv::
   cv::circle(panel, fixed(at), radius, colour, hidden ? 1 : cv::FILLED, cv::LINE_AA, kShift);
 }
 
-/// kSmall: thin and without names, for tiles. kHint: thin dashes, of a frame that the labels do not
+/// kSmall: thin, for tiles. kHint: thin dashes, of a frame that the labels do not
 /// belong to.
 enum class LabelStyle { kFull, kSmall, kHint };
 
@@ -263,7 +269,7 @@ void draw_labels(const PreviewContent& content, PanelScale scale, LabelStyle sty
                                                   : LineStyle::kThin);
     }
   }
-  if (style == LabelStyle::kFull) draw_names(content, scale, panel);
+  if (!is_hint) draw_names(content, scale, style == LabelStyle::kSmall, panel);
   const std::vector<Limb> limbs = limbs_of(content.schema.joint_names);
   for (std::size_t i = 0; i < content.labels.persons.size(); ++i) {
     draw_person(content, i, limbs, scale, style, panel);
@@ -330,19 +336,21 @@ cv::Mat frame_panel(const std::vector<std::uint8_t>& bgr, ImageSize size, PanelS
                 size, scale);
 }
 
-cv::Mat events_panel(const PreviewContent& content, PanelScale scale) {
+cv::Mat events_panel(const PreviewContent& content, int number, PanelScale scale) {
   const ImageSize size = content.shape.size;
   if (content.volume.empty()) return blank_panel(panel_size(size, scale), "no event volume");
-  return scaled(time_panel(content.volume, content.shape), size, scale);
+  const auto draw = number == 2 ? time_panel : polarity_panel;
+  return scaled(draw(content.volume, content.shape), size, scale);
 }
 
-/// Panel 0 is the previous frame, 1 the next one, 2 the events; with their labels.
+/// Panel 0 is the previous frame, 1 the next one, 2 the events by time, 3 by polarity; with their
+/// labels.
 cv::Mat labelled_panel(const PreviewContent& content, int number, PanelScale scale,
                        LabelStyle style) {
-  cv::Mat panel = number == 2 ? events_panel(content, scale)
+  cv::Mat panel = number >= 2 ? events_panel(content, number, scale)
                               : frame_panel(number == 0 ? content.previous_bgr : content.next_bgr,
                                             content.shape.size, scale);
-  const bool has_labels = number == 2 || content.label_position == number;
+  const bool has_labels = number >= 2 || content.label_position == number;
   draw_labels(content, scale, has_labels ? style : LabelStyle::kHint, panel);
   return panel;
 }
@@ -370,15 +378,12 @@ std::string frame_caption(const PreviewContent& content, int number) {
 cv::Mat compose(const PreviewContent& content) {
   const PreviewLayout layout = preview_layout(content.shape.size);
   const cv::Size size = panel_size(content.shape.size, layout.scale);
-  const int rows = (3 + layout.columns - 1) / layout.columns;
+  const int rows = kPanels / layout.columns;
   cv::Mat canvas(kTitleHeight + rows * (size.height + kCaptionHeight),
                  layout.columns * (size.width + kTileGap) + kTileGap, CV_8UC3, kBackground);
   write_text(canvas, content.title, {kTileGap, kTitleHeight - 8}, canvas.cols - 2 * kTileGap);
-  for (int i = 0; i < 3; ++i) {
-    // In two columns the events are below the labelled frame.
-    const bool is_right = layout.columns == 2 && i == 2 && content.label_position == 1;
-    const int column = is_right ? 1 : i % layout.columns;
-    const cv::Rect place({kTileGap + column * (size.width + kTileGap),
+  for (int i = 0; i < kPanels; ++i) {
+    const cv::Rect place({kTileGap + i % layout.columns * (size.width + kTileGap),
                           kTitleHeight + i / layout.columns * (size.height + kCaptionHeight)},
                          size);
     labelled_panel(content, i, layout.scale, LabelStyle::kFull).copyTo(canvas(place));
@@ -389,6 +394,8 @@ cv::Mat compose(const PreviewContent& content) {
     }
     if (i == 2) {
       draw_time_legend(canvas, caption, size.width);
+    } else if (i == 3) {
+      write_text(canvas, "red: brighter, blue: darker;  strong: many events", caption, size.width);
     } else {
       write_text(canvas, frame_caption(content, i), caption, size.width,
                  is_labelled ? kLabelled : kCaptionColour);

@@ -24,11 +24,11 @@ struct PanelScale {
   Point corner(double x, double y) const { return {x * factor - 0.5, y * factor - 0.5}; }
 };
 
-/// How a preview's three panels lie: side by side, one below the other, or the frames side by side
+/// How a preview's four panels lie: side by side, one below the other, or the frames side by side
 /// above the events.
 struct PreviewLayout {
   PanelScale scale;
-  int columns = 3;
+  int columns = 4;
 };
 
 /// The layout whose panels are largest, enlarged by a whole factor of at most 8, as long as the
@@ -37,7 +37,7 @@ struct PreviewLayout {
 /// own size.
 PreviewLayout preview_layout(ImageSize volume);
 
-/// What a preview shows: three panels, each of the volume's shape.
+/// What a preview shows: four panels, each of the volume's shape.
 struct PreviewContent {
   VolumeShape shape;
   /// [y, x, 3] uint8 blue green red, laid into the volume's frame; empty: the frame was not found.
@@ -52,16 +52,17 @@ struct PreviewContent {
   LabelSchema schema;
 };
 
-/// Draws previous frame, next frame and average-timestamp image. The events and the labelled
-/// frame, whose panel has a bright border, have the boxes (with their class; ignored regions dashed
-/// grey), their outlines as thin lines, and poses (hidden joints hollow; limbs where the joint
-/// names are MPII's or Human3.6M's); on another frame, where things have moved, thin dashes hint at
-/// them. A box's name is where it covers boxes least. Small volumes are enlarged by whole factors,
-/// so that text and lines stay readable.
+/// Draws previous frame, next frame, average-timestamp image, and the polarities. The events and
+/// the labelled frame, whose panel has a bright border, have the boxes (magenta or white, with
+/// their class; ignored regions dashed grey), their outlines as thin lines, and poses (hidden
+/// joints hollow; limbs where the joint names are MPII's or Human3.6M's); on another frame, where
+/// things have moved, thin dashes hint at them. A box's name is where it covers boxes least. Small
+/// volumes are enlarged by whole factors, so that text and lines stay readable.
 ///
 /// Time is colour, early blue to late red, the mean over both polarities. Brightness says how many
 /// events, on an absolute scale, so that noise looks faint: 1 - exp(-m) of full brightness where
-/// the pixel's values sum to m; black is no event.
+/// the pixel's values sum to m; black is no event. Of the polarities, on white, positive events are
+/// red, negative ones blue, as strong as the times are bright.
 ///
 /// Throws std::invalid_argument if the sizes do not fit each other, std::runtime_error if OpenCV
 /// cannot draw them. Thread safe.

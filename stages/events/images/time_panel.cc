@@ -19,6 +19,31 @@ std::vector<float> mass(std::span<const float> polarity, int bins, std::size_t p
   return sums;
 }
 
+/// `ground`, and over it the colour that `colour_of(pixel, positive, negative)` gives where there
+/// are events, the less of the ground the more there are; `unsound` where a value is not finite.
+template <class ColourOf>
+cv::Mat drawn(std::span<const float> volume, const VolumeShape& shape, const cv::Vec3b& ground,
+              const cv::Vec3b& unsound, ColourOf colour_of) {
+  const std::size_t plane = shape.size.pixel_count();
+  const std::size_t half = shape.bins * plane;
+  const std::vector<float> positive = mass(volume.first(half), shape.bins, plane);
+  const std::vector<float> negative = mass(volume.subspan(half, half), shape.bins, plane);
+  cv::Mat panel(shape.size.height, shape.size.width, CV_8UC3);
+  for (std::size_t i = 0; i < plane; ++i) {
+    cv::Vec3b& pixel = panel.at<cv::Vec3b>(static_cast<int>(i));
+    const float total = positive[i] + negative[i];
+    pixel = std::isfinite(total) ? ground : unsound;
+    if (!std::isfinite(total) || total <= 0) continue;
+    const float strength = 1.0f - std::exp(-total);
+    const cv::Vec3b colour = colour_of(i, positive[i], negative[i]);
+    for (int channel = 0; channel < 3; ++channel) {
+      pixel[channel] = cv::saturate_cast<std::uint8_t>(colour[channel] * strength +
+                                                       ground[channel] * (1 - strength));
+    }
+  }
+  return panel;
+}
+
 }  // namespace
 
 cv::Vec3b time_colour(float time) {
@@ -36,29 +61,21 @@ cv::Vec3b time_colour(float time) {
 }
 
 cv::Mat time_panel(std::span<const float> volume, const VolumeShape& shape) {
-  const std::size_t plane = shape.size.pixel_count();
-  const std::size_t half = shape.bins * plane;
   const TimeImage times = time_image(volume, shape);
-  const std::vector<float> positive = mass(volume.first(half), shape.bins, plane);
-  const std::vector<float> negative = mass(volume.subspan(half, half), shape.bins, plane);
+  return drawn(volume, shape, {0, 0, 0}, {255, 255, 255},
+               [&](std::size_t i, float positive, float negative) {
+                 return time_colour((times.positive[i] * positive + times.negative[i] * negative) /
+                                    (positive + negative));
+               });
+}
 
-  cv::Mat panel(shape.size.height, shape.size.width, CV_8UC3, cv::Scalar::all(0));
-  for (std::size_t i = 0; i < plane; ++i) {
-    cv::Vec3b& pixel = panel.at<cv::Vec3b>(static_cast<int>(i));
-    const float total = positive[i] + negative[i];
-    if (!std::isfinite(total)) {
-      pixel = {255, 255, 255};
-    } else if (total > 0) {
-      const float time =
-          (times.positive[i] * positive[i] + times.negative[i] * negative[i]) / total;
-      const float brightness = 1.0f - std::exp(-total);
-      const cv::Vec3b colour = time_colour(time);
-      for (int channel = 0; channel < 3; ++channel) {
-        pixel[channel] = cv::saturate_cast<std::uint8_t>(colour[channel] * brightness);
-      }
-    }
-  }
-  return panel;
+cv::Mat polarity_panel(std::span<const float> volume, const VolumeShape& shape) {
+  return drawn(volume, shape, {255, 255, 255}, {0, 0, 0},
+               [](std::size_t, float positive, float negative) {
+                 const float share = positive / (positive + negative);
+                 return cv::Vec3b(cv::saturate_cast<std::uint8_t>(230 * (1 - share)), 0,
+                                  cv::saturate_cast<std::uint8_t>(230 * share));
+               });
 }
 
 }  // namespace eventgan

@@ -21,7 +21,7 @@ from eventgan import plotting
 
 PROGRAM = os.environ["EVENTGAN_PROGRAM"]
 BINS, HEIGHT, WIDTH = 9, 24, 32
-ZOOM, GAP, TITLE = 8, 6, 24  # of a preview of so small volumes: three panels side by side (preview_image.cc)
+ZOOM, GAP, TITLE = 8, 6, 24  # of a preview of so small volumes: four panels side by side (preview_image.cc)
 
 
 @pytest.fixture(autouse=True)
@@ -54,7 +54,7 @@ def previewed(root, folder):
     panels, left, size = {}, GAP + 2 * (WIDTH * ZOOM + GAP), (HEIGHT * ZOOM, WIDTH * ZOOM)
     for path in (folder / "images").iterdir():
         image = cv2.imread(str(path))[..., ::-1]
-        assert image.shape[1] == left + size[1] + GAP
+        assert image.shape[1] == left + 2 * (size[1] + GAP)
         panels[int(path.stem.rpartition("_")[2])] = image[TITLE:TITLE + size[0], left:left + size[1]]
     return eventgan.Shards(folder / "out"), panels
 
@@ -149,7 +149,7 @@ def test_a_sample_s_own_labels_and_others_in_their_place():
     # what is ignored lies below
     assert [patch.get_xy() for patch in ax.patches] == [(4.5, 5.5), (4.5, 5.5), (0.5, 1.5)]
     assert [patch.get_linestyle() in ("-", "solid") for patch in ax.patches] == [True, False, True]
-    assert ax.patches[2].get_edgecolor()[:3] == tuple(np.divide(plotting.CLASSES[1], 255))  # 9 of eight colours
+    assert ax.patches[2].get_edgecolor()[:3] == tuple(np.divide(plotting.CLASSES[1], 255))  # 9 of two colours
     assert [each.get_offsets().tolist() for each in ax.collections] == [[[1, 2]], [[3, 4]]]  # visible, hidden
     ax = eventgan.show(sample, boxes=np.empty((0, 4)), joints=[])
     assert not ax.patches and not sum(len(each.get_offsets()) for each in ax.collections)

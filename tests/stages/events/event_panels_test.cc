@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
@@ -20,12 +21,12 @@ TEST(PreviewLayout, IsAsLargeAsAPageHasRoomFor) {
     EXPECT_EQ(layout.scale.factor, factor) << volume.height << "x" << volume.width;
     EXPECT_EQ(layout.columns, columns) << volume.height << "x" << volume.width;
   };
-  expect({260, 861}, 1, 1);  // 3 x 861 is far beyond 1420
+  expect({260, 861}, 1, 1);  // 2 x 861 is beyond 1420
   expect({375, 1242}, 1, 1);
   expect({260, 346}, 2, 2);  // 2 x 692 + 3 x 6 = 1402
   expect({240, 320}, 2, 2);
-  expect({128, 128}, 5, 2);    // 640 twice each way; in a row 3 x 384
-  expect({1, 1}, 8, 3);        // no larger, and then the fewest rows
+  expect({128, 128}, 5, 2);    // 640 twice each way; in a row 4 x 256
+  expect({1, 1}, 8, 4);        // no larger, and then the fewest rows
   expect({4000, 4000}, 1, 1);  // too large for any page
 }
 
@@ -84,6 +85,27 @@ TEST(TimePanel, UnsoundValuesAreWhite) {
   const cv::Vec3b white(255, 255, 255);
   EXPECT_EQ(pixel_of(3, std::numeric_limits<float>::quiet_NaN()), white);
   EXPECT_EQ(pixel_of(12, std::numeric_limits<float>::infinity()), white);
+}
+
+TEST(PolarityPanel, IsRedOrBlueOnWhite) {
+  const auto pixel = [](float positive, float negative) {
+    std::vector<float> volume(kPixel.value_count(), 0.0f);
+    volume[2] = positive;
+    volume[9 + 5] = negative;
+    return polarity_panel(volume, kPixel).at<cv::Vec3b>(0, 0);
+  };
+  EXPECT_EQ(pixel(0, 0), cv::Vec3b(255, 255, 255));
+  EXPECT_EQ(pixel(50, 0), cv::Vec3b(0, 0, 230));
+  EXPECT_EQ(pixel(0, 50), cv::Vec3b(230, 0, 0));
+  const cv::Vec3b mixed = pixel(20, 60);
+  EXPECT_NEAR(mixed[0], 230 * 0.75, 1);
+  EXPECT_EQ(mixed[1], 0);
+  EXPECT_NEAR(mixed[2], 230 * 0.25, 1);
+  // Half of white and half of red where 1 - exp(-m) is a half.
+  const cv::Vec3b half = pixel(std::log(2.0f), 0);
+  EXPECT_NEAR(half[0], 127, 1);
+  EXPECT_NEAR(half[2], 242, 1);
+  EXPECT_EQ(pixel(std::numeric_limits<float>::quiet_NaN(), 1), cv::Vec3b(0, 0, 0));
 }
 
 TEST(TimePanel, OtherNumbersOfBins) {

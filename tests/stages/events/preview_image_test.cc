@@ -111,7 +111,7 @@ TEST(Skeleton, UnknownNamesHaveNoLimbs) {
 }
 
 // Stacked, four times as large: side by side they could be three times, (1420 - 18) / 2 / 180.
-constexpr ImageSize kDrawnSize{110, 180};
+constexpr ImageSize kDrawnSize{82, 180};
 constexpr int kFactor = 4;
 constexpr int kPanelHeight = kFactor * kDrawnSize.height;
 
@@ -173,26 +173,46 @@ int brightness(const cv::Mat& image, int x, int y) {
   return std::max({pixel[0], pixel[1], pixel[2]});
 }
 
-TEST(PreviewImage, ThreePanels) {
+TEST(PreviewImage, FourPanels) {
   const cv::Mat image = drawn(content_with(90));
-  EXPECT_EQ(image.size(), cv::Size(720 + 2 * 6, 24 + 3 * (440 + 20)));
+  EXPECT_EQ(image.size(), cv::Size(720 + 2 * 6, 24 + 4 * (328 + 20)));
   EXPECT_EQ(panel(image, 0).at<cv::Vec3b>(10, 10), cv::Vec3b(90, 90, 90));
-  EXPECT_EQ(panel(image, 1).at<cv::Vec3b>(439, 719), cv::Vec3b(90, 90, 90));
+  EXPECT_EQ(panel(image, 1).at<cv::Vec3b>(327, 719), cv::Vec3b(90, 90, 90));
   EXPECT_EQ(cv::countNonZero(panel(image, 2).reshape(1)), 0) << "no events are black";
+  EXPECT_EQ(cv::countNonZero(panel(image, 3).reshape(1) != 255), 0) << "or white";
+}
+
+/// So that they are seen on the colours of times and on white.
+TEST(PreviewImage, BoxesAreMagentaOrWhiteWithADarkEdge) {
+  PreviewContent content = content_with(90);
+  add_box(content, {40, 30, 70, 70}, /*ignore=*/false);
+  add_box(content, {100, 30, 130, 70}, /*ignore=*/false);
+  content.annotation.boxes[1].class_id = 1;
+  for (int number = 1; number < 4; ++number) {
+    const cv::Mat image = panel(drawn(content), number);
+    EXPECT_EQ(image.at<cv::Vec3b>(4 * 50, 4 * 40), cv::Vec3b(255, 60, 255));
+    EXPECT_EQ(image.at<cv::Vec3b>(4 * 50, 4 * 100), cv::Vec3b(255, 255, 255));
+    for (const int x : {4 * 40, 4 * 100}) {
+      cv::Mat around;
+      cv::cvtColor(image(cv::Rect(x - 4, 4 * 50, 9, 1)), around, cv::COLOR_BGR2GRAY);
+      EXPECT_GE(cv::countNonZero(around < 110), 2) << "at " << x << " in panel " << number;
+    }
+  }
 }
 
 TEST(PreviewImage, ABoxStandsAtItsPlace) {
   PreviewContent content = content_with(90);
   add_box(content, {40, 50, 90, 80}, /*ignore=*/false);
-  for (int number = 0; number < 3; ++number) {
+  for (int number = 0; number < 4; ++number) {
     const cv::Mat marks = labels_only(content, number);
-    // Below the caption: the lines run along edges x 4, two pixels wide with softened borders.
-    const cv::Rect bounds = cv::boundingRect(marks.rowRange(4 * 50 - 2, kPanelHeight));
-    EXPECT_NEAR(bounds.x, 4 * 40, 3);
-    EXPECT_NEAR(bounds.x + bounds.width, 4 * 90, 3);
-    EXPECT_NEAR(bounds.y + bounds.height + 4 * 50 - 2, 4 * 80, 3);
+    // Below the caption: the lines run along edges x 4, with their edges four pixels wide,
+    // softened.
+    const cv::Rect bounds = cv::boundingRect(marks.rowRange(4 * 50 - 4, kPanelHeight));
+    EXPECT_NEAR(bounds.x, 4 * 40, 4);
+    EXPECT_NEAR(bounds.x + bounds.width, 4 * 90, 4);
+    EXPECT_NEAR(bounds.y + bounds.height + 4 * 50 - 4, 4 * 80, 4);
     EXPECT_EQ(marks.at<std::uint8_t>(4 * 65, 4 * 65), 0) << "the inside stays free";
-    EXPECT_EQ(cv::countNonZero(marks.rowRange(0, 4 * 50 - 2)) > 0, number > 0)
+    EXPECT_EQ(cv::countNonZero(marks.rowRange(0, 4 * 50 - 4)) > 0, number > 0)
         << "the caption is above, where the label belongs";
   }
 }
@@ -202,7 +222,7 @@ TEST(PreviewImage, AnOutlineIsDrawnWhereTheLabelBelongs) {
   for (const bool ignore : {false, true}) {
     add_box(content, {40, 50, 90, 80}, ignore);
     content.labels.boxes.back().outline = {{{{50, 60}, {80, 60}, {80, 75}, {50, 75}}}};
-    for (int number = 0; number < 3; ++number) {
+    for (int number = 0; number < 4; ++number) {
       const cv::Mat marks = labels_only(content, number);
       for (const cv::Point edge : {cv::Point(65, 60), {80, 67}, {65, 75}, {50, 67}}) {
         const cv::Rect around(4 * edge.x - 2, 4 * edge.y - 2, 5, 5);
@@ -233,7 +253,7 @@ TEST(PreviewImage, TheLabelledFrameIsMarkedAndTheOtherHasThinDashes) {
     return cv::countNonZero(labels_only(content, number)(cv::Rect(4 * 40 - 3, 4 * 55, 7, 80)));
   };
   const auto border = [&](int number) {
-    const cv::Vec3b pixel = drawn(content).at<cv::Vec3b>(24 + number * 460 + 100, 4);
+    const cv::Vec3b pixel = drawn(content).at<cv::Vec3b>(24 + number * 348 + 100, 4);
     return pixel[2] > 200;
   };
   for (const int labelled : {0, 1}) {
@@ -249,7 +269,9 @@ TEST(PreviewImage, TheLabelledFrameIsMarkedAndTheOtherHasThinDashes) {
     EXPECT_LE(marked(frame), 80);
     EXPECT_FALSE(border(frame));
   }
-  EXPECT_GE(marked(2), 2 * 80) << "the events have the labels always";
+  for (const int events : {2, 3}) {
+    EXPECT_GE(marked(events), 2 * 80) << "the events have the labels always";
+  }
 }
 
 TEST(PreviewImage, NamesDoNotHideSmallBoxes) {
@@ -259,14 +281,14 @@ TEST(PreviewImage, NamesDoNotHideSmallBoxes) {
   add_box(content, {40, 54, 45, 57}, false);
   const cv::Mat image = panel(drawn(content), 1);
   for (const int top : {50, 54}) {
-    const cv::Rect inside(4 * 40 + 3, 4 * top + 3, 12, 4);
+    const cv::Rect inside(4 * 40 + 4, 4 * top + 4, 10, 3);
     cv::Mat distance;
     cv::absdiff(image(inside), cv::Scalar::all(90), distance);
     EXPECT_EQ(cv::countNonZero(distance.reshape(1)), 0) << top;
   }
   content.annotation.boxes.clear();
   content.labels.boxes.clear();
-  for (int i = 0; i < 800; ++i) {  // one beside the other, smaller than a name: none has room
+  for (int i = 0; i < 560; ++i) {  // one beside the other, smaller than a name: none has room
     const double left = 4.5 * (i % 40), top = 5.5 * (i / 40);
     add_box(content, {left, top, left + 4.5, top + 5.5}, false);
   }
@@ -274,14 +296,28 @@ TEST(PreviewImage, NamesDoNotHideSmallBoxes) {
 }
 
 TEST(PreviewImage, ATileHasTheLabelledFrameAndTheEvents) {
-  PreviewContent content = content_with(90);
-  content.next_bgr.assign(content.next_bgr.size(), 200);
+  PreviewContent content;
+  content.shape = {9, {110, 180}};
+  content.previous_bgr.assign(3 * content.shape.size.pixel_count(), 90);
+  content.next_bgr.assign(3 * content.shape.size.pixel_count(), 200);
+  content.volume.assign(content.shape.value_count(), 0.0f);
   cv::Mat tile = pixels_of(draw_tile(content, 378));
   EXPECT_EQ(tile.size(), cv::Size(378, 24 + 110 + 6)) << "(378 - 18) / 2 = 180";
   EXPECT_EQ(tile.at<cv::Vec3b>(60, 60), cv::Vec3b(200, 200, 200));
   EXPECT_EQ(tile.at<cv::Vec3b>(60, 300), cv::Vec3b(0, 0, 0));
   content.label_position = 0;
   EXPECT_EQ(pixels_of(draw_tile(content, 378)).at<cv::Vec3b>(60, 60), cv::Vec3b(90, 90, 90));
+
+  // A name stands above a box that is as wide, 30 rows below the panel's first.
+  const auto has_name = [&](const Rectangle& edges) {
+    PreviewContent labelled = content;
+    add_box(labelled, edges, /*ignore=*/false);
+    const cv::Rect above(static_cast<int>(6 + edges.left), 24 + 30 - 8, 10, 4);
+    return cv::countNonZero(pixels_of(draw_tile(labelled, 378))(above).clone().reshape(1) != 90) >
+           0;
+  };
+  EXPECT_TRUE(has_name({80, 30, 140, 70}));
+  EXPECT_FALSE(has_name({80, 30, 88, 70}));
 
   PreviewContent wide;
   wide.shape = {9, {10, 100}};
@@ -304,9 +340,9 @@ TEST(PreviewImage, ASheetHasRowsOfTiles) {
 
 TEST(PreviewImage, ABoxThatFillsTheVolumeShowsAllFourSides) {
   PreviewContent content = content_with(90);
-  add_box(content, {0, 0, 180, 110}, /*ignore=*/false);
+  add_box(content, {0, 0, 180, 82}, /*ignore=*/false);
   const cv::Rect bounds = cv::boundingRect(labels_only(content, 1));
-  EXPECT_EQ(bounds, cv::Rect(0, 0, 720, 440));
+  EXPECT_EQ(bounds, cv::Rect(0, 0, 720, 328));
 }
 
 TEST(PreviewImage, IgnoredRegionsAreDashedAndGrey) {
@@ -361,7 +397,7 @@ TEST(PreviewImage, WhatIsMissingIsSaid) {
   content.previous_bgr.clear();
   content.volume.clear();
   const cv::Mat image = drawn(content);
-  for (const int number : {0, 2}) {
+  for (const int number : {0, 2, 3}) {
     cv::Mat grey;
     cv::cvtColor(panel(image, number), grey, cv::COLOR_BGR2GRAY);
     EXPECT_GT(cv::countNonZero(grey > 150), 100) << "text in panel " << number;

@@ -5,7 +5,7 @@ import unittest
 
 import h5py
 
-import eventgan.shards
+import eventgan.open_shards
 from example_shards import SOURCE, ExampleShards
 
 PAGE = SOURCE / "manifests" / "guides" / "shard_format.md"
@@ -74,7 +74,7 @@ class ShardFormatPage(unittest.TestCase):
         rows = re.findall(r"(?m)^\| `(\w+)` \| (.*) \|$", PAGE.read_text(encoding="utf-8").split("## Versions")[1])
         features = [name for name, _ in rows]
         self.assertEqual(list(self.file.attrs["features"]), features)  # this shard has everything
-        self.assertEqual(eventgan.shards.FEATURES, set(features))
+        self.assertEqual(eventgan.open_shards.FEATURES, set(features))
         told = {path for _, what in rows for path in re.findall(r"`(/[\w/]+)`", what)}
         optional = {path for path, _, _, what in self.datasets
                     if what.startswith(("optional", "1 = tile", "share of the sample"))}
@@ -85,7 +85,7 @@ class ShardFormatPage(unittest.TestCase):
     def test_the_version_is_that_of_the_page(self):
         version = self.file.attrs["format_version"]
         self.assertTrue(PAGE.read_text(encoding="utf-8").startswith(f"# Shard format, version {version}\n"))
-        self.assertEqual(version, eventgan.shards.FORMAT_VERSION)
+        self.assertEqual(version, eventgan.open_shards.FORMAT_VERSION)
 
     def test_the_lines_of_python_on_the_page_run(self):
         code = "\n".join(line[4:] for line in re.findall(

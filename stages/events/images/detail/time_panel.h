@@ -12,7 +12,12 @@ namespace eventgan {
 cv::Vec3b time_colour(float time);
 
 /// The average-timestamp image of a volume [2 bins, y, x] as CV_8UC3 of the volume's size,
-/// coloured as write_preview_png says. Pixels with a value that is not finite are white.
+/// coloured as draw_preview says. Pixels with a value that is not finite are white.
 cv::Mat time_panel(std::span<const float> volume, const VolumeShape& shape);
+
+/// Its polarities likewise: red where positive events are, blue where negative ones, between them
+/// their mixture, on white; as strong as the times are bright. Pixels with a value that is not
+/// finite are black.
+cv::Mat polarity_panel(std::span<const float> volume, const VolumeShape& shape);
 
 }  // namespace eventgan
