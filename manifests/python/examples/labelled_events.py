@@ -61,7 +61,7 @@ OBJECTS = {"translation_px": [0, MOTION_PX], "rotation_deg": 3, "scale": 0.04}
 
 def grey(args: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
     """The labelled frame itself."""
-    return _whereshown_in(sample, lambda _, image: frame_channel(args, image))
+    return _where_shown(sample, lambda _, image: frame_channel(args, image))
 
 
 def gradient(_: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
@@ -84,14 +84,14 @@ def gradient(_: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
         along = np.nan_to_num(np.cos(shown) * x + np.sin(shown) * y)
         return signed_channel(np.stack([along.clip(0), (-along).clip(0)]))
 
-    return _whereshown_in(sample, slope, angles)
+    return _where_shown(sample, slope, angles)
 
 
 def v2e(args: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
-    return _whereshown_in(sample, lambda previous, image: signed_channel(recordings.V2e(args.peers)(previous, image)))
+    return _where_shown(sample, lambda previous, image: signed_channel(recordings.V2e(args.peers)(previous, image)))
 
 
-def _whereshown_in(sample: Mapping[str, Any], channel_of: Callable[[np.ndarray, np.ndarray], np.ndarray],
+def _where_shown(sample: Mapping[str, Any], channel_of: Callable[[np.ndarray, np.ndarray], np.ndarray],
                  beside: np.ndarray | None = None) -> np.ndarray:
     """channel_of(previous, labelled frame), both without the letterbox's borders, which are 0; or of what is given
     in place of the previous frame."""
@@ -338,4 +338,4 @@ def with_joints(sample: Mapping[str, Any], names: Sequence[str]) -> Item:
     points = dict(zip(names, np.where(annotated[:, None], places, np.nan)))
     points["head"] = (points["head_top"] + points["neck"]) / 2
     return halved({"volume": torch.from_numpy(sample["volume"]), "id": sample["pair"]["sample_id"],
-                    "joints": torch.from_numpy(np.stack([points[name] for name in JOINTS])).float()})
+                   "joints": torch.from_numpy(np.stack([points[name] for name in JOINTS])).float()})
