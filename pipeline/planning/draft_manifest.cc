@@ -29,6 +29,7 @@
 #include "stages/frames/dataset.h"
 #include "stages/frames/dataset_kinds.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/generator/onednn/onednn_generator.h"
 
 namespace eventgan {
 namespace {
@@ -407,17 +408,23 @@ class Draft {
 }}
 )",
                        name_, name_, fmt::join(written, ",\n"), image_text(sources),
-                       is_events ? kEvents : kNetwork, quoted(place_.output));
+                       is_events ? std::string(kEvents) : network_text(), quoted(place_.output));
   }
 
  private:
-  static constexpr std::string_view kNetwork =
-      R"(  // Volumes are made by the generator that comes with the program, unless another is named:
-  // "generator": { "weights": "my.safetensors" },
-  // Weights that know their sensor make those of a camera, of one that ships or of your own, which
+  static std::string network_text() {
+    const bool has_int8 = onednn_support(Precision::kInt8).able;
+    return fmt::format(
+        R"(  // Detectors and pose networks learn as much from the narrow weights{} as from the wide ones in
+  // float32, "shipped:16", which take four times as long (manifests/guides/choose.md).
+  // Weights of your own: {{ "weights": "my.safetensors" }}.
+  "generator": {{ "weights": "shipped:8", "precision": "{}" }},
+  // Weights that know their sensor make the events of a camera, of one that ships or of your own, which
   // `eventgan fit --weights` finds in its recordings (manifests/guides/sensor.md):
-  // "generator": { "weights": "shipped:sensor", "sensor": "davis346" },
-)";
+  // "generator": {{ "weights": "shipped:sensor", "sensor": "davis346" }},
+)",
+        has_int8 ? " in 8 bits" : "", has_int8 ? "int8" : "auto");
+  }
   static constexpr std::string_view kEvents =
       R"(  // Volumes are made of the camera's own events.
   "generator": { "kind": "events" },
@@ -488,19 +495,22 @@ class Draft {
 )",
           image);
     }
+    const bool drives = source.found.dataset == DatasetKind::kKittiObject;
     return fmt::format(
-        R"(      // The motion of each image is drawn, and half of them rest. Each object moves on its own; one whose labels
+        R"(      // The motion of each image is drawn{} Each object moves on its own; one whose labels
       // have no outline is cut out of its box.
       "pairs": {{
         "from": "stills",
         "motion": {{
-          {},
+          {},{}
           "objects": {{ "translation_px": [{}, {}], "rotation_deg": {}, "scale": {} }}
         }}
       }}
 )",
-        image, object.translation_px[0], object.translation_px[1], object.rotation_deg,
-        object.scale);
+        drives ? ", and none rests, since the camera drives."
+               : ", and half of them rest: \"rests\": 0 is for a camera that moves.",
+        image, drives ? " \"rests\": 0," : "", object.translation_px[0], object.translation_px[1],
+        object.rotation_deg, object.scale);
   }
 
   static std::string window_text(const SourceDraft& source) {

@@ -34,7 +34,9 @@ std::string draft_name(const std::vector<FoundSource>& sources);
 /// frame left out. Where images are no sequence, since some that are looked at have several sizes,
 /// or neighbours that do not show the same scene, or where no labelled frame has a paired frame,
 /// each image makes a pair with itself ("from": "stills"). Of sources that want different sizes, it
-/// is one that fits all. What it reads is what `convert` would read by the manifest.
+/// is one that fits all. What it reads is what `convert` would read by the manifest. Generated
+/// volumes are of the cheapest weights and precision that teach a detector no less: int8 where this
+/// processor has kernels for it, else "auto".
 ///
 /// Throws as open_dataset does, and UsageError for a path that is not UTF-8, which no manifest can
 /// name, for a source that is given twice, and for recordings of events beside frames, which make

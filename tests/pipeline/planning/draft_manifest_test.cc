@@ -5,6 +5,7 @@
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
+#include "stages/generator/onednn/onednn_generator.h"
 #include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -77,6 +78,14 @@ TEST_F(DraftManifest, OfASequenceTakesPairsOfNeighboursAsTheyAre) {
   EXPECT_THAT(
       made.text,
       HasSubstr(R"(// "generator": { "weights": "shipped:sensor", "sensor": "davis346" },)"));
+  EXPECT_EQ(job.generator.weights, "shipped:8");
+  if (onednn_support(Precision::kInt8).able) {
+    EXPECT_EQ(job.generator.precision, Precision::kInt8);
+    EXPECT_THAT(made.text, HasSubstr("narrow weights in 8 bits as from"));
+  } else {
+    EXPECT_EQ(job.generator.precision, std::nullopt);  // "auto"
+    EXPECT_THAT(made.text, HasSubstr("narrow weights as from"));
+  }
   EXPECT_FALSE(job.image.size);
   EXPECT_TRUE(made.has_samples);
   EXPECT_THAT(made.findings, ElementsAre("what was found: 3 frames of 1 sequence, NO LABELS",
@@ -240,6 +249,22 @@ TEST_F(DraftManifest, OfSeveralHasOneSizeAndAPresetWhereTheirsDiffer) {
   EXPECT_FALSE(read(alike).image.size);
   EXPECT_THAT(alike.text, Not(HasSubstr("preset")));
   EXPECT_EQ(read(draft({walk, images("still", {kOneSize, kOtherSize})})).image.size, kDavis);
+}
+
+TEST_F(DraftManifest, OfSingleImagesWithBoxesTheImageRestsUnlessItsCameraDrives) {
+  testing::write_flat_image(folder_ / "kitti/image_2/000000.png", kOneSize, 9);
+  testing::write_file(folder_ / "kitti/label_2/000000.txt", "");
+  const auto streets = read(draft({found(DatasetKind::kKittiObject, "kitti")})).sources[0].pairs;
+  ASSERT_TRUE(streets.stills && streets.stills->objects);
+  EXPECT_EQ(streets.stills->rests, 0);
+
+  FoundSource photos = images("photos", {kOneSize});
+  testing::write_file(folder_ / "photos.csv",
+                      "image,class,left,top,right,bottom\n0.png,a,1,2,9,9\n");
+  photos.labels = {LabelFormat::kCsv, folder_ / "photos.csv"};
+  const auto others = read(draft({photos})).sources[0].pairs;
+  ASSERT_TRUE(others.stills && others.stills->objects);
+  EXPECT_FALSE(others.stills->rests) << "half of them";
 }
 
 TEST_F(DraftManifest, HasSamplesOnlyIfEachSourceHas) {
