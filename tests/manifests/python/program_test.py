@@ -69,7 +69,8 @@ def test_a_drafted_manifest_is_converted(demo, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     manifest = eventgan.init("kitti_object", demo / "kitti" / "training")
     assert manifest == pathlib.Path("manifest.json") and "// KITTI object: 12 labelled frames" in manifest.read_text()
-    text, count = re.subn(r'^  "generator": .*$', '  "generator": { "kind": "difference" },', manifest.read_text(), flags=re.M)
+    text, count = re.subn(r'^  "generator": .*$', '  "generator": { "kind": "difference" },', manifest.read_text(),
+                          flags=re.M)
     assert count == 1
     manifest.write_text(text)
     shards = eventgan.convert(manifest, progress=False)
