@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Trains a small detector on the boxes of event-volume shards: minutes on one core, and no other trainer is needed.
 
-    train_detector.py --data out --classes person --out persons --steps 300
+    train_detector.py --data out --classes person --out persons
 
 It sees one channel, positive minus negative events (`eventgan.signed_channel`), unless --channels says that it sees the
 volume. In a map of an eighth of the image's size it finds how likely the middle of an object is at each place, and how
@@ -13,7 +13,11 @@ from __future__ import annotations
 
 import argparse
 import functools
+import itertools
+import json
 import math
+import pathlib
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -28,6 +32,9 @@ from torch import nn
 from torch.utils.data import Dataset
 
 STRIDE = 8  # input pixels per cell of the map
+LEAST_SIDE = 2 * STRIDE  # input pixels: few boxes with a shorter side are learnt
+STEPS = 3000  # unless the options say; ten times those of a first look
+POOR = 0.1  # an AP below that finds hardly anything
 Norm = Callable[[int], nn.Module]  # channels -> layer
 SPREAD = 0.54 / 6  # standard deviation of a box's Gaussian, as a share of its sides: TTFNet's
 # What the events of another scene or camera may look like: measured on real cameras, manifests/guides/real_cameras.md.
@@ -199,8 +206,71 @@ def signed(sample: Mapping[str, Any]) -> np.ndarray:
     return signed_channel(sample["volume"])
 
 
+def size_of(area: np.ndarray, scale: float) -> tuple[int, int]:
+    """H, W of the input that shows the area of the volumes at `scale`: multiples of 32."""
+    height, width = (32 * math.ceil(side * scale / 32) for side in (area[2:] - area[:2])[::-1])
+    return height, width
+
+
+def shorter_sides(items: Iterable[dict[str, Any]], classes: Sequence[str]) -> dict[str, np.ndarray]:
+    """For each class the shorter sides of its boxes, in input pixels, ignored ones left out."""
+    kept = [(item["boxes"][~item["ignore"]], item["labels"][~item["ignore"]]) for item in items]
+    boxes, labels = (torch.cat(each) for each in zip(*kept))
+    sides = (boxes[:, 2:] - boxes[:, :2]).amin(1)
+    return {name: sides[labels == i].numpy() for i, name in enumerate(classes)}
+
+
+def larger_scale(area: np.ndarray, scale: float, side: float) -> tuple[float, float]:
+    """The least multiple of 0.5 as --scale that makes `side`, in input pixels at `scale`, LEAST_SIDE or more, at most
+    4; and the side at it."""
+    def seen(at: float) -> float:
+        return float(fitted(area, size_of(area, at))[0, 0])
+
+    steps = itertools.count(math.floor(2 * scale) + 1)
+    found = next(at / 2 for at in steps if at >= 8 or side * seen(at / 2) / seen(scale) >= LEAST_SIDE)
+    return found, side * seen(found) / seen(scale)
+
+
+def warn_of_small(sides: Mapping[str, np.ndarray], area: np.ndarray, scale: float) -> float | None:
+    """Prints how many boxes there are, and how large; warns if the network will hardly see half of those of a class.
+    The --scale at which it does, None: it does at this one."""
+    medians = {name: float(np.median(each)) for name, each in sides.items() if len(each)}
+    print("boxes for training, and the median of their shorter side in the network's input: "
+          + ", ".join(f"{len(each)} {name}" + (f" {medians[name]:.3g} px" if len(each) else "")
+                      for name, each in sides.items()))
+    name = min(medians, key=medians.__getitem__)
+    if medians[name] >= LEAST_SIDE:
+        return None
+    warning = (f"warning: half of the boxes of {name} are narrower than {medians[name]:.3g} pixels in the network's "
+               f"input, and its map has a cell for {STRIDE}")
+    if scale >= 4:
+        print(f"{warning}: such boxes need larger volumes (image.width, image.height of convert's manifest)",
+              file=sys.stderr)
+        return None
+    larger, side = larger_scale(area, scale, medians[name])
+    print(f"{warning}: --scale {larger:g} makes them {side:.3g}" + (
+        "" if side >= LEAST_SIDE else ", which is little; larger volumes (image.width, image.height of convert's "
+        "manifest) have more to see"), file=sys.stderr)
+    return larger
+
+
+def advice(summary: Mapping[str, Any], items: int, larger: float | None) -> str | None:
+    """What to do about the result, `summary` of metrics.json; None: it is not poor."""
+    score, steps = summary[summary["metric"]], summary["history"][-1]["step"]
+    if score is None:
+        return f"there is no {summary['metric']}: the validation samples have no box of that class"
+    if score >= POOR and score > summary["untrained"]:
+        return None
+    todo = [f"--steps {max(STEPS, 2 * steps)} in place of {steps}"]
+    todo += [f"--scale {larger:g} (and another --out)"] if larger else []
+    todo += [f"more labelled images than {items}"] if items < 400 else []
+    return f"{summary['metric']} {score:.2g} finds hardly anything. What helps: {'; '.join(todo)}"
+
+
 def main() -> None:
-    parser = training.options(__doc__.splitlines()[0], batch=16, lr=2e-3)
+    parser = training.options(__doc__.splitlines()[0], batch=16, lr=2e-3, steps=STEPS)
+    parser.epilog = (f"{STEPS} steps of 320x192 take about 6 minutes on a core with AVX512-BF16 and --bfloat16; "
+                     "--steps 300 is for a first look.")
     parser.add_argument("--classes", default="Car",
                         help="class names, separated by commas; the first one's AP is the result")
     parser.add_argument("--channels", choices=["signed", "volume"], default="signed", help="what the network sees")
@@ -212,8 +282,8 @@ def main() -> None:
     train_shards, validation_shards = training.divided(args, training.with_boxes)
     test_shards = training.tested(args, train_shards, validation_shards, training.with_boxes)
     area = train_shards.image_area()  # what a letterbox has added shows nothing
-    size = tuple(32 * math.ceil(side * args.scale / 32) for side in (area[2:] - area[:2])[::-1])
-    view, classes = fitted(area, size), args.classes.split(",")
+    size, classes = size_of(area, args.scale), args.classes.split(",")
+    view = fitted(area, size)
 
     def seen(shards: Shards) -> Shards:
         return shards.changed(signed) if args.channels == "signed" else shards
@@ -228,7 +298,14 @@ def main() -> None:
         test = items_of(test_set)
     except ValueError as error:
         raise SystemExit(str(error))
+    sides = shorter_sides(items, classes)
+    if not len(sides[classes[0]]):
+        there = [f"{count} of {name}" for name, count in train_shards.class_counts().items() if count]
+        raise SystemExit(f"expected boxes of {classes[0]} to train on, got none, in {args.data}; its training samples "
+                         f"have {', '.join(there) or 'no boxes that are not to be ignored'}")
+    larger = warn_of_small(sides, area, args.scale)
     model = train(args, items, classes, AUGMENTATION, validation)
+    poor = advice(json.loads(pathlib.Path(args.out, "metrics.json").read_text(encoding="utf-8")), len(items), larger)
 
     def image_of(i: int) -> tuple[str, np.ndarray]:
         boxes, labels, scores = next(detect(model, validation[i]["volume"][None]))
@@ -240,6 +317,8 @@ def main() -> None:
     training.write_predictions(args, (entry for item, boxes in found
                                       for entry in training.box_predictions(item, boxes, classes, test_view)))
     training.write_images(args, len(validation), image_of)
+    if poor:
+        print(f"warning: {poor}", file=sys.stderr)
 
 
 if __name__ == "__main__":

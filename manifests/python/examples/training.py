@@ -55,17 +55,19 @@ def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
     return parser
 
 
-def options_of_any(description: str, data: str, **defaults: Any) -> argparse.ArgumentParser:
+def options_of_any(description: str, data: str, steps: int | None = None, **defaults: Any) -> argparse.ArgumentParser:
     """The options that all examples have, of which --data is `data`. The first limit that is reached ends the
-    training."""
+    training; if none is given, so many `steps` do, None: 30 minutes."""
+    otherwise = " (default: {} if there is no other limit)"
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--data", required=True, help=data)
     parser.add_argument("--out", required=True, help="folder for checkpoint, weights, metrics.json and images; run the "
                         "same command again to resume")
     parser.add_argument("--epochs", type=int, help="stop after this many epochs")
-    parser.add_argument("--steps", type=int, help="stop after this many batches")
-    parser.add_argument("--minutes", type=float, help="stop after this much training time, without validation "
-                        "(default: 30 if there is no other limit)")
+    parser.add_argument("--steps", type=int,
+                        help="stop after this many batches" + (otherwise.format(steps) if steps else ""))
+    parser.add_argument("--minutes", type=float, help="stop after this much training time, without validation"
+                        + ("" if steps else otherwise.format(30)))
     parser.add_argument("--every", type=int, default=1, help="validate every so many epochs, and at the end")
     parser.add_argument("--batch", type=int)
     parser.add_argument("--lr", type=float,
@@ -77,7 +79,7 @@ def options_of_any(description: str, data: str, **defaults: Any) -> argparse.Arg
     parser.add_argument("--threads", type=int, help="number of threads (default: all cores)")
     parser.add_argument("--workers", type=int, default=0, help="processes that read samples")
     parser.add_argument("--images", type=int, default=6)
-    parser.set_defaults(**defaults)
+    parser.set_defaults(unlimited=("steps", steps) if steps else ("minutes", 30.0), **defaults)
     return parser
 
 
@@ -87,8 +89,9 @@ def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
         value = getattr(args, name)
         if value is not None and (value < least or not value):
             sys.exit(f"expected --{name} {'above 0' if name == 'minutes' else 'of at least 1'}, got {value}")
+    name, value = vars(args).pop("unlimited")
     if args.epochs is None and args.steps is None and args.minutes is None:
-        args.minutes = 30.0
+        setattr(args, name, value)
     if args.device == "cuda" and not torch.cuda.is_available():
         sys.exit("expected a CUDA device, got none, in --device cuda")
     # Debian's PyTorch begins with one thread.

@@ -67,6 +67,37 @@ def test_targets_of_several_boxes():
     assert all(not each.any() for each in nothing)
 
 
+def test_small_boxes_are_told_with_a_scale_that_makes_them_larger(capsys):
+    """Of 10x6, 30x6, 6x40 and an ignored 2x2 box the median of the shorter sides is 6. At --scale 2.5 it is 15, at 3
+    it is 18, 16 or more."""
+    area = np.array([0, 0, 128, 96])
+    small = item([[0, 0, 10, 6], [0, 0, 30, 6], [0, 0, 6, 40], [0, 0, 2, 2]], ignore=[False, False, False, True])
+    sides = detector.shorter_sides([small, item([[0, 0, 50, 40]], [1])], ["dog", "cat", "cow"])
+    assert [sides[name].tolist() for name in sides] == [[6, 6, 6], [40], []]
+    assert detector.warn_of_small(sides, area, 1.0) == 3
+    told = capsys.readouterr()
+    assert "3 dog 6 px, 1 cat 40 px, 0 cow" in told.out
+    assert "warning: half of the boxes of dog are narrower than 6 pixels" in told.err
+    assert "--scale 3 makes them 18" in told.err
+    assert detector.warn_of_small({"dog": np.array([16.0])}, area, 1.0) is None and not capsys.readouterr().err
+    assert detector.warn_of_small({"dog": np.array([1.0])}, area, 1.0) == 4  # at most
+    assert "--scale 4 makes them 4, which is little" in capsys.readouterr().err
+    assert detector.warn_of_small({"dog": np.array([1.0])}, area, 4.0) is None
+    assert "need larger volumes" in capsys.readouterr().err
+
+
+def test_a_poor_result_is_told_with_what_helps():
+    def summary(score, untrained=0.0):
+        return {"metric": "AP50 dog", "AP50 dog": score, "untrained": untrained, "history": [{"step": 200}]}
+
+    told = detector.advice(summary(0.0006), items=50, larger=3.0)
+    assert told.startswith("AP50 dog 0.0006 finds hardly anything")
+    assert "--steps 3000 in place of 200" in told and "--scale 3 " in told and "more labelled images than 50" in told
+    assert "--scale" not in detector.advice(summary(0.3, untrained=0.4), items=500, larger=None)
+    assert detector.advice(summary(0.3), items=50, larger=None) is None
+    assert "no box of that class" in detector.advice(summary(None), items=50, larger=None)
+
+
 def test_what_is_learnt_is_what_is_found():
     given = item([[4, 16, 84, 56], [70, 2, 90, 90], [100, 60, 128, 96]])
     logits, edges, heat, boxes, weight = perfect(given)
