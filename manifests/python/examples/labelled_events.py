@@ -146,6 +146,7 @@ METHODS = {  # of the main table
 LAYERS = {
     "EventGAN 16, layers": Source(SHIPPED[16], layers=True),
     "EventGAN 8, layers": Source(SHIPPED[8], layers=True),
+    "EventGAN 8, int8, layers": Source({**SHIPPED[8], "precision": "int8"}, layers=True),
     "difference, layers": Source({"kind": "difference"}, layers=True),
     "ESIM, layers": Source({"kind": "esim"}, layers=True),
     "gradient, layers": Source(of_pair=gradient, layers=True),

@@ -51,8 +51,8 @@ FULL = train_detector.AUGMENTATION
 LAST_LAYER_STEPS = 200
 ALL = "all recordings"
 TUNED, CONSTANT = ", last layer tuned", "the same answer everywhere, of the test's own labels"
-IN_LAYERS = ("EventGAN 16, layers", "EventGAN 8, layers", "difference, layers", "ESIM, layers", "gradient, layers",
-             "grey frames")
+IN_LAYERS = ("EventGAN 16, layers", "EventGAN 8, layers", "EventGAN 8, int8, layers", "difference, layers",
+             "ESIM, layers", "gradient, layers", "grey frames")
 TASKS = {
     "persons": Task(
         classes=(PERSON,), stills=("pennfudan", "coco256", "voc100"), clips={"sot_person": 3, "davis_tennis": 3},
