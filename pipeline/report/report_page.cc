@@ -229,6 +229,9 @@ std::string origin(const Survey& survey, const PageContext& context) {
           manifest.image.size ? "" : " (of the first shard, each image has its own)",
           to_string(header.dtype), header.scope.empty() ? "" : ", scope " + escaped(header.scope),
           header.unit == VolumeUnit::kLearned ? "are dimensionless, about 0–1" : "count events"));
+  if (!manifest.image.preset.empty()) {
+    html += fact("preset", "<code>" + escaped(manifest.image.preset) + "</code>");
+  }
   html += fact("preprocessing", "<code>" + escaped(header.preprocessing) + "</code>");
   html += fact("plan", "<code>" + escaped(header.plan_hash) + "</code>, seed " +
                            std::to_string(manifest.seed));
@@ -303,11 +306,19 @@ std::string counts(const Survey& survey) {
   std::ranges::stable_sort(classes, std::greater(), &std::pair<std::string, std::int64_t>::second);
   rows.clear();
   for (const auto& [name, boxes] : classes) {
+    const auto found = survey.narrow_boxes.find(name);
+    const std::int64_t narrow = found == survey.narrow_boxes.end() ? 0 : found->second;
     rows.push_back(text_cell(escaped(name)) + cell("class." + name, boxes) +
-                   right_cell(percent(boxes, survey.counts.boxes)));
+                   right_cell(percent(boxes, survey.counts.boxes)) +
+                   cell("class." + name + ".narrow", narrow));
   }
   if (!rows.empty()) {
-    html += "<div><h3>Boxes by class</h3>" + table({"class", "#boxes", "#share"}, rows) + "</div>";
+    html += "<div><h3>Boxes by class</h3>" + table({"class", "#boxes", "#share", "#narrow"}, rows) +
+            fmt::format(
+                "<p class=note>Narrow: not to be ignored, and with a shorter side of less "
+                "than {:g} volume pixels. Detectors learn few of these: enlarge their "
+                "input, or make larger volumes.</p></div>",
+                Survey::kNarrowPx);
   }
   rows.clear();
   for (const auto& [flag, samples] : survey.flags) {

@@ -162,8 +162,13 @@ class Surveyor {
     for (std::size_t box = 0; box < tables.boxes.class_id.size(); ++box) {
       if (tables.boxes.ignore[box] != 0) continue;
       const double* xyxy = &tables.boxes.xyxy[4 * box];
-      survey_.box_sides.add(
-          std::sqrt(std::max(0.0, xyxy[2] - xyxy[0]) * std::max(0.0, xyxy[3] - xyxy[1])));
+      const double width = std::max(0.0, xyxy[2] - xyxy[0]);
+      const double height = std::max(0.0, xyxy[3] - xyxy[1]);
+      survey_.box_sides.add(std::sqrt(width * height));
+      if (std::min(width, height) < Survey::kNarrowPx) {
+        const auto id = static_cast<std::size_t>(tables.boxes.class_id[box]);
+        ++survey_.narrow_boxes[overview.header.label_schema.class_names.at(id)];
+      }
     }
   }
 

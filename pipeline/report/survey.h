@@ -72,6 +72,9 @@ struct Survey {
   /// A joint without such a pixel this near, in pixels each way, is one without events.
   static constexpr int kJointRadius = 4;
 
+  /// Detectors learn few boxes with a shorter side than two cells of their finest map, 8 pixels.
+  static constexpr double kNarrowPx = 16;
+
   DatasetParts parts;
   ShardHeader header;  ///< of the first shard that is done
   DatasetCounts counts;
@@ -80,6 +83,8 @@ struct Survey {
   std::map<int, GapSurvey> gaps;
   std::map<std::string, std::int64_t> flags;  ///< valid samples by flag_names
   LogHistogram box_sides;  ///< sqrt(width x height) in volume pixels, ignored ones left out
+  /// Boxes by class whose shorter side is less than kNarrowPx volume pixels, ignored ones left out.
+  std::map<std::string, std::int64_t> narrow_boxes;
   std::map<std::string, FaultSurvey> faults;
   std::vector<QuarantinedSlot> quarantined;  ///< the first kMostQuarantined
   static constexpr std::size_t kMostQuarantined = 50;

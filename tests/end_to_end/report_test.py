@@ -80,8 +80,11 @@ class Report(program.InFolder):
                 for gap in shard["pairs/gap_frames"][:]:
                     numbers[f"gap.{gap}"] = numbers.get(f"gap.{gap}", 0) + 1
                 names = [text(name) for name in shard["labels/boxes/class_id"].attrs["class_names"]]
-                for box in shard["labels/boxes/class_id"][:]:
+                boxes = shard["labels/boxes"]
+                for box, (left, top, right, bottom), ignore in zip(boxes["class_id"], boxes["xyxy"], boxes["ignore"]):
                     numbers[f"class.{names[box]}"] = numbers.get(f"class.{names[box]}", 0) + 1
+                    narrow = not ignore and min(right - left, bottom - top) < 16
+                    numbers[f"class.{names[box]}.narrow"] = numbers.get(f"class.{names[box]}.narrow", 0) + narrow
         return numbers
 
     def without_events(self):
@@ -111,6 +114,9 @@ class Report(program.InFolder):
         expected = self.counted()
         self.assertEqual(expected["quarantined"], 1)
         self.assertGreater(expected["boxes"], 5)
+        narrow = [number for key, number in expected.items() if key.endswith(".narrow")]
+        self.assertGreater(sum(narrow), 0)
+        self.assertIn("preset", page.texts)
         for key, number in expected.items():
             self.assertEqual(page.numbers[key], number, key)
         for name, (looked_at, without) in self.without_events().items():
