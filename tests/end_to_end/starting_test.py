@@ -81,8 +81,8 @@ class Init(program.InFolder):
         told, manifest = self.init(self.folder)
         self.assertIn("no prev_2", told)
         self.assertIn('no sequences: each image makes a pair with itself under a small motion ("from": "stills")', told)
-        self.assertEqual(read_commented(manifest)["sources"][0]["pairs"],
-                         {**STILLS, "motion": {**STILLS["motion"], "objects": OBJECTS}})
+        self.assertEqual(read_commented(manifest)["sources"][0]["pairs"],  # its camera drives, so no image rests
+                         {**STILLS, "motion": {**STILLS["motion"], "objects": OBJECTS, "rests": 0}})
 
     def test_gaps_without_paired_frames_are_left_out(self):
         write_cars(self.folder / "training", 2, np.random.default_rng(7))
