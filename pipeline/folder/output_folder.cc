@@ -231,12 +231,6 @@ void refuse_another_job(const fs::path& folder, const Fingerprint& now,
 /// What to do about a fingerprint that differs: inputs that were mended ask for no new start, which
 /// would throw away what all other shards took.
 std::string way_out(const Fingerprint& frozen, Fingerprint now) {
-  if (const auto trial = limit_of(frozen); trial && trial != limit_of(now)) {
-    return fmt::format(
-        ": a trial of it lies there, made with --limit {} (choose another output folder, or start "
-        "again with --overwrite):",
-        *trial);
-  }
   for (const auto& [field, value] : frozen) {
     if (is_amendable(field)) now[field] = value;
   }
@@ -254,6 +248,12 @@ void require_same_fingerprint(const fs::path& folder, const Fingerprint& frozen,
   const auto differences = fingerprint_differences(frozen, now);
   if (differences.empty()) return;
   refuse_another_job(folder, now, manifest_folder, /*discards=*/false);
+  if (const auto trial = limit_of(frozen); trial && trial != limit_of(now)) {
+    throw UsageError(
+        fmt::format("expected no trial of this job, got one made with --limit {}, in {} (choose "
+                    "another --output, or start again with --overwrite)",
+                    *trial, folder.string()));
+  }
   std::string message = (folder / kPlanName).string() +
                         " was frozen by a run that would write different bytes" +
                         way_out(frozen, now);

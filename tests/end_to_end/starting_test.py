@@ -395,11 +395,15 @@ class Trial(program.InFolder):
             run(command, self.folder / "out-trial-4")
 
     def test_is_no_beginning_of_the_whole(self):
-        self.convert("--limit", 4, "--output", self.folder / "mine")
+        mine = self.folder / "mine"
+        out, _ = self.convert("--limit", 4, "--output", mine)
+        self.assertTrue(out.endswith(f"eventgan convert {self.manifest} --output {mine} --overwrite\n"), out)
         self.assertEqual(len(self.ids("mine")), 4)
-        _, errors = self.convert("--output", self.folder / "mine", expect=64)
-        self.assertIn(": a trial of it lies there, made with --limit 4 (choose another", errors)
-        self.assertIn("limit: expected 4, got nothing", errors)
+        _, errors = self.convert("--output", mine, expect=64)
+        self.assertIn(f"expected no trial of this job, got one made with --limit 4, in {self.folder}/mine (choose",
+                      errors)
+        self.convert("--output", mine, "--overwrite")
+        self.assertEqual(len(self.ids("mine")), 9)
         self.convert()
         self.assertIn("limit: expected nothing, got 4",
                       self.convert("--limit", 4, "--output", self.folder / "out", expect=64)[1])

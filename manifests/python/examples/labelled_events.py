@@ -251,7 +251,8 @@ def _write_coco(folder: pathlib.Path, path: pathlib.Path) -> None:
         for row in csv.DictReader(file):
             images.append({"id": len(images) + 1, "file_name": row["image"], "width": int(row["width"]),
                            "height": int(row["height"])})
-            mask = cv2.imread(str(folder / "masks" / f"{pathlib.Path(row['image']).stem}.png"), cv2.IMREAD_UNCHANGED)
+            path_of_mask = folder / "masks" / f"{pathlib.Path(row['image']).stem}.png"
+            mask = cv2.imread(str(path_of_mask), cv2.IMREAD_UNCHANGED) if path_of_mask.exists() else None
             for number in range(1, 1 + (0 if mask is None else int(mask.max()))):
                 y, x = np.nonzero(mask == number)
                 runs = np.diff(np.flatnonzero(np.diff((mask == number).T.ravel(), prepend=0, append=2)), prepend=0)

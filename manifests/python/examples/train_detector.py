@@ -48,7 +48,7 @@ def convolution(inputs: int, outputs: int, stride: int = 1, norm: Norm = nn.Batc
 
 class Trunk(nn.Module):
     """Of events [N, C, H, W], sides multiples of 32: what is `seen`, [N, 64, H/8, W/8]. A U-Net down to 1/32 of the
-    size; 0.5 million numbers."""
+    size; 0.5 million parameters."""
 
     def __init__(self, channels: int, norm: Norm) -> None:
         super().__init__()

@@ -65,11 +65,15 @@ def main() -> None:
         persons = read_persons(validation_shards)
     except ValueError as error:
         raise SystemExit(str(error))
-    # PCKh is measured by the heads' boxes
-    persons = persons.rows(validation_shards.annotated(train_set.joint_names) & np.isfinite(persons.head_box))
+    persons = persons.rows(validation_shards.annotated(train_set.joint_names))
+    # PCKh by the heads' boxes, as MPII has it, or else by their joints, as the EventGAN paper has it
+    by_head = {"pckh_mpii": np.isfinite(persons.head_box), "pckh": np.isfinite(persons.head)}
+    pckh = next((key for key, known in by_head.items() if known.any()), None)
+    if pckh:
+        persons = persons.rows(by_head[pckh])
     validation_set.persons = persons.place
     if not len(validation_set) or persons.names != train_set.joint_names:
-        raise SystemExit("expected validation persons with head boxes and the trained joints, got "
+        raise SystemExit(f"expected validation persons with the {len(train_set.joint_names)} trained joints, got "
                          f"{len(validation_set)} with {len(persons.names)} joints, in "
                          f"{args.data} (--dataset {args.dataset})")
     print(f"{len(train_set)} persons for training, {len(validation_set)} for validation")
@@ -104,12 +108,13 @@ def main() -> None:
 
     def measure() -> dict[str, float]:
         scores = pose_scores(search(validation_set), persons, hidden=True)["all"]
-        return {"PCKh@0.5": scores["pckh_mpii"], "MPJPE": scores["mpjpe_source"]}
+        return ({"PCKh@0.5": scores[pckh]} if pckh else {}) | {"MPJPE": scores["mpjpe_source"]}
 
     if args.last_layer:
         model.requires_grad_(False).final_layer.requires_grad_(True)
     optimizer = torch.optim.Adam([weight for weight in model.parameters() if weight.requires_grad], lr=args.lr)
-    training.fit(args, model, optimizer, training.batches(args, train_set, shuffle=True), loss_of, measure, "PCKh@0.5")
+    training.fit(args, model, optimizer, training.batches(args, train_set, shuffle=True), loss_of, measure,
+                 "PCKh@0.5" if pckh else "MPJPE")
 
     def image_of(i: int) -> tuple[str, np.ndarray]:
         events, _, _, meta = validation_set[i]
@@ -123,8 +128,9 @@ def main() -> None:
     names = searched.column("sample_id")[test.persons[:, 0]]
     with torch.no_grad():
         found = search(test).tolist()
-    training.write_predictions(args, ({"image_id": name, "person": person, "joints": joints}
-                                      for name, person, joints in zip(names, test.persons[:, 1].tolist(), found)))
+    entries = ({"image_id": name, "person": person, "joints": joints}
+               for name, person, joints in zip(names, test.persons[:, 1].tolist(), found))
+    training.write_predictions(args, entries, "poses")
     training.write_images(args, len(validation_set), image_of)
 
 

@@ -25,6 +25,7 @@ from torch.utils.data import DataLoader, Dataset
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package, if it is not installed
 
+import eventgan
 from eventgan import Sample, Shards, drawing, read_description
 from eventgan.detection_scores import Detections, GroundTruth, detection_scores
 from eventgan.torch import DetectionDataset, fitted, inverse, move_boxes
@@ -37,7 +38,7 @@ MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", 
 
 def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
     """The options of all examples that train on shards."""
-    parser = options_of_any(description, "output folder completed by eventgan finalize", **defaults)
+    parser = options_of_any(description, "folder that eventgan convert has completed", **defaults)
     parser.add_argument("--dataset", help="use only samples of this kind of source, such as kitti_object")
     parser.add_argument("--test", help="folder of shards whose labelled samples (of its validation split, if it has "
                         "one) are predicted at the end, into predictions.json; default: the validation samples")
@@ -161,9 +162,9 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
             shards = shards[list(usable(shards))]
             by = next((by for by in GROUPS if _divides(shards, by)), "sample_id")
             parts, how = (([shards, shards], "the same") if args.overfit or not len(shards)
-                          else (shards.divide(0.8, by, args.seed), f"of another {by}"))
+                          else (shards.divide(0.8, by, args.seed), f"of other {_groups_named(shards, by)}"))
     except FileNotFoundError as error:
-        sys.exit(f"expected a folder completed by eventgan finalize, got no {error.filename}")
+        sys.exit(f"expected a folder that eventgan convert or finalize has completed, got no {error.filename}")
     except ValueError as error:
         sys.exit(str(error))
     if not len(parts[0]) or not len(parts[1]):
@@ -172,6 +173,9 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
                  f"samples of {', '.join(description['counts']['by_dataset'])})")
     if description.get("missing"):
         print(f"{len(description['missing'])} shards are missing in {args.data} (finalize --partial)")
+    if "limit" in description["fingerprint"]:
+        print(f"warning: {args.data} is a trial of its job (--limit {description['fingerprint']['limit']})",
+              file=sys.stderr)
     if description["quarantined"]:
         print(f"{len(description['quarantined'])} quarantined samples are left out")
     print(f"{len(parts[0])} samples for training, {len(parts[1])} for validation, {how}")
@@ -181,8 +185,10 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
 
 def tested(args: argparse.Namespace, train_shards: Shards, validation_shards: Shards,
            usable: Callable[[Shards], Iterable[int]]) -> Shards:
-    """The samples that predictions.json is of, changed as the options say."""
+    """The samples that predictions.json is of, changed as the options say; OUT/ids.txt names them."""
     shards = _to_test(args, validation_shards, usable)
+    text = "".join(f"{name}\n" for name in shards.column("sample_id"))
+    _replace(pathlib.Path(args.out, "ids.txt"), lambda path: path.write_text(text, encoding="utf-8"))
     if args.without_noise:
         shards = shards.changed(without_noise)
     if args.as_bright:
@@ -265,6 +271,12 @@ def labelled_frame(sample: Sample) -> np.ndarray:
     volume = np.zeros_like(sample["volume"])
     volume[0] = placed(sample, labelled_image(sample)) / 255
     return volume
+
+
+def _groups_named(shards: Shards, by: str) -> str:
+    """What each of groups(by) is: of single photographs an image, whatever they are divided by."""
+    alone = len(set(shards.groups(by).tolist())) == len(set(shards.groups("sample_id").tolist()))
+    return "images" if alone else f"{by}s"
 
 
 def _divides(shards: Shards, by: str) -> bool:
@@ -418,11 +430,15 @@ def box_predictions(item: dict, found: tuple[torch.Tensor, torch.Tensor, torch.T
             for box, label, score in zip(boxes.tolist(), labels, scores.tolist())]
 
 
-def write_predictions(args: argparse.Namespace, entries: Iterable[dict]) -> None:
-    """predictions.json, which `python3 -m eventgan.evaluate` reads."""
+def write_predictions(args: argparse.Namespace, entries: Iterable[dict], what: str = "detections") -> None:
+    """predictions.json, and the line that scores it."""
     with torch.no_grad():
         text = json.dumps(list(entries)) + "\n"
     _replace(pathlib.Path(args.out, "predictions.json"), lambda path: path.write_text(text, encoding="utf-8"))
+    place = pathlib.Path(eventgan.__file__).parents[1]
+    path = "" if place.name.endswith("-packages") else f"PYTHONPATH={place} "
+    print(f"to score them: {path}{sys.executable} -m eventgan.evaluate {what} {args.out}/predictions.json "
+          f"--truth {args.test or args.data} --ids {args.out}/ids.txt")
 
 
 def markdown(cells: Sequence[Sequence[str]]) -> str:

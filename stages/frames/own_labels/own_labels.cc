@@ -131,7 +131,7 @@ void OwnLabels::note_without_label(const std::string& labels_path) {
   if (without == 0) return;
   notes_.push_back("no label for " + std::to_string(without) + " of " +
                    count_text(std::ssize(labels_), "frame") + " in " + labels_path +
-                   ": no samples, but paired frames");
+                   ": no samples of their own");
 }
 
 Outcome<ImageSize> OwnLabels::image_size(const std::string& label_key,

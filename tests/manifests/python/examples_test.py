@@ -18,7 +18,7 @@ from eventgan import Shards
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("torchvision")
-pytest.importorskip("cv2")
+cv2 = pytest.importorskip("cv2")
 
 PROGRAM = os.environ["EVENTGAN_PROGRAM"]
 EXAMPLES = SOURCE / "manifests" / "python" / "examples"
@@ -68,13 +68,12 @@ def assert_trained(out, steps, images):
 def test_faster_rcnn_learns_and_goes_on(data, tmp_path):
     options = ["--dataset", "kitti_object", "--batch", "2", "--scale", "0.5", "--regions", "16", "--every", "9"]
     said = train("train_torchvision", data, tmp_path / "parts", "--steps", "1", *options)
-    assert "10 samples for training, 2 for validation, of another sequence" in said and "(untrained)" in said
+    assert "10 samples for training, 2 for validation, of other images" in said and "(untrained)" in said
     assert "resuming after epoch 1" in train("train_torchvision", data, tmp_path / "parts", "--steps", "3", *options)
     assert_trained(tmp_path / "parts", [0, 1, 3], images=2)
     assert {"AP50 Car", "AP50 Van"} <= history(tmp_path / "parts")[0].keys()
-    (tmp_path / "ids.txt").write_text(
-        "\n".join({entry["image_id"] for entry in json.loads((tmp_path / "parts" / "predictions.json").read_text())}))
-    scores = evaluate("detections", tmp_path / "parts", data, "--ids", tmp_path / "ids.txt", "--classes", "Car")
+    ids = tmp_path / "parts" / "ids.txt"
+    scores = evaluate("detections", tmp_path / "parts", data, "--ids", ids, "--classes", "Car")
     assert scores["classes"]["Car"]["ap_voc"] == pytest.approx(history(tmp_path / "parts")[-1]["AP50 Car"], abs=1e-4)
     said = train("train_torchvision", data, tmp_path / "parts", "--steps", "4", *options, "--lr", "0.5", expect=1)
     assert "expected --lr 0.0002, as when this run started, got 0.5, in" in said
@@ -85,6 +84,31 @@ def test_keypoint_rcnn_learns(data, tmp_path):
           "--batch", "1", "--scale", "0.5", "--regions", "8", "--every", "9")
     assert_trained(tmp_path / "out", [0, 2], images=1)
     assert {"AP50 person", "PCK@0.2"} <= history(tmp_path / "out")[0].keys()
+
+
+@pytest.mark.parametrize(("head", "scores"), [("head_top", {"PCKh@0.5", "MPJPE"}), ("nose", {"MPJPE"})])
+def test_pose_resnet_learns_persons_without_head_boxes(head, scores, tmp_path):
+    """Of COCO's files, as LSP's: PCKh is of the heads' joints, or there is none."""
+    trainer, random, names = need_trainer("pose_resnet", "easydict", "yaml"), np.random.default_rng(0), [
+        head, "left_shoulder", "right_shoulder", "left_hip", "right_hip"]
+    images, places = tmp_path / "photos" / "images", [[32, 8], [24, 20], [40, 20], [26, 44], [38, 44]]
+    images.mkdir(parents=True)
+    for i in range(5):
+        cv2.imwrite(str(images / f"{i}.png"), random.integers(0, 256, (64, 64), np.uint8))
+    annotations = [{"id": i + 1, "image_id": i + 1, "category_id": 1, "iscrowd": 0, "bbox": [20, 4, 24, 56],
+                    "num_keypoints": 5, "keypoints": [value for place in places for value in (*place, 2)]}
+                   for i in range(5)]
+    (tmp_path / "photos" / "person_keypoints.json").write_text(json.dumps(
+        {"images": [{"id": i + 1, "file_name": f"{i}.png", "width": 64, "height": 64} for i in range(5)],
+         "annotations": annotations, "categories": [{"id": 1, "name": "person", "keypoints": names, "skeleton": []}]}))
+    subprocess.run([PROGRAM, "convert", tmp_path / "photos", "--output", tmp_path / "out", "--limit", "5",
+                    "--progress", "none"], check=True, capture_output=True)
+    said = train("train_pose", tmp_path / "out", tmp_path / "poses", "--trainer", trainer, "--dataset", "frames",
+                 "--batch", "4", "--size", "64", "--filters", "16", "--steps", "1")
+    assert "4 samples for training, 1 for validation, of other images" in said
+    assert f"warning: {tmp_path / 'out'} is a trial of its job (--limit 5)" in said
+    last = history(tmp_path / "poses")[-1]
+    assert {"PCKh@0.5", "MPJPE"} & last.keys() == scores and all(np.isfinite(last[name]) for name in scores)
 
 
 def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
@@ -99,9 +123,7 @@ def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
             time.sleep(0.01)
         process.kill()
     assert "resuming after epoch" in train("train_pose", data, tmp_path / "killed", *options)
-    predictions = json.loads((tmp_path / "whole" / "predictions.json").read_text())
-    (tmp_path / "ids.txt").write_text("\n".join(entry["image_id"] for entry in predictions))
-    scores = evaluate("poses", tmp_path / "whole", data, "--ids", tmp_path / "ids.txt", "--hidden")
+    scores = evaluate("poses", tmp_path / "whole", data, "--ids", tmp_path / "whole" / "ids.txt", "--hidden")
     assert scores["joints"]["all"]["pckh_mpii"] == history(tmp_path / "whole")[-1]["PCKh@0.5"]
     weights = torch.load(tmp_path / "whole" / "weights.pt")
     train("train_pose", data, tmp_path / "tuned", *options, "--pretrained", tmp_path / "whole" / "weights.pt",
@@ -251,12 +273,13 @@ def test_volumes_are_changed_as_they_are_read(folder, tmp_path, monkeypatch):
     import training
 
     def tested(shards, train_shards=None, **options):
-        args = argparse.Namespace(**{"test": None, "data": "data", "as_bright": False, "without_noise": False,
-                                     **options})
+        args = argparse.Namespace(**{"test": None, "data": "data", "out": tmp_path, "as_bright": False,
+                                     "without_noise": False, **options})
         return training.tested(args, train_shards, shards, None)
 
     shards, before = Shards(folder), {path: path.read_bytes() for path in folder.iterdir()}
     assert [sample["volume"].tolist() for sample in tested(shards)] == [sample["volume"].tolist() for sample in shards]
+    assert (tmp_path / "ids.txt").read_text().split() == shards.column("sample_id").tolist()
     mean = np.mean([sample["volume"].mean() for sample in shards])
     top = max(sample["volume"].max() for sample in shards)
     train_shards = shards.changed(lambda sample: np.full_like(sample["volume"], 2 * mean / top))

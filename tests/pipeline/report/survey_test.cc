@@ -4,11 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <numeric>
+#include <optional>
+#include <string>
 
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/convert.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/small_job.h"
+#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
@@ -30,9 +33,10 @@ TEST(LogHistogram, BinsAreSixthsOfADecade) {
 /// of four; image 13 is damaged, so that samples 13 and 14 are in quarantine.
 class SurveyFolder : public ::testing::Test {
  protected:
-  void make(const std::string& damaged) {
+  void make(const std::string& damaged, const std::optional<LabelSpec>& labels = {}) {
     JobManifest job = testing::make_small_job(folder_, 9);
     job.errors.max_fraction = 1;
+    job.sources[0].labels = labels;
     if (!damaged.empty()) {
       const std::filesystem::path image = folder_ / "clip" / damaged;
       std::filesystem::resize_file(image, std::filesystem::file_size(image) - 20);
@@ -68,6 +72,21 @@ TEST_F(SurveyFolder, HasTheNumbersOfEverySample) {
   LogHistogram expected;
   for (int i = 0; i < 8; ++i) expected.add(5 * change);  // 1 + ... + 9 = 45 ninths
   EXPECT_EQ(survey.sources.at(0).events_per_pixel.counts, expected.counts);
+}
+
+TEST_F(SurveyFolder, ABoxIsNarrowByItsShorterSide) {
+  testing::write_file(folder_ / "boxes.csv",
+                      "image,class,left,top,right,bottom\n"
+                      "f_11.png,wide,0,0,30,16\n"    // 16 lines are enough
+                      "f_11.png,wide,0,0,30,15.5\n"  // narrow, though it is wide
+                      "f_11.png,high,2,0,17.5,20\n"  // narrow
+                      "f_12.png,high,2,0,18,20\n"
+                      "f_12.png,wide,1,1,30,20\n");
+  make("", LabelSpec{LabelFormat::kCsv, "boxes.csv"});
+  const Survey survey = survey_folder(folder_ / "out");
+  EXPECT_EQ(survey.counts.boxes, 5);
+  EXPECT_THAT(survey.narrow_boxes,
+              ::testing::ElementsAre(::testing::Pair("high", 1), ::testing::Pair("wide", 1)));
 }
 
 TEST_F(SurveyFolder, PicksRandomOnesBySeedAndTheExtremes) {

@@ -102,7 +102,7 @@ TEST_F(CocoLabels, OfTheImagesThatTheyName) {
   EXPECT_THAT(dataset->label_schema().joint_names, IsEmpty());
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("instances.json"));
   EXPECT_THAT(dataset->notes(), ElementsAre("no label for 1 of 3 frames in instances.json: no "
-                                            "samples, but paired frames"));
+                                            "samples of their own"));
   const auto& frames = dataset->labelled_frames();
   ASSERT_EQ(frames.size(), 2u);
   EXPECT_EQ(frames[0].sample_id, "000001");

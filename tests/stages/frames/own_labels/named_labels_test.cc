@@ -197,7 +197,7 @@ TEST_F(NamedLabels, MotLiesInTheSequence) {
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("m/s/gt/gt.txt", "m/s/seqinfo.ini"));
   EXPECT_THAT(dataset->notes(),
               ElementsAre("1 sequence without gt/gt.txt or gt.txt in m: t",
-                          "no label for 4 of 6 frames in m: no samples, but paired frames"));
+                          "no label for 4 of 6 frames in m: no samples of their own"));
   const auto& frames = dataset->labelled_frames();
   ASSERT_EQ(frames.size(), 3u);
   EXPECT_EQ(frames[0].sample_id, "s/000002");

@@ -271,8 +271,7 @@ TEST_F(YoloLabels, WhatIsOnOneSideAloneIsNotLost) {
   EXPECT_EQ(missing.frame.path, "d/images/5.png");
   EXPECT_THAT(dataset->notes(),
               ElementsAre("1 folder of labels without images left out in d/labels: old",
-                          "no label for 1 of 3 frames in d/labels: no samples, but paired "
-                          "frames"));
+                          "no label for 1 of 3 frames in d/labels: no samples of their own"));
 }
 
 TEST_F(YoloLabels, ClassesAreInTheFolderAboveWhateverThePathIs) {
