@@ -81,6 +81,19 @@ class AsWritten(program.InFolder):
                 self.assertIn("the events are sorted by time", told)
                 self.assertEqual(self.check_windows(self.events), 8)
 
+    def test_arrays_with_labels_beside_them_are_found_as_windows(self):
+        folder = self.folder / "windows"
+        folder.mkdir()
+        for name in ("a.npy", "b.npy"):
+            self.table(f"windows/{name}", self.events)
+        (folder / "classes.txt").write_text("person\n")
+        run("init", folder, "--out", self.folder / "none.json", expect=66)  # any numbers
+        for name in ("a.txt", "b.txt"):
+            (folder / name).write_text("0 0.5 0.5 0.25 0.5\n")
+        told = run("convert", folder, "--output", self.out, "--sensor", f"{WIDTH}x{HEIGHT}")[0]
+        self.assertIn("2 of 2 ", told)
+        self.assertIn("boxes: 2 person\n", told)
+
     def test_files_sorted_in_pieces_lose_no_event_in_silence(self):
         catted, blocks = self.pieces()
         for events, invalid in ((catted, 8), (blocks, 4)):

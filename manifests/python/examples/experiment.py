@@ -2,9 +2,9 @@
 """The EventGAN paper's experiments on a small scale: networks trained on generated events, tested on those of a
 simulated camera.
 
-    experiment.py detection --program build/release/eventgan --trainer ../shared/trainers/yolov3 --out cars
-    experiment.py pose --program build/release/eventgan --trainer ../shared/trainers/pose_resnet --out poses
-    experiment.py trade --program build/release/eventgan --trainer ../shared/trainers/yolov3 --out cars
+    experiment.py detection --program build/release/eventgan --trainer yolov3 --out cars
+    experiment.py pose --program build/release/eventgan --trainer human-pose-estimation.pytorch --out poses
+    experiment.py trade --program build/release/eventgan --trainer yolov3 --out cars
     experiment.py real --program build/release/eventgan --frames labelled_frames --real real_labels --peers peers --out
     persons
     experiment.py real --task cars --program build/release/eventgan --frames labelled_frames --real real_labels --out

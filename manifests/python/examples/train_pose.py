@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Trains Microsoft's pose_resnet (Simple Baselines) on the persons of event-volume shards: its network, its loss.
 
-    train_pose.py --trainer ../shared/trainers/pose_resnet --data out --out poses --minutes 30
+    train_pose.py --trainer human-pose-estimation.pytorch --data out --out poses --minutes 30
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from eventgan.torch import PoseAugmentation, PoseDataset, exchange_first_convolu
 
 
 def read_args() -> argparse.Namespace:
-    parser = training.options(__doc__.splitlines()[0], batch=16, lr=1e-3, dataset="mpii")
+    parser = training.options(__doc__.splitlines()[0], batch=16, lr=1e-3)
     parser.add_argument("--trainer", required=True, help="folder of microsoft/human-pose-estimation.pytorch")
     parser.add_argument("--size", type=int, default=128, help="height and width of the input, a multiple of 32")
     parser.add_argument("--layers", type=int, default=18, help="layers of the ResNet: 18, 34, 50, 101 or 152")

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Trains ultralytics' YOLOv3 (the archive branch) on the boxes of event-volume shards: its Darknet, its loss.
 
-    train_yolov3.py --trainer ../shared/trainers/yolov3 --data out --out cars --minutes 30
+    train_yolov3.py --trainer yolov3 --data out --out cars --minutes 30
 """
 
 from __future__ import annotations

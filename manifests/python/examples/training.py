@@ -166,7 +166,7 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
     except FileNotFoundError as error:
         sys.exit(f"expected a folder that eventgan convert or finalize has completed, got no {error.filename}")
     except ValueError as error:
-        sys.exit(str(error))
+        sys.exit(f"{error} (--overfit validates on the training samples)")
     if not len(parts[0]) or not len(parts[1]):
         sys.exit(f"expected labelled samples for training and validation, got {len(parts[0])} and {len(parts[1])}, in "
                  f"{args.data} (--dataset {args.dataset}; it has "
@@ -437,8 +437,10 @@ def write_predictions(args: argparse.Namespace, entries: Iterable[dict], what: s
     _replace(pathlib.Path(args.out, "predictions.json"), lambda path: path.write_text(text, encoding="utf-8"))
     place = pathlib.Path(eventgan.__file__).parents[1]
     path = "" if place.name.endswith("-packages") else f"PYTHONPATH={place} "
-    print(f"to score them: {path}{sys.executable} -m eventgan.evaluate {what} {args.out}/predictions.json "
-          f"--truth {args.test or args.data} --ids {args.out}/ids.txt")
+    classes = f" --classes {args.classes}" if "classes" in args else ""
+    print(f"to score what was found in {args.test or 'the validation samples'}: {path}{sys.executable} -m "
+          f"eventgan.evaluate {what} {args.out}/predictions.json --truth {args.test or args.data} "
+          f"--ids {args.out}/ids.txt{classes}")
 
 
 def markdown(cells: Sequence[Sequence[str]]) -> str:

@@ -55,8 +55,12 @@ std::optional<FoundRecording> first_recording(const fs::path& root) {
   for (const std::string& name : listing.folders) {
     if (const auto found = recording_at(root / name)) return found;
   }
+  // Any numbers [N, 4] may be in an array's file: those of a window have its labels beside them.
+  const auto has_text = [&](const fs::path& file) {
+    return std::ranges::count(listing.files, fs::path(file).replace_extension(".txt").string()) > 0;
+  };
   for (const std::string& name : listing.files) {
-    if (!may_be_recording(name) || lower_extension(name) == ".npy") continue;  // any numbers [N, 4]
+    if (!may_be_recording(name) || (lower_extension(name) == ".npy" && !has_text(name))) continue;
     if (const auto found = recording_at(root / name)) return found;
   }
   return std::nullopt;

@@ -14,6 +14,7 @@
 #include "manifests/values/faults.h"
 #include "stages/base/files/input_file.h"
 #include "stages/frames/events/recording_labels.h"
+#include "stages/frames/own_labels/detail/yolo_text.h"
 #include "stages/frames/source_folders.h"
 #include "stages/recordings/recording.h"
 
@@ -122,6 +123,7 @@ class FolderSearch {
           "expected a recording of an event camera ({}), or a folder of them, got none, in {}{}",
           fmt::join(titles, ", "), root.string(), reason.empty() ? "" : " (" + reason + ")"));
     }
+    std::erase(left_out, yolo_names_file(root));
     std::erase_if(left_out, [&](const fs::path& name) {  // labels, or told of as no such
       const auto recorded = found_.recordings.find(name.stem().string());
       return is_window_label_file(name) && recorded != found_.recordings.end() &&
@@ -214,6 +216,19 @@ class FolderSearch {
       found_.notes.push_back(
           counted(without, "recording", " without labels left out in " + spec.root));
     }
+    note_names_of_windows();
+  }
+
+  /// Of windows' texts, which have numbers for classes.
+  void note_names_of_windows() {
+    const auto window = std::ranges::find_if(found_.recordings, [](const auto& entry) {
+      return is_window_label_file(entry.second.label_file_on_disk);
+    });
+    if (window == found_.recordings.end()) return;
+    if (!WindowLabels().companions(window->second.label_file_on_disk).empty()) return;
+    found_.notes.push_back(
+        "classes are named by their numbers, since no data.yaml or classes.txt with names is in " +
+        fs::path(window->second.label_file).parent_path().string() + " or the folder above it");
   }
 
   /// Relative to the manifest where the root is.

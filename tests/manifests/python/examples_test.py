@@ -103,8 +103,8 @@ def test_pose_resnet_learns_persons_without_head_boxes(head, scores, tmp_path):
          "annotations": annotations, "categories": [{"id": 1, "name": "person", "keypoints": names, "skeleton": []}]}))
     subprocess.run([PROGRAM, "convert", tmp_path / "photos", "--output", tmp_path / "out", "--limit", "5",
                     "--progress", "none"], check=True, capture_output=True)
-    said = train("train_pose", tmp_path / "out", tmp_path / "poses", "--trainer", trainer, "--dataset", "frames",
-                 "--batch", "4", "--size", "64", "--filters", "16", "--steps", "1")
+    said = train("train_pose", tmp_path / "out", tmp_path / "poses", "--trainer", trainer, "--batch", "4",
+                 "--size", "64", "--filters", "16", "--steps", "1")
     assert "4 samples for training, 1 for validation, of other images" in said
     assert f"warning: {tmp_path / 'out'} is a trial of its job (--limit 5)" in said
     last = history(tmp_path / "poses")[-1]
@@ -114,7 +114,7 @@ def test_pose_resnet_learns_persons_without_head_boxes(head, scores, tmp_path):
 def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
     # nothing beside it
     trainer = shutil.copytree(need_trainer("pose_resnet", "easydict", "yaml"), tmp_path / "trainer")
-    options = ["--trainer", trainer, "--batch", "3", "--size", "64", "--filters", "16", "--epochs", "3"]
+    options = ["--trainer", trainer, "--dataset", "mpii", "--batch", "3", "--size", "64", "--filters", "16", "--epochs", "3"]
     train("train_pose", data, tmp_path / "whole", *options)
     assert_trained(tmp_path / "whole", [0, 2, 4, 6], images=1)
     with subprocess.Popen(line("train_pose", data, tmp_path / "killed", *options),

@@ -25,6 +25,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::Contains;
+using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -530,10 +531,14 @@ TEST_F(WindowTextsTest, NumberTheirClassesAsYoloDoes) {
   EXPECT_THAT(classes(*open(), 1), ElementsAre(1));
   EXPECT_THAT(open()->label_schema().class_names,
               ElementsAre("0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10"));
+  EXPECT_THAT(open()->notes(),
+              Contains("classes are named by their numbers, since no data.yaml or classes.txt "
+                       "with names is in windows or the folder above it"));
   write("a.txt", "0 0.5 0.5 0.1 0.1\n");
   write("data.yaml", "names: [person, car]\n");
   EXPECT_THAT(classes(*open(), 0), ElementsAre(0));
   EXPECT_THAT(open()->label_schema().class_names, ElementsAre("person", "car"));
+  EXPECT_THAT(open()->notes(), Each(HasSubstr("times are taken to count seconds")));
 }
 
 TEST_F(WindowTextsTest, AreLabelsOnlyIfOneSaysSo) {
