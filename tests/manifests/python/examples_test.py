@@ -114,7 +114,8 @@ def test_pose_resnet_learns_persons_without_head_boxes(head, scores, tmp_path):
 def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
     # nothing beside it
     trainer = shutil.copytree(need_trainer("pose_resnet", "easydict", "yaml"), tmp_path / "trainer")
-    options = ["--trainer", trainer, "--dataset", "mpii", "--batch", "3", "--size", "64", "--filters", "16", "--epochs", "3"]
+    options = ["--trainer", trainer, "--dataset", "mpii", "--batch", "3", "--size", "64", "--filters", "16",
+               "--epochs", "3"]
     train("train_pose", data, tmp_path / "whole", *options)
     assert_trained(tmp_path / "whole", [0, 2, 4, 6], images=1)
     with subprocess.Popen(line("train_pose", data, tmp_path / "killed", *options),
