@@ -408,12 +408,27 @@ class Draft {
 }}
 )",
                        name_, name_, fmt::join(written, ",\n"), image_text(sources),
-                       is_events ? std::string(kEvents) : network_text(), quoted(place_.output));
+                       is_events ? std::string(kEvents) : generator_text(sources),
+                       quoted(place_.output));
   }
 
  private:
-  static std::string network_text() {
+  /// Photographs whose objects move on their own.
+  static bool is_in_layers(const SourceDraft& source) {
+    return source.is_stills && source.found.labels;
+  }
+
+  static std::string generator_text(const std::vector<SourceDraft>& sources) {
     const bool has_int8 = onednn_support(Precision::kInt8).able;
+    if (std::ranges::all_of(sources, is_in_layers)) {
+      return fmt::format(
+          R"(  // The motion of photographs is drawn, so a simulator can follow it: detectors of persons learn more
+  // from its events than from the network's, which take less time (manifests/guides/choose.md):
+  // "generator": {{ "weights": "shipped:8", "precision": "{}" }},
+  "generator": {{ "kind": "esim" }},
+)",
+          has_int8 ? "int8" : "auto");
+    }
     return fmt::format(
         R"(  // Detectors and pose networks learn as much from the narrow weights{} as from the wide ones in
   // float32, "shipped:16", which take four times as long (manifests/guides/choose.md).
@@ -497,8 +512,8 @@ class Draft {
     }
     const bool drives = source.found.dataset == DatasetKind::kKittiObject;
     return fmt::format(
-        R"(      // The motion of each image is drawn{} Each object moves on its own; one whose labels
-      // have no outline is cut out of its box.
+        R"(      // The motion of each image is drawn{}
+      // Each object moves on its own; one whose labels have no outline is cut out of its box.
       "pairs": {{
         "from": "stills",
         "motion": {{

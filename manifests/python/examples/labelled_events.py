@@ -151,6 +151,7 @@ LAYERS = {
     "ESIM, layers": Source({"kind": "esim"}, layers=True),
     "gradient, layers": Source(of_pair=gradient, layers=True),
     "EventGAN 16, layers, rests 0": Source(SHIPPED[16], layers=True, rests=0),
+    "ESIM, layers, rests 0": Source({"kind": "esim"}, layers=True, rests=0),
 }
 SOURCES = METHODS | SENSORS | LAYERS | {
     "EventGAN 16, finer": Source(SHIPPED[16], finer=2),

@@ -262,9 +262,13 @@ TEST_F(DraftManifest, OfSingleImagesWithBoxesTheImageRestsUnlessItsCameraDrives)
   testing::write_file(folder_ / "photos.csv",
                       "image,class,left,top,right,bottom\n0.png,a,1,2,9,9\n");
   photos.labels = {LabelFormat::kCsv, folder_ / "photos.csv"};
-  const auto others = read(draft({photos})).sources[0].pairs;
+  const JobManifest layers = read(draft({photos}));
+  const PairSpec& others = layers.sources[0].pairs;
   ASSERT_TRUE(others.stills && others.stills->objects);
   EXPECT_FALSE(others.stills->rests) << "half of them";
+  EXPECT_EQ(layers.generator.kind, GeneratorKind::kEsim) << "it follows what was drawn";
+  const auto with_a_sequence = read(draft({photos, images("walk", {kOneSize, kOneSize})}));
+  EXPECT_EQ(with_a_sequence.generator.kind, GeneratorKind::kNetwork);
 }
 
 TEST_F(DraftManifest, HasSamplesOnlyIfEachSourceHas) {
