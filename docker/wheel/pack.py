@@ -34,12 +34,14 @@ import tomllib
 import zipfile
 
 # What every Linux of the tag has, in at least these versions: RHEL 9, Debian 12, Ubuntu 22.04, and what came later.
-SYSTEM = {"ld-linux-x86-64.so.2", "libc.so.6", "libdl.so.2", "libgcc_s.so.1", "libm.so.6", "libpthread.so.0",
-          "librt.so.1", "libstdc++.so.6"}
+SYSTEM = {"ld-linux-aarch64.so.1", "ld-linux-x86-64.so.2", "libc.so.6", "libdl.so.2", "libgcc_s.so.1", "libm.so.6",
+          "libpthread.so.0", "librt.so.1", "libstdc++.so.6"}
 NEWEST = {"GLIBC": (2, 34), "GLIBCXX": (3, 4, 29), "CXXABI": (1, 3, 13), "GCC": (11, 0)}
-TAG = f"manylinux_2_34_{platform.machine()}"
+MACHINE = platform.machine()
+TAG = f"manylinux_2_34_{MACHINE}"
+FIRST = "GLIBC_2.17" if MACHINE == "aarch64" else "GLIBC_2.2.5"  # of glibc's versions
 # Functions that got another version for what no caller here sees (errno, noexcept), and the one that they had.
-LOWERED = {("libm.so.6", "GLIBC_2.35"): ("GLIBC_2.2.5", {"hypot", "hypotf"}),
+LOWERED = {("libm.so.6", "GLIBC_2.35"): (FIRST, {"hypot", "hypotf"}),
            ("libstdc++.so.6", "GLIBCXX_3.4.30"):
                ("GLIBCXX_3.4.11", {"_ZNSt18condition_variable4waitERSt11unique_lockISt5mutexE"})}
 # Of what is packed. A wheel's deflate packs oneDNN to 11 MB, xz to 7.
@@ -305,12 +307,13 @@ def is_program(name: str) -> bool:
 
 def write_archive(tree: pathlib.Path, out: pathlib.Path, version: str) -> pathlib.Path:
     """Likewise, and without owners and times."""
-    name = f"eventgan-{version}-linux-{platform.machine()}"
+    name = f"eventgan-{version}-linux-{MACHINE}"
     path = out / f"{name}.tar.xz"
     # Two streams of xz, which tar and xz read as one: jumps in x86's code by where they lead are 4 % less, weights as
     # numbers of four bytes 8 %.
     most = {"id": lzma.FILTER_LZMA2, "preset": 9 | lzma.PRESET_EXTREME}
-    code, numbers = [{"id": lzma.FILTER_X86}, most], [{**most, "lc": 2, "lp": 2}]
+    code = [{"id": lzma.FILTER_X86}, most] if MACHINE == "x86_64" else [most]
+    numbers = [{**most, "lc": 2, "lp": 2}]
     content = io.BytesIO()
     with tarfile.open(fileobj=content, mode="w") as archive:
         for file, data, runs in sorted(files_of(tree), key=lambda entry: is_weights(entry[0])):
