@@ -5,8 +5,8 @@
 
 Each time a user without rights unpacks the archive where there is no Python, then installs the wheel where there is
 Python, NumPy and h5py: a dataset and a video are converted, finalized, reported, exported, the README's Python run, and
-the volumes must be those of the program EVENTGAN_PROGRAM (a build's, with Debian's libraries) bit for bit. One
-conversion runs as on an x86-64-v2 processor, where qemu-x86_64 is. Ubuntu, Fedora and others cannot be had from
+the volumes must be those of the program EVENTGAN_PROGRAM (a build's, with Debian's libraries) bit for bit. On x86-64,
+one conversion runs as on an x86-64-v2 processor, where qemu-x86_64 is. Ubuntu, Fedora and others cannot be had from
 Debian's mirrors: docker/wheel/pack.py's check of versions stands for them.
 
 Needs what bare_debian.py needs, h5py and 3 GB. Exit code 77: something of that, or BUILD's files, is missing.
@@ -14,6 +14,7 @@ Needs what bare_debian.py needs, h5py and 3 GB. Exit code 77: something of that,
 
 import os
 import pathlib
+import platform
 import re
 import shutil
 import subprocess
@@ -152,8 +153,8 @@ python3 try.py "$(echo lib/python3*/site-packages/eventgan/bin/eventgan)" >told"
 def try_old_processor(top, archive, expected):
     """x86-64-v2: no AVX, no FMA."""
     emulator = shutil.which("qemu-x86_64")
-    if not emulator:
-        print("skipped: no qemu-x86_64, for an old processor")
+    if not emulator or platform.machine() != "x86_64":
+        print("skipped: no qemu-x86_64, or no x86-64, for an old processor")
         return
     folder = top / "old"
     folder.mkdir()

@@ -181,6 +181,8 @@ class Workflow(unittest.TestCase):
         self.assertEqual(workflow[True], {"push": {"tags": ["v*"]}})  # YAML 1.1 takes `on` for a truth value
         files = workflow["jobs"]["files"]
         self.assertEqual(files["container"]["image"], "debian:bookworm")
+        self.assertEqual(files["strategy"]["matrix"], {"machine": ["ubuntu-24.04", "ubuntu-24.04-arm"]})
+        self.assertEqual(files["runs-on"], "${{ matrix.machine }}")
         commands = [step.get("run", "") for step in files["steps"]]
         self.assertIn("docker/bootstrap.sh release", commands)
         self.assertIn("tests/docker/portable.py build/wheel", commands)
