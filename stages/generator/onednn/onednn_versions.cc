@@ -6,6 +6,15 @@
 
 namespace eventgan {
 
+dnnl::cpu_isa this_processor() {
+  const dnnl::cpu_isa found = dnnl::get_effective_cpu_isa();
+#if defined(__aarch64__)
+  return dnnl::cpu_isa{static_cast<int>(found) & static_cast<int>(dnnl::cpu_isa::sse41)};
+#else
+  return found;
+#endif
+}
+
 bool processor_has(dnnl::cpu_isa instructions, dnnl::cpu_isa processor) {
   // A bit for each part of what a processor has.
   const auto wanted = static_cast<unsigned>(instructions);
@@ -14,9 +23,13 @@ bool processor_has(dnnl::cpu_isa instructions, dnnl::cpu_isa processor) {
 
 std::string instruction_set_name() {
   if (!processor_has(dnnl::cpu_isa::sse41)) return "none that oneDNN compiles for";
+#if defined(__aarch64__)
+  return "arm64";
+#else
   constexpr std::string_view kPrefix = "cpu_isa_";
   const std::string name = dnnl_cpu_isa2str(dnnl_get_effective_cpu_isa());
   return name.starts_with(kPrefix) ? name.substr(kPrefix.size()) : name;
+#endif
 }
 
 namespace {

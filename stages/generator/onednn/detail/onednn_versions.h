@@ -10,13 +10,16 @@ namespace eventgan {
 
 // What oneDNN 2 and 3 want in different ways; the rest of the engine is the same for both.
 
-/// Whether a processor has these instructions: this one, as far as ONEDNN_MAX_CPU_ISA lets oneDNN
-/// see. A later one, of which this build knows nothing, has what its predecessors have. Thread
+/// What this processor has, as far as ONEDNN_MAX_CPU_ISA lets oneDNN see. Of arm64 only that oneDNN
+/// compiles for it, as SSE 4.1 says of x86-64: its numbers mean other instructions there. Thread
 /// safe.
-bool processor_has(dnnl::cpu_isa instructions,
-                   dnnl::cpu_isa processor = dnnl::get_effective_cpu_isa());
+dnnl::cpu_isa this_processor();
 
-/// oneDNN's name of all that it finds: "avx512_core_vnni".
+/// Whether a processor has these instructions. A later one, of which this build knows nothing, has
+/// what its predecessors have.
+bool processor_has(dnnl::cpu_isa instructions, dnnl::cpu_isa processor = this_processor());
+
+/// oneDNN's name of all that it finds, "avx512_core_vnni"; "arm64" there.
 std::string instruction_set_name();
 
 /// Adds value > 0 ? value : slope * value to what follows a convolution.
