@@ -4,7 +4,7 @@
 #   docker/bootstrap.sh test         the whole test suite
 #   docker/bootstrap.sh build        only the program, build/release/eventgan
 #   docker/bootstrap.sh package      Debian packages, build/release/*.deb: eventgan, eventgan-torch adds LibTorch, libeventgan1, its -dev, python3-eventgan
-#   docker/bootstrap.sh wheel        for any Linux, on Debian 12: build/wheel/*.whl for pip and *.tar.xz to unpack, without LibTorch
+#   docker/bootstrap.sh wheel        for any Linux of this processor, on Debian 12: build/wheel/*.whl for pip and *.tar.xz to unpack, without LibTorch
 #   docker/bootstrap.sh release      on Debian 12: build/files, what a release has: packages, wheel, archive, sources, SHA-256 sums
 #   docker/bootstrap.sh packages [LIST...]   only installs what is missing of docker/packages/LIST.txt (default: build test)
 # Run again, it does only what is left to do. JOBS sets the number of compilers at a time (default: all cores).
