@@ -48,11 +48,10 @@ namespace fs = std::filesystem;
 
 /// What a trial leaves to do, for a person.
 std::string trial_text(const JobOptions& job, const ConversionReport& report) {
-  // There the trial is in the whole job's way.
-  const std::string output =
-      job.output ? fmt::format(" --output {} --overwrite", job.output->string()) : "";
-  return fmt::format("trial run: {} of the job. For all pairs:  eventgan convert {}{}\n",
-                     count_text(report.plan_pairs, "pair"), job.manifest, output);
+  return fmt::format("trial run: {} of the job. For all pairs{}:  eventgan convert {}{}\n",
+                     count_text(report.plan_pairs, "pair"),
+                     job.output ? ", into another folder" : "", job.manifest,
+                     job.output ? " --output DIR" : "");
 }
 
 /// Completes the dataset as `eventgan finalize` does; false, and says why, if a shard is gone

@@ -517,14 +517,15 @@ class Draft {
       "pairs": {{
         "from": "stills",
         "motion": {{
-          {},{}
+          {},
+          "rests": {},
           "objects": {{ "translation_px": [{}, {}], "rotation_deg": {}, "scale": {} }}
         }}
       }}
 )",
         drives ? ", and none rests, since the camera drives."
-               : ", and half of them rest: \"rests\": 0 is for a camera that moves.",
-        image, drives ? " \"rests\": 0," : "", object.translation_px[0], object.translation_px[1],
+               : ", and half of them rest; for a camera that moves set \"rests\" to 0.",
+        image, drives ? "0" : "0.5", object.translation_px[0], object.translation_px[1],
         object.rotation_deg, object.scale);
   }
 

@@ -397,7 +397,8 @@ class Trial(program.InFolder):
     def test_is_no_beginning_of_the_whole(self):
         mine = self.folder / "mine"
         out, _ = self.convert("--limit", 4, "--output", mine)
-        self.assertTrue(out.endswith(f"eventgan convert {self.manifest} --output {mine} --overwrite\n"), out)
+        self.assertTrue(out.endswith("trial run: 4 pairs of the job. For all pairs, into another folder:  "
+                                     f"eventgan convert {self.manifest} --output DIR\n"), out)
         self.assertEqual(len(self.ids("mine")), 4)
         _, errors = self.convert("--output", mine, expect=64)
         self.assertIn(f"expected no trial of this job, got one made with --limit 4, in {self.folder}/mine (choose",

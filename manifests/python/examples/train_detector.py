@@ -315,8 +315,8 @@ def main() -> None:
         return validation[i]["id"], training.draw_item(validation[i], boxes[sure], texts)
 
     found = search(model, test, args.batch)
-    training.write_predictions(args, (entry for item, boxes in found
-                                      for entry in training.box_predictions(item, boxes, classes, test_view)))
+    training.write_predictions(args, test_shards, (entry for item, boxes in found for entry in
+                                                   training.box_predictions(item, boxes, classes, test_view)))
     training.write_images(args, len(validation), image_of)
     if poor:
         print(f"warning: {poor}", file=sys.stderr)

@@ -130,7 +130,7 @@ def main() -> None:
         found = search(test).tolist()
     entries = ({"image_id": name, "person": person, "joints": joints}
                for name, person, joints in zip(names, test.persons[:, 1].tolist(), found))
-    training.write_predictions(args, entries, "poses")
+    training.write_predictions(args, searched, entries, "poses")
     training.write_images(args, len(validation_set), image_of)
 
 

@@ -80,16 +80,15 @@ def main() -> None:
             train_set = DetectionDataset(train_shards, args.classes.split(",") if args.classes else None,
                                          augmentation=augmentation, **place)
             validation_set = DetectionDataset(validation_shards, train_set.classes, **place)
-            test, test_view = training.detection_test(
-                args, training.tested(args, train_shards, validation_shards, usable(args.task)),
-                list(train_set.classes), **place)
+            searched = training.tested(args, train_shards, validation_shards, usable(args.task))
+            test, test_view = training.detection_test(args, searched, list(train_set.classes), **place)
     except ValueError as error:
         raise SystemExit(str(error))
     predict = train(args, train_set, validation_set, (height, width))
     if args.task == "detection":
         classes = list(train_set.classes)
-        training.write_predictions(args, (entry for item, found in predict(test)
-                                          for entry in training.box_predictions(item, found, classes, test_view)))
+        training.write_predictions(args, searched, (entry for item, found in predict(test) for entry in
+                                                    training.box_predictions(item, found, classes, test_view)))
 
 
 def train(args: argparse.Namespace, train_set: Dataset, validation_set: Dataset,

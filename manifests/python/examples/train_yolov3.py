@@ -78,9 +78,8 @@ def main() -> None:
     try:
         train_set = DetectionDataset(train_shards, classes, (height, width), augmentation, view=view)
         validation_set = DetectionDataset(validation_shards, classes, (height, width), view=view)
-        test, test_view = training.detection_test(
-            args, training.tested(args, train_shards, validation_shards, training.with_boxes), classes,
-            (height, width), view)
+        searched = training.tested(args, train_shards, validation_shards, training.with_boxes)
+        test, test_view = training.detection_test(args, searched, classes, (height, width), view)
     except ValueError as error:
         raise SystemExit(str(error))
 
@@ -138,8 +137,8 @@ def main() -> None:
         return item["id"], training.draw_item(item, found[:, :4],
                                               [f"{classes[int(c)]} {score:.2f}" for score, c in found[:, 4:]])
 
-    training.write_predictions(args, (entry for item, found in search(test)
-                                      for entry in training.box_predictions(item, found, classes, test_view)))
+    training.write_predictions(args, searched, (entry for item, found in search(test) for entry in
+                                                training.box_predictions(item, found, classes, test_view)))
     training.write_images(args, len(validation_set), image_of)
 
 

@@ -69,7 +69,8 @@ def options_of_any(description: str, data: str, steps: int | None = None, **defa
                         help="stop after this many batches" + (otherwise.format(steps) if steps else ""))
     parser.add_argument("--minutes", type=float, help="stop after this much training time, without validation"
                         + ("" if steps else otherwise.format(30)))
-    parser.add_argument("--every", type=int, default=1, help="validate every so many epochs, and at the end")
+    parser.add_argument("--every", type=int, help="validate every so many epochs, and at the end (default: 1; with a "
+                        "limit in epochs or steps so many that it is done about 20 times)")
     parser.add_argument("--batch", type=int)
     parser.add_argument("--lr", type=float,
                         help="peak learning rate: it rises during the first 5 %% and decays to 1 %% along a cosine")
@@ -185,10 +186,8 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
 
 def tested(args: argparse.Namespace, train_shards: Shards, validation_shards: Shards,
            usable: Callable[[Shards], Iterable[int]]) -> Shards:
-    """The samples that predictions.json is of, changed as the options say; OUT/ids.txt names them."""
+    """The samples that predictions.json is of, changed as the options say."""
     shards = _to_test(args, validation_shards, usable)
-    text = "".join(f"{name}\n" for name in shards.column("sample_id"))
-    _replace(pathlib.Path(args.out, "ids.txt"), lambda path: path.write_text(text, encoding="utf-8"))
     if args.without_noise:
         shards = shards.changed(without_noise)
     if args.as_bright:
@@ -333,6 +332,7 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
     began = time.monotonic()
     steps = min(math.inf if args.steps is None else args.steps,
                 math.inf if args.epochs is None else args.epochs * len(loader))
+    every = args.every or (1 if math.isinf(steps) else math.ceil(steps / (20 * len(loader))))
 
     def progress() -> float:
         minutes = (state["seconds"] + time.monotonic() - began) / 60
@@ -380,7 +380,7 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
             if progress() >= 1:
                 break
         done = progress() >= 1
-        if state["epoch"] % args.every and not done:
+        if state["epoch"] % every and not done:
             continue
         state["seconds"] += time.monotonic() - began
         report(float(np.mean(losses)))
@@ -430,11 +430,14 @@ def box_predictions(item: dict, found: tuple[torch.Tensor, torch.Tensor, torch.T
             for box, label, score in zip(boxes.tolist(), labels, scores.tolist())]
 
 
-def write_predictions(args: argparse.Namespace, entries: Iterable[dict], what: str = "detections") -> None:
-    """predictions.json, and the line that scores it."""
+def write_predictions(args: argparse.Namespace, shards: Shards, entries: Iterable[dict],
+                      what: str = "detections") -> None:
+    """predictions.json of the samples, ids.txt, which names these, and the line that scores them."""
     with torch.no_grad():
         text = json.dumps(list(entries)) + "\n"
-    _replace(pathlib.Path(args.out, "predictions.json"), lambda path: path.write_text(text, encoding="utf-8"))
+    ids = "".join(f"{name}\n" for name in shards.column("sample_id"))
+    for name, content in (("predictions.json", text), ("ids.txt", ids)):
+        _replace(pathlib.Path(args.out, name), lambda path, content=content: path.write_text(content, encoding="utf-8"))
     place = pathlib.Path(eventgan.__file__).parents[1]
     path = "" if place.name.endswith("-packages") else f"PYTHONPATH={place} "
     classes = f" --classes {args.classes}" if "classes" in args else ""

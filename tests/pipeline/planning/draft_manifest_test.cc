@@ -265,7 +265,7 @@ TEST_F(DraftManifest, OfSingleImagesWithBoxesTheImageRestsUnlessItsCameraDrives)
   const JobManifest layers = read(draft({photos}));
   const PairSpec& others = layers.sources[0].pairs;
   ASSERT_TRUE(others.stills && others.stills->objects);
-  EXPECT_FALSE(others.stills->rests) << "half of them";
+  EXPECT_EQ(others.stills->rests, 0.5);
   EXPECT_EQ(layers.generator.kind, GeneratorKind::kEsim) << "it follows what was drawn";
   const auto with_a_sequence = read(draft({photos, images("walk", {kOneSize, kOneSize})}));
   EXPECT_EQ(with_a_sequence.generator.kind, GeneratorKind::kNetwork);
