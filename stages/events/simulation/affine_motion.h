@@ -31,7 +31,7 @@ AffineMotion random_affine_motion(ImageSize size, double displacement_px, Counte
 double largest_displacement(const AffineMotion& motion, ImageSize size);
 
 /// The image at u in [0, 1], bilinear with places rounded to 1/32 px, bit for bit as OpenCV 4.6 to
-/// 4.10 have it in cv::warpAffine. Intensity: [y, x] float32 in [0, 1], C order. Throws
+/// 4.10 have it in cv::warpAffine on x86-64. Intensity: [y, x] float32 in [0, 1], C order. Throws
 /// std::invalid_argument if the image is empty. Thread safe.
 std::vector<float> render_affine(const GreyImage& image, const AffineMotion& motion, double u);
 

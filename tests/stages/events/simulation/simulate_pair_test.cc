@@ -83,8 +83,8 @@ TEST(RenderAffine, TakesAnImageOfOnePixel) {
   EXPECT_EQ(render_affine({{1, 1}, {51}}, shift(3, 2), 1), std::vector<float>{0.2f});
 }
 
-// Later versions of OpenCV compute warpAffine in another way.
-#if CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR <= 10
+// Later versions of OpenCV compute warpAffine in another way, and arm64's round products with sums.
+#if CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR <= 10 && defined(__x86_64__)
 TEST(RenderAffine, IsWarpAffineOfOpenCvToTheLastBit) {
   for (const ImageSize size : {ImageSize{1, 9}, ImageSize{7, 1}, ImageSize{61, 143}}) {
     const GreyImage image = textured_image(size);
