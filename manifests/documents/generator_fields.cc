@@ -121,7 +121,8 @@ Schema network_rule() {
 void list_generator(Fields& fields, GeneratorSpec& spec) {
   fields.kind("kind", spec.kind, words(kGeneratorWords),
               "network: EventGAN. esim: a random affine motion of the previous frame, as the paper "
-              "compares with. difference: each pixel's log intensity moves on a line from the "
+              "compares with, or a still's own motion. difference: each pixel's log intensity "
+              "moves on a line from the "
               "previous frame to the next. The volumes of these two are counts of events. events: "
               "the camera's own, of recording and dhp19, which have no other: counts, each event "
               "in the volume's pixel that its place falls in.");
