@@ -161,13 +161,16 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
         else:
             shards = Shards(args.data, where=where, partial=True)
             shards = shards[list(usable(shards))]
-            by = next((by for by in GROUPS if _divides(shards, by)), "sample_id")
+            by = next((by for by in GROUPS if _divides(shards, by)), None)
+            if by is None and len(shards) and not args.overfit:
+                sys.exit("expected two labelled frames or more, for training and for validation, got one, in "
+                         f"{args.data} (--overfit validates on the training samples)")
             parts, how = (([shards, shards], "the same") if args.overfit or not len(shards)
                           else (shards.divide(0.8, by, args.seed), f"of other {_groups_named(shards, by)}"))
     except FileNotFoundError as error:
         sys.exit(f"expected a folder that eventgan convert or finalize has completed, got no {error.filename}")
     except ValueError as error:
-        sys.exit(f"{error} (--overfit validates on the training samples)")
+        sys.exit(str(error))
     if not len(parts[0]) or not len(parts[1]):
         sys.exit(f"expected labelled samples for training and validation, got {len(parts[0])} and {len(parts[1])}, in "
                  f"{args.data} (--dataset {args.dataset}; it has "

@@ -57,7 +57,8 @@ std::optional<FoundRecording> first_recording(const fs::path& root) {
   }
   // Any numbers [N, 4] may be in an array's file: those of a window have its labels beside them.
   const auto has_text = [&](const fs::path& file) {
-    return std::ranges::count(listing.files, fs::path(file).replace_extension(".txt").string()) > 0;
+    return std::ranges::binary_search(listing.files,
+                                      fs::path(file).replace_extension(".txt").string());
   };
   for (const std::string& name : listing.files) {
     if (!may_be_recording(name) || (lower_extension(name) == ".npy" && !has_text(name))) continue;

@@ -101,14 +101,17 @@ def test_pose_resnet_learns_persons_without_head_boxes(head, scores, tmp_path):
     (tmp_path / "photos" / "person_keypoints.json").write_text(json.dumps(
         {"images": [{"id": i + 1, "file_name": f"{i}.png", "width": 64, "height": 64} for i in range(5)],
          "annotations": annotations, "categories": [{"id": 1, "name": "person", "keypoints": names, "skeleton": []}]}))
-    subprocess.run([PROGRAM, "convert", tmp_path / "photos", "--output", tmp_path / "out", "--limit", "5",
-                    "--progress", "none"], check=True, capture_output=True)
+    for name, pairs in (("out", "5"), ("one", "1")):
+        subprocess.run([PROGRAM, "convert", tmp_path / "photos", "--output", tmp_path / name, "--limit", pairs,
+                        "--progress", "none"], check=True, capture_output=True)
     said = train("train_pose", tmp_path / "out", tmp_path / "poses", "--trainer", trainer, "--batch", "4",
                  "--size", "64", "--filters", "16", "--steps", "1")
     assert "4 samples for training, 1 for validation, of other images" in said
     assert f"warning: {tmp_path / 'out'} is a trial of its job (--limit 5)" in said
     last = history(tmp_path / "poses")[-1]
     assert {"PCKh@0.5", "MPJPE"} & last.keys() == scores and all(np.isfinite(last[name]) for name in scores)
+    said = train("train_pose", tmp_path / "one", tmp_path / "none", "--trainer", trainer, expect=1)
+    assert f"got one, in {tmp_path / 'one'} (--overfit validates on the training samples)" in said
 
 
 def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
