@@ -88,7 +88,9 @@ TEST(TakeTurn, ThePeakOfMemoryDoesNotGrowWithThePairsAndTheStoredTypes) {
   constexpr double kVolume = 18 * 160 * 120 * sizeof(float);
   const double few = peak(5);
   ASSERT_GT(few, kVolume);
-  EXPECT_LT(peak(20) - few, 10 * kVolume);
+  // How many pairs are in flight, and what the heap keeps of them, differs from run to run by some
+  // ten volumes; whoever held one volume a pair would need 45 more.
+  EXPECT_LT(peak(50) - few, 25 * kVolume);
 }
 
 }  // namespace
