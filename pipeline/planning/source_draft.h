@@ -1,0 +1,46 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manifests/values/job.h"
+#include "stages/frames/dataset_kinds.h"
+#include "stages/frames/find_source.h"
+
+namespace eventgan {
+
+/// A sensor that the events of a recording fit on.
+struct SensorGuess {
+  ImageSize size;
+  int x = 0, y = 0;  ///< the largest of an event
+};
+
+/// What is known of a source when its part of a manifest is written.
+struct SourceDraft {
+  explicit SourceDraft(const FoundSource& source);
+
+  FoundSource found;
+  const DraftHabits& habits;               ///< of its dataset
+  std::vector<int> gaps = {};              ///< to take pairs of; at first those of `habits`
+  std::string preset = {};                 ///< ImageSpec::preset of it alone; empty of events
+  std::vector<std::string> findings = {};  ///< as ManifestDraft has them
+  std::vector<std::string> notes = {};     ///< Dataset::notes()
+  bool is_stills = false;
+  bool has_sizes = false;                 ///< the images that were looked at have several sizes
+  bool has_frames = false;                ///< recording
+  bool are_windows = false;               ///< recordings, each a labelled window of its own
+  bool needs_sensor = false;              ///< recording whose files do not tell the sensor's size
+  std::optional<SensorGuess> guess = {};  ///< then: what the events show, if any was seen
+  bool has_samples = false;               ///< labelled frames that make pairs, or windows
+  std::optional<ValueRange> range = {};   ///< of images of 16 bits that use little of them
+};
+
+/// Opens the dataset of `spec`, which a manifest in `folder` has for it, counts its labelled frames
+/// and their paired frames, and looks at some images: do neighbours show the same scene, or does
+/// each image make a pair with itself? Throws as open_dataset does.
+void look_at_source(const SourceSpec& spec, const std::filesystem::path& folder,
+                    SourceDraft& draft);
+
+}  // namespace eventgan
