@@ -24,7 +24,7 @@ import tempfile
 
 import bare_debian
 
-PROGRAM = os.environ.get("EVENTGAN_PROGRAM", str(bare_debian.SOURCE / "build" / "release" / "eventgan"))
+PROGRAM = os.path.abspath(os.environ.get("EVENTGAN_PROGRAM", bare_debian.SOURCE / "build" / "release" / "eventgan"))
 MOST_S = {"program": 0.1, "command": 0.1, "import": 0.1}  # of a processor for one start, the quickest of ten
 JOB = """
 eventgan make-demo demo --scenes 2 --progress none
