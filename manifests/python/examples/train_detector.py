@@ -264,7 +264,7 @@ def advice(summary: Mapping[str, Any], items: int, larger: float | None) -> str 
     todo = [f"--steps {max(STEPS, 2 * steps)} in place of {steps}"]
     todo += [f"--scale {larger:g} (and another --out)"] if larger else []
     todo += [f"more labelled images than {items}"] if items < 400 else []
-    return (f"{summary['metric']} {score:.2g} of the validation samples is next to nothing. What helps: "
+    return (f"{summary['metric']} {score:.2g} on the validation samples is next to nothing. What helps: "
             f"{'; '.join(todo)}")
 
 

@@ -11,6 +11,7 @@ import math
 import os
 import pathlib
 import pickle
+import shlex
 import sys
 import time
 import types
@@ -146,6 +147,12 @@ def with_boxes(shards: Shards) -> list[int]:
     return [i for i in range(len(shards)) if shards.class_names(i)]
 
 
+def _split_apart(args: argparse.Namespace, description: dict[str, Any]) -> str | None:
+    """The validation split of a folder that has one for training, too; None: its samples are to be divided."""
+    has_both = "train" in description["counts"]["by_split"] and not args.overfit
+    return validation_split(description) if has_both else None
+
+
 def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]]) -> tuple[Shards, Shards]:
     """The training samples and the validation samples, of which `usable` gives the positions of those with labels: by
     the folder's splits if it has both, else four fifths and one fifth that share no subject, drive, sequence, or at
@@ -153,8 +160,8 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
     where = {"dataset": args.dataset} if args.dataset else None
     try:
         description = read_description(args.data)
-        validation = validation_split(description)
-        if validation and "train" in description["counts"]["by_split"] and not args.overfit:
+        validation = _split_apart(args, description)
+        if validation:
             parts, how = [Shards(args.data, split=split, where=where, partial=True)
                           for split in ("train", validation)], f"of split {validation}"
             parts = [part[list(usable(part))] for part in parts]
@@ -172,9 +179,9 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
     except ValueError as error:
         sys.exit(str(error))
     if not len(parts[0]) or not len(parts[1]):
+        of_dataset = f"--dataset {args.dataset}; " if args.dataset else ""
         sys.exit(f"expected labelled samples for training and validation, got {len(parts[0])} and {len(parts[1])}, in "
-                 f"{args.data} (--dataset {args.dataset}; it has "
-                 f"samples of {', '.join(description['counts']['by_dataset'])})")
+                 f"{args.data} ({of_dataset}it has samples of {', '.join(description['counts']['by_dataset'])})")
     if description.get("missing"):
         print(f"{len(description['missing'])} shards are missing in {args.data} (finalize --partial)")
     if "limit" in description["fingerprint"]:
@@ -201,13 +208,19 @@ def tested(args: argparse.Namespace, train_shards: Shards, validation_shards: Sh
     return shards
 
 
+def _part_tested(args: argparse.Namespace) -> tuple[str | None, str | None]:
+    """The split and the kind of source of which `tested` has samples; None: any."""
+    description = read_description(args.test or args.data)
+    split = validation_split(description) if args.test else _split_apart(args, description)
+    return split, args.dataset if args.dataset in description["counts"]["by_dataset"] else None
+
+
 def _to_test(args: argparse.Namespace, validation_shards: Shards, usable: Callable[[Shards], Iterable[int]]) -> Shards:
     if not args.test:
         return validation_shards
     try:
-        description = read_description(args.test)
-        where = {"dataset": args.dataset} if args.dataset in description["counts"]["by_dataset"] else None
-        shards = Shards(args.test, split=validation_split(description), where=where, partial=True)
+        split, dataset = _part_tested(args)
+        shards = Shards(args.test, split=split, where={"dataset": dataset} if dataset else None, partial=True)
         shards = shards[list(usable(shards))]
     except (OSError, ValueError) as error:
         sys.exit(str(error))
@@ -442,11 +455,15 @@ def write_predictions(args: argparse.Namespace, shards: Shards, entries: Iterabl
     for name, content in (("predictions.json", text), ("ids.txt", ids)):
         _replace(pathlib.Path(args.out, name), lambda path, content=content: path.write_text(content, encoding="utf-8"))
     place = pathlib.Path(eventgan.__file__).parents[1]
-    path = "" if place.name.endswith("-packages") else f"PYTHONPATH={place} "
-    classes = f" --classes {args.classes}" if "classes" in args else ""
-    print(f"to score what was found in {args.test or 'the validation samples'}: {path}{sys.executable} -m "
-          f"eventgan.evaluate {what} {args.out}/predictions.json --truth {args.test or args.data} "
-          f"--ids {args.out}/ids.txt{classes}")
+    path = "" if place.name.endswith("-packages") else f"PYTHONPATH={shlex.quote(str(place))} "
+    options = {"--truth": args.test or args.data, "--ids": f"{args.out}/ids.txt"}
+    options |= zip(("--split", "--dataset"), _part_tested(args))
+    if getattr(args, "classes", None):
+        options["--classes"] = ",".join(name for name in args.classes.split(",") if name in shards.known_classes())
+    line = [sys.executable, "-m", "eventgan.evaluate", what, f"{args.out}/predictions.json",
+            *(word for option in options.items() if option[1] for word in option)]
+    print(f"to score what was found in {args.test or 'the validation samples'}: {path}"
+          f"{shlex.join(line + (['--hidden'] if what == 'poses' else []))}")
 
 
 def markdown(cells: Sequence[Sequence[str]]) -> str:

@@ -91,7 +91,7 @@ def test_a_poor_result_is_told_with_what_helps():
         return {"metric": "AP50 dog", "AP50 dog": score, "untrained": untrained, "history": [{"step": 200}]}
 
     told = detector.advice(summary(0.0006), items=50, larger=3.0)
-    assert told.startswith("AP50 dog 0.0006 of the validation samples is next to nothing")
+    assert told.startswith("AP50 dog 0.0006 on the validation samples is next to nothing")
     assert "--steps 3000 in place of 200" in told and "--scale 3 " in told and "more labelled images than 50" in told
     assert "--scale" not in detector.advice(summary(0.3, untrained=0.4), items=500, larger=None)
     assert detector.advice(summary(0.3), items=50, larger=None) is None

@@ -4,6 +4,7 @@ import argparse
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -12,7 +13,7 @@ import types
 
 import numpy as np
 import pytest
-from conftest import PACKAGE, SOURCE
+from conftest import SOURCE
 
 from eventgan import Shards
 
@@ -49,11 +50,11 @@ def need_trainer(name, *modules):
     return TRAINERS / name
 
 
-def evaluate(what, out, data, *more):
-    done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", what, out / "predictions.json", "--truth", data,
-                           "--json", *more],
-                          capture_output=True, text=True, env={**ONE_THREAD, "PYTHONPATH": str(PACKAGE)})
-    assert done.returncode == 0, done.stderr
+def scores(said):
+    """Those of the line that an example has printed to score what it found."""
+    (line,) = re.findall("^to score what was found in .*: (.* -m eventgan.evaluate .*)$", said, re.MULTILINE)
+    done = subprocess.run(f"{line} --json", shell=True, capture_output=True, text=True, env=ONE_THREAD)
+    assert done.returncode == 0, line + done.stderr
     return json.loads(done.stdout)
 
 
@@ -69,12 +70,12 @@ def test_faster_rcnn_learns_and_goes_on(data, tmp_path):
     options = ["--dataset", "kitti_object", "--batch", "2", "--scale", "0.5", "--regions", "16", "--every", "9"]
     said = train("train_torchvision", data, tmp_path / "parts", "--steps", "1", *options)
     assert "10 samples for training, 2 for validation, of other images" in said and "(untrained)" in said
-    assert "resuming after epoch 1" in train("train_torchvision", data, tmp_path / "parts", "--steps", "3", *options)
+    said = train("train_torchvision", data, tmp_path / "parts", "--steps", "3", *options)
+    assert "resuming after epoch 1" in said
     assert_trained(tmp_path / "parts", [0, 1, 3], images=2)
     assert {"AP50 Car", "AP50 Van"} <= history(tmp_path / "parts")[0].keys()
-    ids = tmp_path / "parts" / "ids.txt"
-    scores = evaluate("detections", tmp_path / "parts", data, "--ids", ids, "--classes", "Car")
-    assert scores["classes"]["Car"]["ap_voc"] == pytest.approx(history(tmp_path / "parts")[-1]["AP50 Car"], abs=1e-4)
+    cars = scores(said)["classes"]["Car"]
+    assert cars["ap_voc"] == pytest.approx(history(tmp_path / "parts")[-1]["AP50 Car"], abs=1e-4)
     said = train("train_torchvision", data, tmp_path / "parts", "--steps", "4", *options, "--lr", "0.5", expect=1)
     assert "expected --lr 0.0002, as when this run started, got 0.5, in" in said
 
@@ -86,32 +87,48 @@ def test_keypoint_rcnn_learns(data, tmp_path):
     assert {"AP50 person", "PCK@0.2"} <= history(tmp_path / "out")[0].keys()
 
 
-@pytest.mark.parametrize(("head", "scores"), [("head_top", {"PCKh@0.5", "MPJPE"}), ("nose", {"MPJPE"})])
-def test_pose_resnet_learns_persons_without_head_boxes(head, scores, tmp_path):
-    """Of COCO's files, as LSP's: PCKh is of the heads' joints, or there is none."""
-    trainer, random, names = need_trainer("pose_resnet", "easydict", "yaml"), np.random.default_rng(0), [
-        head, "left_shoulder", "right_shoulder", "left_hip", "right_hip"]
-    images, places = tmp_path / "photos" / "images", [[32, 8], [24, 20], [40, 20], [26, 44], [38, 44]]
+def convert_persons(folder, joints, limit):
+    """Five random images with the same person; `joints`: places by name. The folder of the shards."""
+    random, images = np.random.default_rng(0), folder / "photos" / "images"
     images.mkdir(parents=True)
     for i in range(5):
         cv2.imwrite(str(images / f"{i}.png"), random.integers(0, 256, (64, 64), np.uint8))
     annotations = [{"id": i + 1, "image_id": i + 1, "category_id": 1, "iscrowd": 0, "bbox": [20, 4, 24, 56],
-                    "num_keypoints": 5, "keypoints": [value for place in places for value in (*place, 2)]}
+                    "num_keypoints": 5, "keypoints": [value for place in joints.values() for value in (*place, 2)]}
                    for i in range(5)]
-    (tmp_path / "photos" / "person_keypoints.json").write_text(json.dumps(
+    (folder / "photos" / "person_keypoints.json").write_text(json.dumps(
         {"images": [{"id": i + 1, "file_name": f"{i}.png", "width": 64, "height": 64} for i in range(5)],
-         "annotations": annotations, "categories": [{"id": 1, "name": "person", "keypoints": names, "skeleton": []}]}))
-    for name, pairs in (("out", "5"), ("one", "1")):
-        subprocess.run([PROGRAM, "convert", tmp_path / "photos", "--output", tmp_path / name, "--limit", pairs,
-                        "--progress", "none"], check=True, capture_output=True)
-    said = train("train_pose", tmp_path / "out", tmp_path / "poses", "--trainer", trainer, "--batch", "4",
-                 "--size", "64", "--filters", "16", "--steps", "1")
+         "annotations": annotations,
+         "categories": [{"id": 1, "name": "person", "keypoints": list(joints), "skeleton": []}]}))
+    subprocess.run([PROGRAM, "convert", folder / "photos", "--output", folder / "out", "--limit", str(limit),
+                    "--progress", "none"], check=True, capture_output=True)
+    return folder / "out"
+
+
+@pytest.mark.parametrize(("head", "measured"), [("head_top", {"PCKh@0.5", "MPJPE"}), ("nose", {"MPJPE"})])
+def test_pose_resnet_learns_persons_without_head_boxes(head, measured, tmp_path):
+    """Of COCO's files, as LSP's: PCKh is of the heads' joints, or there is none."""
+    trainer = need_trainer("pose_resnet", "easydict", "yaml")
+    joints = {head: [32, 8], "left_shoulder": [24, 20], "right_shoulder": [40, 20], "left_hip": [26, 44],
+              "right_hip": [38, 44]}
+    data, one = (convert_persons(tmp_path / str(limit), joints, limit) for limit in (5, 1))
+    options = ["--trainer", trainer, "--batch", "4", "--size", "64", "--filters", "16", "--steps", "1"]
+    said = train("train_pose", data, tmp_path / "poses", *options)
     assert "4 samples for training, 1 for validation, of other images" in said
-    assert f"warning: {tmp_path / 'out'} is a trial of its job (--limit 5)" in said
+    assert f"warning: {data} is a trial of its job (--limit 5)" in said
     last = history(tmp_path / "poses")[-1]
-    assert {"PCKh@0.5", "MPJPE"} & last.keys() == scores and all(np.isfinite(last[name]) for name in scores)
-    said = train("train_pose", tmp_path / "one", tmp_path / "none", "--trainer", trainer, expect=1)
-    assert f"got one, in {tmp_path / 'one'} (--overfit validates on the training samples)" in said
+    assert {"PCKh@0.5", "MPJPE"} & last.keys() == measured and all(np.isfinite(last[name]) for name in measured)
+    # Whatever the order of a test's joints, and no others.
+    other_way = convert_persons(tmp_path / "other way", dict(reversed(joints.items())), 5)
+    errors = [{name: row["mpjpe_volume"] for name, row in scores(said)["joints"].items()}
+              for said in (train("train_pose", data, tmp_path / "poses", *options, "--test", test)
+                           for test in (data, other_way))]
+    assert errors[0] == pytest.approx(errors[1]) and set(joints) < errors[0].keys()
+    more = convert_persons(tmp_path / "more", {**joints, "neck": [32, 18]}, 5)
+    said = train("train_pose", data, tmp_path / "poses", *options, "--test", more, expect=1)
+    assert f"expected the trained joints {', '.join(joints)}, got {', '.join(joints)}, neck, in {more}" in said
+    said = train("train_pose", one, tmp_path / "none", "--trainer", trainer, expect=1)
+    assert f"got one, in {one} (--overfit validates on the training samples)" in said
 
 
 def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
@@ -126,9 +143,9 @@ def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
         while not (tmp_path / "killed" / "checkpoint.pt").exists() and process.poll() is None:
             time.sleep(0.01)
         process.kill()
-    assert "resuming after epoch" in train("train_pose", data, tmp_path / "killed", *options)
-    scores = evaluate("poses", tmp_path / "whole", data, "--ids", tmp_path / "whole" / "ids.txt", "--hidden")
-    assert scores["joints"]["all"]["pckh_mpii"] == history(tmp_path / "whole")[-1]["PCKh@0.5"]
+    said = train("train_pose", data, tmp_path / "killed", *options)
+    assert "resuming after epoch" in said
+    assert scores(said)["joints"]["all"]["pckh_mpii"] == history(tmp_path / "killed")[-1]["PCKh@0.5"]
     weights = torch.load(tmp_path / "whole" / "weights.pt")
     train("train_pose", data, tmp_path / "tuned", *options, "--pretrained", tmp_path / "whole" / "weights.pt",
           "--last-layer")
@@ -140,10 +157,10 @@ def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
 
 def test_yolov3_learns(data, tmp_path):
     trainer = shutil.copytree(need_trainer("yolov3", "matplotlib", "tqdm"), tmp_path / "trainer")  # nothing beside it
-    train("train_yolov3", data, tmp_path / "out", "--trainer", trainer, "--dataset", "kitti_object", "--steps", "2",
-          "--batch", "2", "--scale", "1", "--every", "9", "--classes", "Car,Van", "--test", data)
-    scores = evaluate("detections", tmp_path / "out", data, "--dataset", "kitti_object")
-    assert scores["counts"]["samples"] == 12 and scores["counts"]["not_of_these_samples"] == 0
+    said = train("train_yolov3", data, tmp_path / "out", "--trainer", trainer, "--dataset", "kitti_object", "--steps",
+                 "2", "--batch", "2", "--scale", "1", "--every", "9", "--classes", "Car,Van", "--test", data)
+    counts = scores(said)["counts"]
+    assert counts["samples"] == 12 and counts["not_of_these_samples"] == 0
     assert_trained(tmp_path / "out", [0, 2], images=2)
     assert "channels=18" in (tmp_path / "out" / "model.cfg").read_text()
     said = train("train_yolov3", data, tmp_path / "bus", "--trainer", trainer, "--dataset", "kitti_object", "--classes",
