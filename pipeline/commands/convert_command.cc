@@ -47,10 +47,12 @@ int judge(const ConversionReport& report, const ErrorSpec& errors) {
 namespace fs = std::filesystem;
 
 /// What a trial leaves to do, for a person.
-std::string trial_text(const JobOptions& job, const ConversionReport& report) {
-  return fmt::format("trial run: {} of the job. For all pairs{}:  eventgan convert {}{}\n",
+std::string trial_text(const ConvertArguments& arguments, const ConversionReport& report) {
+  const JobOptions& job = arguments.job;
+  return fmt::format("trial run: {} of the job. For all pairs{}:  eventgan convert {}{}{}\n",
                      count_text(report.plan_pairs, "pair"),
                      job.output ? ", into another folder" : "", job.manifest,
+                     arguments.sensor ? " --sensor " + *arguments.sensor : "",
                      job.output ? " --output DIR" : "");
 }
 
@@ -86,7 +88,7 @@ int convert_and_report(const ConvertArguments& arguments, const GivenJob& given,
   const int code = judge(report, manifest.errors);
   const auto print = [&] {
     std::cout << (job.as_json() ? to_json(report) : to_text(report));
-    if (options.limit && !job.as_json()) std::cout << trial_text(job, report);
+    if (options.limit && !job.as_json()) std::cout << trial_text(arguments, report);
     std::cout << std::flush;
   };
   // A worker with a part of the plan cannot know when the others are done.

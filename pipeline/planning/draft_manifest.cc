@@ -82,7 +82,7 @@ class Draft {
   }
 
  private:
-  /// Photographs whose objects move on their own.
+  /// Photographs of one's own whose objects move on their own.
   static bool is_in_layers(const SourceDraft& source) {
     return source.is_stills && source.found.labels;
   }

@@ -642,6 +642,10 @@ class WithoutFrames(program.InFolder):
         for wrong in ("640", "0x480", "640x", "640x480x2", "x480"):
             self.assertIn("--sensor: expected WIDTHxHEIGHT",
                           run("convert", self.folder / "camera.dat", "--sensor", wrong, expect=64)[1])
+        told = run("convert", self.folder / "camera.dat", "--output", self.folder / "trial", "--sensor", "640x480",
+                   "--limit", 1)[0]
+        self.assertTrue(told.endswith(f"eventgan convert {self.folder / 'camera.dat'} --sensor 640x480 --output DIR\n"),
+                        told)
         run("convert", self.folder / "camera.dat", "--output", out, "--sensor", "640x480")
         with h5py.File(next(out.glob("*-of-*.h5"))) as shard:
             self.assertEqual(shard["events/volume"].shape[2:], (480, 640))

@@ -12,6 +12,7 @@
 #include "manifests/values/recording_formats.h"
 #include "stages/frames/dataset_kinds.h"
 #include "stages/frames/events/recording_dataset.h"
+#include "stages/frames/events/recording_labels.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "stages/frames/sequences/image_folder.h"
 #include "stages/frames/source_folders.h"
@@ -55,13 +56,17 @@ std::optional<FoundRecording> first_recording(const fs::path& root) {
   for (const std::string& name : listing.folders) {
     if (const auto found = recording_at(root / name)) return found;
   }
-  // Any numbers [N, 4] may be in an array's file: those of a window have its labels beside them.
-  const auto has_text = [&](const fs::path& file) {
-    return std::ranges::binary_search(listing.files,
-                                      fs::path(file).replace_extension(".txt").string());
+  // Any numbers [N, 4] may be in an array's file: those of a window have its labels beside them,
+  // and these are not those of YOLO's images.
+  const bool are_of_images =
+      root.filename() == "labels" && has_folder(root.parent_path() / "images");
+  const auto has_labels = [&](const fs::path& file) {
+    const std::string text = fs::path(file).replace_extension(".txt").string();
+    return !are_of_images && std::ranges::binary_search(listing.files, text) &&
+           is_window_label_text(root / text).value_or(false);
   };
   for (const std::string& name : listing.files) {
-    if (!may_be_recording(name) || (lower_extension(name) == ".npy" && !has_text(name))) continue;
+    if (!may_be_recording(name) || (lower_extension(name) == ".npy" && !has_labels(name))) continue;
     if (const auto found = recording_at(root / name)) return found;
   }
   return std::nullopt;

@@ -166,6 +166,7 @@ class FolderSearch {
             *spec.annotations + ", in " + spec.root);
       }
       recorded.set_labels(*spec.annotations, named);
+      note_names_of_windows();
       return;
     }
     const fs::path folder = spec.annotations ? named : default_labels_;
@@ -226,9 +227,10 @@ class FolderSearch {
     });
     if (window == found_.recordings.end()) return;
     if (!WindowLabels().companions(window->second.label_file_on_disk).empty()) return;
+    const fs::path folder = fs::path(window->second.label_file).parent_path();
     found_.notes.push_back(
         "classes are named by their numbers, since no data.yaml or classes.txt with names is in " +
-        fs::path(window->second.label_file).parent_path().string() + " or the folder above it");
+        (folder.empty() ? "." : folder.string()) + " or the folder above it");
   }
 
   /// Relative to the manifest where the root is.

@@ -585,6 +585,19 @@ TEST_F(FindSource, KnowsRecordingsOfEventCameras) {
   write("numbers/boxes/a.npy", testing::npy_doubles({1, 4}, {0, 0, 1, 1}));
   EXPECT_EQ(find("numbers").dataset, DatasetKind::kFrames);
   EXPECT_EQ(find("numbers/boxes/a.npy").dataset, DatasetKind::kRecording);
+  // Or their labels beside them do, if they are no labels of images.
+  const std::string events = testing::npy_doubles({1, 4}, {0, 0, 1, 1});
+  for (const char* name : {"windows/a", "windows/b", "yolo/labels/1", "poses/a"}) {
+    write(name + std::string(".npy"), events);
+  }
+  write("windows/a.txt", "");
+  write("windows/b.txt", "0 0.5 0.5 0.1 0.1\n");
+  EXPECT_EQ(find("windows").dataset, DatasetKind::kRecording);
+  write("yolo/images/1.png");
+  write("yolo/labels/1.txt", "0 0.5 0.5 0.1 0.1\n");
+  EXPECT_EQ(find("yolo").dataset, DatasetKind::kFrames);
+  write("poses/a.txt", "hello");
+  EXPECT_THROW(find("poses"), InputError);
   write("clip/1.png");
   write("clip/2.png");
   write("clip/a.csv", "t,x,y,p\n");

@@ -534,6 +534,11 @@ TEST_F(WindowTextsTest, NumberTheirClassesAsYoloDoes) {
   EXPECT_THAT(open()->notes(),
               Contains("classes are named by their numbers, since no data.yaml or classes.txt "
                        "with names is in windows or the folder above it"));
+  spec_.root = "windows/a.csv";
+  spec_.annotations = "windows/a.txt";
+  EXPECT_THAT(open()->notes(), Contains(HasSubstr("with names is in windows")));
+  spec_.root = "windows";
+  spec_.annotations.reset();
   write("a.txt", "0 0.5 0.5 0.1 0.1\n");
   write("data.yaml", "names: [person, car]\n");
   EXPECT_THAT(classes(*open(), 0), ElementsAre(0));
