@@ -124,13 +124,14 @@ flatbuffers::Verifier verifier_of(const std::string& bytes) {
 /// behind it: then the size is taken off `bytes`.
 template <class Table>
 const Table& table_of(std::string& bytes, const char* identifier) {
-  flatbuffers::Verifier whole = verifier_of(bytes);
-  if (whole.VerifySizePrefixedBuffer<Table>(identifier)) {
-    return *flatbuffers::GetSizePrefixedRoot<Table>(bytes.data());
-  }
   constexpr std::size_t kSizeBytes = 4;
+  // Verifiers of FlatBuffers 23 and later allow more bytes behind it.
   if (bytes.size() > kSizeBytes &&
       number_at<std::uint32_t>(bytes, 0) == bytes.size() - kSizeBytes) {
+    flatbuffers::Verifier whole = verifier_of(bytes);
+    if (whole.VerifySizePrefixedBuffer<Table>(identifier)) {
+      return *flatbuffers::GetSizePrefixedRoot<Table>(bytes.data());
+    }
     bytes.erase(0, kSizeBytes);
     flatbuffers::Verifier rest = verifier_of(bytes);
     if (rest.VerifyBuffer<Table>(identifier)) {
