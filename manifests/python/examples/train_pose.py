@@ -76,9 +76,9 @@ def main() -> None:
         raise SystemExit(f"expected validation persons with the {len(train_set.joint_names)} trained joints, got "
                          f"{len(validation_set)} with {len(persons.names)} joints, in "
                          f"{args.data}{f' (--dataset {args.dataset})' if args.dataset else ''}")
-    joints = searched.default_joints()  # predictions.json has them in the folder's own order
-    if set(joints) != set(train_set.joint_names):
-        raise SystemExit(f"expected the trained joints {', '.join(train_set.joint_names)}, got {', '.join(joints)}, in "
+    wanted = searched.default_joints()  # eventgan.evaluate reads predictions.json in this order
+    if set(wanted) != set(train_set.joint_names):
+        raise SystemExit(f"expected the trained joints {', '.join(train_set.joint_names)}, got {', '.join(wanted)}, in "
                          f"{args.test or args.data}")
     print(f"{len(train_set)} persons for training, {len(validation_set)} for validation")
 
@@ -131,7 +131,7 @@ def main() -> None:
 
     names = searched.column("sample_id")[test.persons[:, 0]]
     with torch.no_grad():
-        found = search(test)[:, [train_set.joint_names.index(name) for name in joints]].tolist()
+        found = search(test)[:, [train_set.joint_names.index(name) for name in wanted]].tolist()
     entries = ({"image_id": name, "person": person, "joints": joints}
                for name, person, joints in zip(names, test.persons[:, 1].tolist(), found))
     training.write_predictions(args, searched, entries, "poses")
