@@ -12,8 +12,8 @@
 #include <string_view>
 #include <system_error>
 
-#include "pipeline/command_line/detail/usage.h"
 #include "pipeline/command_line/standard_streams.h"
+#include "pipeline/command_line/usage.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/errors.h"

@@ -4,9 +4,9 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/detail/manifest_file.h"
-#include "manifests/documents/detail/strict_json.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/documents/strict_json.h"
 
 namespace eventgan {
 namespace {

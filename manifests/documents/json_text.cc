@@ -1,4 +1,4 @@
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 
 #include <fmt/format.h>
 #include <utf8.h>

@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "manifests/documents/detail/document_tables.h"
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 
 namespace eventgan {
 namespace {

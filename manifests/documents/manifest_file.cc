@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 

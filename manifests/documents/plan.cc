@@ -7,8 +7,8 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/detail/plan_lines.h"
+#include "manifests/documents/json_text.h"
 
 namespace eventgan {
 

@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "manifests/documents/commit_record.h"
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 
 namespace eventgan {
 namespace {

@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "manifests/documents/detail/document_tables.h"
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/detail/manifest_file.h"
 #include "manifests/documents/detail/sensor_document.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 
 namespace eventgan {

@@ -1,4 +1,4 @@
-#include "manifests/documents/detail/strict_json.h"
+#include "manifests/documents/strict_json.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 
 namespace eventgan {
 namespace {

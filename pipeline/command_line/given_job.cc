@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "manifests/documents/job_manifest.h"
+#include "manifests/files/atomic_file.h"
 #include "manifests/values/faults.h"
 #include "pipeline/command_line/standard_streams.h"
 #include "pipeline/planning/draft_manifest.h"
-#include "stages/base/files/atomic_file.h"
 #include "stages/frames/find_source.h"
 
 namespace eventgan {

@@ -11,8 +11,8 @@
 #include <system_error>
 
 #include "manifests/values/faults.h"
-#include "pipeline/command_line/detail/usage.h"
 #include "pipeline/command_line/standard_streams.h"
+#include "pipeline/command_line/usage.h"
 #include "pipeline/planning/fingerprint.h"
 
 namespace eventgan {

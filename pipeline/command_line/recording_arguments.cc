@@ -13,8 +13,8 @@
 #include "manifests/documents/training_manifest.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/recording_formats.h"
-#include "pipeline/command_line/detail/usage.h"
 #include "pipeline/command_line/standard_streams.h"
+#include "pipeline/command_line/usage.h"
 
 namespace eventgan {
 namespace {

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/progress.h"
 

@@ -1,4 +1,4 @@
-#include "pipeline/command_line/detail/usage.h"
+#include "pipeline/command_line/usage.h"
 
 #include <algorithm>
 #include <iostream>

@@ -7,6 +7,8 @@
 #include <optional>
 
 #include "manifests/documents/job_manifest.h"
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "pipeline/command_line/options.h"
@@ -17,8 +19,6 @@
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/sha256.h"
 #include "stages/generator/calibration.h"
 #include "stages/generator/weights_file.h"
 

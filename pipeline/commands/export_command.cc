@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
-#include "pipeline/command_line/detail/usage.h"
 #include "pipeline/command_line/options.h"
 #include "pipeline/command_line/standard_streams.h"
+#include "pipeline/command_line/usage.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/exports/export_job.h"
 #include "pipeline/runtime/errors.h"

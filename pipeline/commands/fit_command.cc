@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "manifests/documents/sensor_document.h"
+#include "manifests/files/atomic_file.h"
 #include "manifests/values/faults.h"
 #include "pipeline/command_line/options.h"
 #include "pipeline/command_line/recording_arguments.h"
@@ -18,7 +19,6 @@
 #include "pipeline/realism/volume_method.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/threads.h"
-#include "stages/base/files/atomic_file.h"
 #include "stages/recordings/recording.h"
 
 namespace eventgan {

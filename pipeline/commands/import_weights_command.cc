@@ -3,11 +3,11 @@
 #include <memory>
 #include <utility>
 
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/runtime/errors.h"
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/sha256.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/checkpoints/fold.h"
 #include "stages/generator/weights_file.h"

@@ -11,13 +11,13 @@
 #include <string_view>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/atomic_file.h"
 #include "manifests/values/datasets.h"
 #include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/planning/draft_manifest.h"
 #include "pipeline/runtime/errors.h"
-#include "stages/base/files/atomic_file.h"
 #include "stages/frames/find_source.h"
 
 namespace eventgan {

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "pipeline/command_line/options.h"
 #include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"

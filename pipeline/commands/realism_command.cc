@@ -13,10 +13,10 @@
 
 #include "manifests/documents/sensor_document.h"
 #include "manifests/values/faults.h"
-#include "pipeline/command_line/detail/usage.h"
 #include "pipeline/command_line/options.h"
 #include "pipeline/command_line/recording_arguments.h"
 #include "pipeline/command_line/standard_streams.h"
+#include "pipeline/command_line/usage.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/realism/realism.h"
 #include "pipeline/runtime/errors.h"

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 
+#include "manifests/files/atomic_file.h"
 #include "pipeline/command_line/options.h"
 #include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
@@ -13,7 +14,6 @@
 #include "pipeline/preview/preview_reader.h"
 #include "pipeline/report/report_page.h"
 #include "pipeline/runtime/errors.h"
-#include "stages/base/files/atomic_file.h"
 #include "stages/events/images/image_output.h"
 
 namespace eventgan {

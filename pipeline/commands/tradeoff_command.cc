@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "manifests/documents/job_manifest.h"
+#include "manifests/files/atomic_file.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "manifests/values/words.h"
@@ -22,7 +23,6 @@
 #include "pipeline/runtime/stopping.h"
 #include "pipeline/tradeoff/tradeoff.h"
 #include "pipeline/tradeoff/tradeoff_report.h"
-#include "stages/base/files/atomic_file.h"
 
 namespace eventgan {
 namespace {

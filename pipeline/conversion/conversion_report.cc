@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "manifests/documents/commit_record.h"
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/text.h"
 
 namespace eventgan {

@@ -6,7 +6,7 @@
 
 #include "manifests/documents/commit_record.h"
 #include "manifests/documents/plan.h"
-#include "stages/base/files/input_file.h"
+#include "manifests/files/input_file.h"
 
 namespace eventgan {
 namespace {

@@ -9,7 +9,7 @@
 #include <numeric>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/text.h"
 #include "pipeline/conversion/sample_stages.h"
 #include "pipeline/runtime/progress.h"

@@ -13,8 +13,9 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/documents/plan.h"
+#include "manifests/files/file_lock.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
 #include "manifests/values/text.h"
@@ -26,7 +27,6 @@
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/runtime/trace.h"
-#include "stages/base/files/file_lock.h"
 #include "stages/frames/class_numbers.h"
 #include "stages/recordings/event_index.h"
 #include "stages/shards/shard_reader.h"

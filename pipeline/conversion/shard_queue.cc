@@ -11,10 +11,10 @@
 
 #include "manifests/documents/commit_record.h"
 #include "manifests/documents/plan.h"
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/input_file.h"
+#include "manifests/files/unfinished_files.h"
 #include "pipeline/folder/shard_scan.h"
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/input_file.h"
-#include "stages/base/files/unfinished_files.h"
 
 namespace eventgan {
 namespace {

@@ -8,11 +8,11 @@
 #include <utility>
 
 #include "manifests/documents/commit_record.h"
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_backup.h"
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 namespace {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "manifests/documents/commit_record.h"
+#include "manifests/files/atomic_file.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
 #include "manifests/values/text.h"
@@ -18,7 +19,6 @@
 #include "pipeline/runtime/memory.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/runtime/trace.h"
-#include "stages/base/files/atomic_file.h"
 #include "stages/generator/shipped_weights.h"
 
 namespace eventgan {

@@ -12,12 +12,12 @@
 #include <string_view>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/job_manifest.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "pipeline/folder/shard_guard.h"
-#include "stages/base/files/sha256.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_tables.h"
 

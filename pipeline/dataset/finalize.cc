@@ -6,13 +6,13 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/input_file.h"
 #include "manifests/values/job.h"
 #include "manifests/values/text.h"
 #include "pipeline/dataset/dataset_description.h"
 #include "pipeline/folder/shard_backup.h"
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 

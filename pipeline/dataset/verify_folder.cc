@@ -15,8 +15,11 @@
 #include <utility>
 
 #include "manifests/documents/commit_record.h"
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/job_manifest.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/input_file.h"
+#include "manifests/files/sha256.h"
+#include "manifests/files/unfinished_files.h"
 #include "manifests/values/text.h"
 #include "pipeline/dataset/dataset_description.h"
 #include "pipeline/dataset/source_comparison.h"
@@ -24,9 +27,6 @@
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
 #include "pipeline/runtime/errors.h"
-#include "stages/base/files/input_file.h"
-#include "stages/base/files/sha256.h"
-#include "stages/base/files/unfinished_files.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {

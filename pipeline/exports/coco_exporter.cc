@@ -10,10 +10,10 @@
 #include <set>
 #include <utility>
 
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/sha256.h"
 #include "pipeline/exports/detail/exporter.h"
 #include "stages/base/archives/numpy_arrays.h"
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/sha256.h"
 #include "stages/events/images/skeleton.h"
 #include "stages/exports/detection_labels.h"
 #include "stages/exports/pose_list.h"

@@ -9,12 +9,12 @@
 #include <system_error>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/input_file.h"
+#include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
 #include "pipeline/exports/export_job.h"
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/input_file.h"
-#include "stages/base/files/unfinished_files.h"
 
 namespace eventgan {
 namespace {

@@ -10,15 +10,15 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/job_manifest.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/input_file.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/pair_key.h"
 #include "pipeline/dataset/dataset_description.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
-#include "stages/base/files/input_file.h"
-#include "stages/base/files/sha256.h"
 
 namespace eventgan {
 namespace {

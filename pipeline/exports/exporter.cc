@@ -8,12 +8,12 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/input_file.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/archives/numpy_arrays.h"
-#include "stages/base/files/input_file.h"
-#include "stages/base/files/sha256.h"
 #include "stages/events/images/preview_image.h"
 #include "stages/labels/label_mapping.h"
 #include "stages/shards/sample_check.h"

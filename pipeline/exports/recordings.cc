@@ -14,14 +14,14 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
 #include "manifests/values/pair_key.h"
 #include "manifests/values/text.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/archives/numpy_arrays.h"
-#include "stages/base/files/sha256.h"
 #include "stages/exports/sampled_events.h"
 
 namespace eventgan {

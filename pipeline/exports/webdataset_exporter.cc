@@ -10,13 +10,13 @@
 #include <string_view>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/atomic_file.h"
 #include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
 #include "pipeline/exports/detail/exporter.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/archives/numpy_arrays.h"
-#include "stages/base/files/atomic_file.h"
 #include "stages/exports/array_files.h"
 #include "stages/shards/codec/volume_codec.h"
 

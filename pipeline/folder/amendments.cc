@@ -4,11 +4,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
-#include "manifests/documents/detail/strict_json.h"
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/file_lock.h"
-#include "stages/base/files/input_file.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/documents/strict_json.h"
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/file_lock.h"
+#include "manifests/files/input_file.h"
 
 namespace eventgan {
 namespace {

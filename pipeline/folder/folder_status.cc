@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "manifests/documents/commit_record.h"
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/documents/plan.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"

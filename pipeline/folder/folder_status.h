@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "manifests/files/unfinished_files.h"
 #include "manifests/values/shard.h"
-#include "stages/base/files/unfinished_files.h"
 
 namespace eventgan {
 

@@ -15,15 +15,15 @@
 #include <vector>
 
 #include "manifests/documents/commit_record.h"
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/format_version.h"
 #include "manifests/documents/job_manifest.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/input_file.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "pipeline/folder/amendments.h"
 #include "pipeline/planning/make_plan.h"
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/input_file.h"
-#include "stages/base/files/sha256.h"
 
 namespace eventgan {
 namespace {

@@ -20,11 +20,11 @@
 #include <string>
 
 #include "manifests/documents/commit_record.h"
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/input_file.h"
+#include "manifests/files/sha256.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/memory.h"
-#include "stages/base/files/input_file.h"
-#include "stages/base/files/sha256.h"
 
 namespace eventgan {
 namespace {

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "manifests/documents/commit_record.h"
+#include "manifests/files/input_file.h"
+#include "manifests/files/sha256.h"
 #include "pipeline/runtime/threads.h"
-#include "stages/base/files/input_file.h"
-#include "stages/base/files/sha256.h"
 #include "stages/shards/shard_check.h"
 #include "stages/shards/shard_reader.h"
 

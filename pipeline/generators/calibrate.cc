@@ -8,14 +8,14 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/events.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/pair_key.h"
 #include "manifests/values/weights.h"
 #include "pipeline/conversion/sample_stages.h"
 #include "pipeline/generators/choose_engine.h"
-#include "stages/base/files/sha256.h"
 #include "stages/generator/calibration.h"
 #include "stages/generator/onednn/calibrator.h"
 #include "stages/generator/onednn/onednn_generator.h"

@@ -14,12 +14,12 @@
 #include <system_error>
 #include <utility>
 
+#include "manifests/files/sha256.h"
 #include "manifests/values/events.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/weights.h"
 #include "pipeline/generators/choose_engine.h"
 #include "pipeline/generators/simulated_generator.h"
-#include "stages/base/files/sha256.h"
 #include "stages/generator/onednn/onednn_generator.h"
 #include "stages/generator/shipped_weights.h"
 #include "stages/generator/torch/torch_generator.h"

@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "manifests/documents/manifest_fields.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/counter_random.h"
 #include "manifests/values/frames.h"
 #include "pipeline/runtime/memory.h"
-#include "stages/base/files/sha256.h"
 #include "stages/base/processor_clones.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/sensor.h"

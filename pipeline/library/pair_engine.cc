@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "manifests/documents/job_manifest.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "pipeline/runtime/memory.h"
-#include "stages/base/files/sha256.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/generator/onednn/buffers.h"
 #include "stages/labels/label_mapping.h"

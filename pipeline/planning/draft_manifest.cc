@@ -11,8 +11,8 @@
 #include <string_view>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/job_manifest.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
 #include "pipeline/planning/outline_masks.h"

@@ -13,8 +13,8 @@
 #include <string_view>
 
 #include "manifests/documents/manifest_fields.h"
-#include "stages/base/files/sha256.h"
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "manifests/files/sha256.h"
+#include "stages/base/hdf5/hdf5.h"
 #include "stages/base/processor/processor.h"
 #include "stages/base/videos/video_file.h"
 

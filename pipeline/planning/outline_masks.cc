@@ -13,13 +13,13 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/atomic_file.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
 #include "pipeline/planning/spread.h"
 #include "pipeline/runtime/threads.h"
-#include "stages/base/files/atomic_file.h"
 #include "stages/base/images/image_file.h"
 #include "stages/frames/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"

@@ -8,12 +8,12 @@
 #include <optional>
 #include <utility>
 
+#include "manifests/files/sha256.h"
 #include "manifests/values/events.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/weights.h"
 #include "pipeline/generators/load_generator.h"
 #include "pipeline/runtime/threads.h"
-#include "stages/base/files/sha256.h"
 #include "stages/events/drawn_events.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/simulate_pair.h"

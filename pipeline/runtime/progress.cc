@@ -7,7 +7,7 @@
 #include <ostream>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 
 namespace eventgan {
 namespace {

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/runtime/trace_file.h"
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <system_error>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/unfinished_files.h"
 
 namespace eventgan {
 

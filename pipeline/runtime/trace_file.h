@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "stages/base/files/atomic_file.h"
+#include "manifests/files/atomic_file.h"
 
 namespace eventgan {
 

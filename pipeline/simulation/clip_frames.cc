@@ -3,8 +3,8 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/sha256.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "stages/frames/sequences/image_folder.h"

@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/hdf5.h"
 #include "stages/recordings/aedat4_writer.h"
 #include "stages/recordings/evt3_writer.h"
 #include "stages/recordings/mvsec_writer.h"

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/documents/manifest_fields.h"
 #include "manifests/documents/plan.h"
 #include "manifests/values/faults.h"

@@ -11,7 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/input_file.h"
+#include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "pipeline/runtime/memory.h"
@@ -21,9 +24,6 @@
 #include "pipeline/simulation/recording_plan.h"
 #include "pipeline/simulation/scene.h"
 #include "pipeline/simulation/still_scenes.h"
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/input_file.h"
-#include "stages/base/files/unfinished_files.h"
 #include "stages/events/simulation/sensor.h"
 #include "stages/events/simulation/simulate_pair.h"
 #include "stages/recordings/evt3_writer.h"

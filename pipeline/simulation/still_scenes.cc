@@ -11,16 +11,16 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/job_manifest.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/documents/manifest_fields.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/outlines.h"
 #include "manifests/values/pair_key.h"
 #include "manifests/values/placement.h"
 #include "manifests/values/still_motion.h"
 #include "pipeline/simulation/clip_frames.h"
-#include "stages/base/files/sha256.h"
 #include "stages/events/simulation/sensor.h"
 #include "stages/frames/class_numbers.h"
 #include "stages/frames/decoding/still_clip.h"

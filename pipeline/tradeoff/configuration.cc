@@ -5,8 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/job_manifest.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 
 namespace eventgan {

@@ -10,7 +10,7 @@
 #include <numeric>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/text.h"
 #include "pipeline/realism/realism_report.h"
 

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "stages/base/files/atomic_file.h"
+#include "manifests/files/atomic_file.h"
 
 namespace eventgan {
 namespace {

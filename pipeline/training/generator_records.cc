@@ -12,11 +12,11 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/sha256.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/planning/spread.h"
 #include "pipeline/training/csv_table.h"
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/sha256.h"
 #include "stages/events/images/comparison_image.h"
 #include "stages/events/simulation/moving_planes.h"
 #include "stages/events/volume_statistics.h"

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "manifests/documents/plan.h"
+#include "manifests/files/atomic_file.h"
 #include "manifests/values/faults.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/threads.h"
@@ -19,7 +20,6 @@
 #include "pipeline/training/sample_source.h"
 #include "pipeline/training/training_checkpoint.h"
 #include "pipeline/training/training_folder.h"
-#include "stages/base/files/atomic_file.h"
 #include "stages/base/processor/processor.h"
 #include "stages/training/trainer.h"
 

@@ -15,11 +15,11 @@
 
 #include "manifests/documents/manifest_fields.h"
 #include "manifests/documents/plan.h"
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/training/sample_source.h"
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/sha256.h"
 #include "stages/base/processor/processor.h"
 #include "stages/generator/safetensors.h"
 

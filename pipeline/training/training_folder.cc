@@ -11,8 +11,8 @@
 #include <string>
 #include <string_view>
 
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/unfinished_files.h"
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/unfinished_files.h"
 
 namespace eventgan {
 

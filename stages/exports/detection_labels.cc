@@ -11,7 +11,7 @@
 #include <string_view>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/outlines.h"
 
 namespace eventgan {

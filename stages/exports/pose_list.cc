@@ -13,8 +13,8 @@
 #include <string_view>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
-#include "stages/base/files/atomic_file.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/atomic_file.h"
 
 namespace eventgan {
 

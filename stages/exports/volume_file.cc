@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "stages/base/hdf5/detail/hdf5_output_file.h"
+#include "stages/base/hdf5/hdf5_output_file.h"
 
 namespace eventgan {
 namespace {

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/frames/dataset_kinds.h"
 #include "stages/frames/index_mask.h"

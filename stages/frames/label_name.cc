@@ -1,6 +1,6 @@
 #include "stages/frames/label_name.h"
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 
 namespace eventgan {
 

@@ -6,10 +6,10 @@
 #include <cctype>
 #include <system_error>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 

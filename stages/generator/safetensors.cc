@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "manifests/documents/detail/json_text.h"
-#include "stages/base/files/input_file.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/input_file.h"
 
 namespace eventgan {
 namespace {

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "manifests/documents/training_manifest.h"
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 #include "stages/generator/calibration.h"
 #include "stages/generator/safetensors.h"
 

@@ -12,8 +12,8 @@
 #include <string_view>
 #include <vector>
 
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/input_file.h"
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/input_file.h"
 #include "stages/recordings/detail/aedat4_file.h"
 
 namespace eventgan {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "manifests/values/faults.h"
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/hdf5.h"
 #include "stages/recordings/detail/event_check.h"
 #include "stages/recordings/detail/hdf5_table.h"
 

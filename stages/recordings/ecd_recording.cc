@@ -9,9 +9,9 @@
 #include <system_error>
 #include <utility>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/base/files/input_file.h"
 #include "stages/recordings/detail/frame_intervals.h"
 #include "stages/recordings/detail/recording_reader.h"
 

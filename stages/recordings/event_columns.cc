@@ -9,8 +9,8 @@
 #include <system_error>
 #include <utility>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 #include "stages/base/images/image_file.h"
 #include "stages/recordings/detail/frame_intervals.h"
 #include "stages/recordings/detail/hdf5_table.h"

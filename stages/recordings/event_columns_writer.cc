@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/base/hdf5/detail/hdf5_output_file.h"
+#include "stages/base/hdf5/hdf5_output_file.h"
 #include "stages/recordings/detail/event_columns.h"
 #include "stages/recordings/detail/growing_dataset.h"
 

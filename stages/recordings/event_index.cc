@@ -7,9 +7,9 @@
 #include <system_error>
 #include <utility>
 
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/input_file.h"
-#include "stages/base/files/sha256.h"
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/input_file.h"
+#include "manifests/files/sha256.h"
 #include "stages/recordings/detail/packed_bytes.h"
 
 namespace eventgan {

@@ -6,8 +6,8 @@
 #include <span>
 #include <string>
 
+#include "manifests/files/atomic_file.h"
 #include "manifests/values/frames.h"
-#include "stages/base/files/atomic_file.h"
 #include "stages/recordings/event_columns_writer.h"
 
 namespace eventgan {

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "stages/base/hdf5/detail/hdf5_output_file.h"
+#include "stages/base/hdf5/hdf5_output_file.h"
 #include "stages/recordings/detail/event_check.h"
 #include "stages/recordings/detail/growing_dataset.h"
 #include "stages/recordings/detail/hdf5_recording.h"

@@ -10,9 +10,9 @@
 #include <system_error>
 #include <utility>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/hdf5.h"
 #include "stages/recordings/detail/recording_reader.h"
 
 namespace eventgan {

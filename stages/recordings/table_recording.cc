@@ -16,12 +16,12 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/files/csv_records.h"
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/archives/detail/numpy_arrays.h"
 #include "stages/base/archives/numpy_arrays.h"
+#include "stages/base/archives/numpy_layout.h"
 #include "stages/base/archives/zip_archive.h"
-#include "stages/base/files/csv_records.h"
-#include "stages/base/files/input_file.h"
 #include "stages/recordings/detail/event_parts.h"
 #include "stages/recordings/detail/recording_reader.h"
 #include "stages/recordings/detail/stored_recording.h"

@@ -10,9 +10,9 @@
 #include <type_traits>
 #include <utility>
 
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/base/files/sha256.h"
 #include "stages/shards/detail/shard_reader.h"
 #include "stages/shards/sample_check.h"
 #include "stages/shards/shard_reader.h"

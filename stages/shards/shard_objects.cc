@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/shard_summary.h"
 #include "stages/shards/shard_tables.h"

@@ -13,8 +13,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 #include "stages/shards/codec/chunk_filters.h"
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/codec/volume_codec.h"

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/events.h"
 #include "manifests/values/text.h"
 #include "stages/shards/detail/shard_objects.h"

@@ -5,8 +5,8 @@
 #include <system_error>
 #include <vector>
 
-#include "stages/base/files/sha256.h"
-#include "stages/base/hdf5/detail/hdf5_output_file.h"
+#include "manifests/files/sha256.h"
+#include "stages/base/hdf5/hdf5_output_file.h"
 #include "stages/shards/detail/shard_objects.h"
 #include "stages/shards/shard_rows.h"
 #include "stages/shards/shard_tables.h"

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/strict_json.h"
+#include "manifests/documents/strict_json.h"
 #include "manifests/values/frames.h"
 #include "manifests/values/job.h"
 

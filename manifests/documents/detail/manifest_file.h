@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "manifests/documents/detail/fields.h"
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 
 namespace eventgan {

@@ -5,8 +5,8 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "manifests/documents/detail/strict_json.h"
 #include "manifests/documents/plan.h"
+#include "manifests/documents/strict_json.h"
 
 namespace eventgan {
 

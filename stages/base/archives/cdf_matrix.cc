@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "stages/base/files/input_file.h"
+#include "manifests/files/input_file.h"
 
 namespace eventgan {
 namespace {

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "stages/base/files/input_file.h"
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "manifests/files/input_file.h"
+#include "stages/base/hdf5/hdf5.h"
 
 namespace eventgan {
 namespace {

@@ -17,7 +17,7 @@
 #include <string_view>
 #include <utility>
 
-#include "stages/base/archives/detail/numpy_arrays.h"
+#include "stages/base/archives/numpy_layout.h"
 
 namespace eventgan {
 namespace {

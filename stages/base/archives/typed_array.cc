@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "stages/base/archives/detail/typed_array.h"
+#include "stages/base/archives/array_json.h"
 
 namespace eventgan {
 

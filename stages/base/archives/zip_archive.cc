@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "stages/base/files/input_file.h"
+#include "manifests/files/input_file.h"
 
 namespace eventgan {
 namespace {

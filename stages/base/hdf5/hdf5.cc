@@ -1,4 +1,4 @@
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/hdf5.h"
 
 #include <fmt/format.h>
 

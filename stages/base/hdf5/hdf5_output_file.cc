@@ -1,4 +1,4 @@
-#include "stages/base/hdf5/detail/hdf5_output_file.h"
+#include "stages/base/hdf5/hdf5_output_file.h"
 
 #include <fcntl.h>
 #include <unistd.h>

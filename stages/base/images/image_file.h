@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/frames.h"
-#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 

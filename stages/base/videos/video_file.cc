@@ -19,7 +19,7 @@ extern "C" {
 #include <string_view>
 #include <thread>
 
-#include "stages/base/files/input_file.h"
+#include "manifests/files/input_file.h"
 
 namespace eventgan {
 namespace {

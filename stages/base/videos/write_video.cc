@@ -13,7 +13,7 @@ extern "C" {
 #include <string_view>
 #include <vector>
 
-#include "stages/base/files/atomic_file.h"
+#include "manifests/files/atomic_file.h"
 #include "stages/base/videos/video_file.h"
 
 namespace eventgan {

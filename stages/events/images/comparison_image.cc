@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "stages/base/files/atomic_file.h"
+#include "manifests/files/atomic_file.h"
 #include "stages/base/images/image_file.h"
 #include "stages/events/images/detail/time_panel.h"
 

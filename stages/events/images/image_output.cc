@@ -4,7 +4,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "stages/base/files/atomic_file.h"
+#include "manifests/files/atomic_file.h"
 
 namespace eventgan {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "stages/base/files/input_file.h"
+#include "manifests/files/input_file.h"
 #include "stages/base/images/image_file.h"
 #include "stages/frames/decoding/prepared_frame.h"
 

@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/frames/dataset_kinds.h"

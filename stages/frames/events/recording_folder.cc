@@ -10,9 +10,9 @@
 #include <system_error>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 #include "stages/frames/events/recording_labels.h"
 #include "stages/frames/own_labels/detail/yolo_text.h"
 #include "stages/frames/source_folders.h"

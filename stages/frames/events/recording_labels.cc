@@ -13,13 +13,13 @@
 #include <unordered_set>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
-#include "manifests/documents/detail/strict_json.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/documents/strict_json.h"
+#include "manifests/files/csv_records.h"
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/archives/detail/typed_array.h"
+#include "stages/base/archives/array_json.h"
 #include "stages/base/archives/numpy_arrays.h"
-#include "stages/base/files/csv_records.h"
-#include "stages/base/files/input_file.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
 

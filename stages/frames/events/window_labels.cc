@@ -2,8 +2,8 @@
 #include <string>
 #include <vector>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 #include "stages/frames/events/recording_labels.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
 

@@ -9,11 +9,11 @@
 #include <stdexcept>
 #include <vector>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/archives/detail/typed_array.h"
+#include "stages/base/archives/array_json.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/archives/pickle.h"
-#include "stages/base/files/input_file.h"
 #include "stages/frames/human36m/detail/pose_table.h"
 
 namespace eventgan {

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/base/archives/detail/typed_array.h"
+#include "stages/base/archives/array_json.h"
 #include "stages/base/archives/hdf5_arrays.h"
 #include "stages/frames/human36m/detail/camera_book.h"
 #include "stages/frames/human36m/detail/human36m_dataset.h"

@@ -13,10 +13,10 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
+#include "stages/base/archives/array_json.h"
 #include "stages/base/archives/cdf_matrix.h"
-#include "stages/base/archives/detail/typed_array.h"
 #include "stages/frames/human36m/detail/camera_book.h"
 #include "stages/frames/human36m/detail/human36m_dataset.h"
 #include "stages/frames/human36m/detail/pose_table.h"

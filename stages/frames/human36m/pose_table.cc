@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "manifests/values/text.h"
-#include "stages/base/archives/detail/typed_array.h"
+#include "stages/base/archives/array_json.h"
 
 namespace eventgan {
 namespace {

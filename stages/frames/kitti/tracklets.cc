@@ -13,7 +13,7 @@
 #include <string_view>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"

@@ -9,8 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/frames/mpii/detail/mat_file.h"
 #include "stages/frames/mpii/detail/mat_json.h"

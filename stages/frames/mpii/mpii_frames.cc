@@ -10,9 +10,9 @@
 #include <system_error>
 #include <utility>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/base/files/input_file.h"
 #include "stages/base/images/image_file.h"
 #include "stages/frames/source_folders.h"
 

@@ -14,12 +14,12 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/base/archives/detail/typed_array.h"
+#include "stages/base/archives/array_json.h"
 #include "stages/base/archives/hdf5_arrays.h"
-#include "stages/base/files/input_file.h"
 #include "stages/frames/mpii/detail/mpii_annotations.h"
 #include "stages/frames/mpii/detail/mpii_list_dataset.h"
 #include "stages/frames/mpii/mpii_frames.h"

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
-#include "manifests/documents/detail/strict_json.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/documents/strict_json.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/outlines.h"
 #include "stages/frames/kitti/kitti_label.h"

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
-#include "stages/base/files/csv_records.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/csv_records.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/own_labels/detail/find_labels.h"

@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 #include "stages/frames/own_labels/own_labels.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "stages/frames/sequences/image_folder.h"

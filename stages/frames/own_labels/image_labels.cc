@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/text.h"
 
 namespace eventgan {

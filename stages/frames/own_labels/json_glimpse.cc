@@ -3,7 +3,7 @@
 #include <string>
 #include <utility>
 
-#include "stages/base/files/input_file.h"
+#include "manifests/files/input_file.h"
 #include "stages/frames/own_labels/detail/counted_bytes.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
 

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/outlines.h"
-#include "stages/base/files/sha256.h"
 #include "stages/frames/index_mask.h"
 #include "stages/frames/own_labels/detail/file_per_image.h"
 #include "stages/frames/own_labels/detail/find_labels.h"

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/files/csv_records.h"
 #include "manifests/values/text.h"
-#include "stages/base/files/csv_records.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/numbered_sequence.h"
 #include "stages/frames/own_labels/detail/find_labels.h"

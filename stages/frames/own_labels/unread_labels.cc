@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "manifests/files/csv_records.h"
 #include "manifests/values/text.h"
-#include "stages/base/files/csv_records.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/source_folders.h"

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
 #include "stages/frames/kitti/kitti_label.h"

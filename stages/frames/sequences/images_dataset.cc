@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "stages/frames/own_labels/detail/absent_frames.h"

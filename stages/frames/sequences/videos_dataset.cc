@@ -13,10 +13,10 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/json_text.h"
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/base/files/input_file.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/own_labels/detail/absent_frames.h"
 #include "stages/frames/own_labels/own_labels.h"

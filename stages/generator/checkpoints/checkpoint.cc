@@ -8,8 +8,8 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 #include "stages/generator/checkpoints/checkpoint_archive.h"
 #include "stages/generator/checkpoints/stored_tensor.h"
 

@@ -5,8 +5,8 @@
 #include <span>
 #include <stdexcept>
 
+#include "manifests/files/input_file.h"
 #include "stages/base/archives/zip_archive.h"
-#include "stages/base/files/input_file.h"
 #include "stages/generator/checkpoints/stored_tensor.h"
 
 namespace eventgan {

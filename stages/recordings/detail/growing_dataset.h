@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/hdf5.h"
 
 namespace eventgan {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "manifests/values/faults.h"
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/hdf5.h"
 
 namespace eventgan {
 

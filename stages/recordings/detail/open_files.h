@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "stages/base/files/input_file.h"
+#include "manifests/files/input_file.h"
 #include "stages/recordings/detail/recently_used.h"
 
 namespace eventgan {

@@ -4,7 +4,7 @@
 
 #include "manifests/documents/format_version.h"
 #include "manifests/values/shard.h"
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/hdf5.h"
 
 namespace eventgan {
 

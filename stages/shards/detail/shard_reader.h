@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "manifests/values/shard.h"
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/hdf5.h"
 #include "stages/shards/shard_tables.h"
 
 namespace eventgan {

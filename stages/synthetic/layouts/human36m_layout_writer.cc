@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/hdf5.h"
 #include "stages/synthetic/figure_scene.h"
 #include "stages/synthetic/layouts/layout_writers.h"
 #include "stages/synthetic/layouts/output_files.h"

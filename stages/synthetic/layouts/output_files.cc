@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "stages/base/files/atomic_file.h"
+#include "manifests/files/atomic_file.h"
 
 namespace eventgan {
 

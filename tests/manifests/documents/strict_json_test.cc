@@ -1,4 +1,4 @@
-#include "manifests/documents/detail/strict_json.h"
+#include "manifests/documents/strict_json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

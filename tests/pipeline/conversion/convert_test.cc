@@ -9,12 +9,12 @@
 
 #include "manifests/documents/commit_record.h"
 #include "manifests/documents/job_manifest.h"
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
 #include "pipeline/dataset/verify_folder.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/generators/load_generator.h"
 #include "pipeline/runtime/memory.h"
-#include "stages/base/files/input_file.h"
 #include "stages/generator/torch/torch_generator.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_summary.h"

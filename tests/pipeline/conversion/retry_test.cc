@@ -11,6 +11,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/convert.h"
 #include "pipeline/dataset/dataset_description.h"
@@ -18,7 +19,6 @@
 #include "pipeline/dataset/verify_folder.h"
 #include "pipeline/folder/amendments.h"
 #include "pipeline/planning/make_plan.h"
-#include "stages/base/files/unfinished_files.h"
 #include "stages/shards/shard_reader.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/image_file.h"

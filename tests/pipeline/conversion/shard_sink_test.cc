@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "manifests/documents/commit_record.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/earlier_shards.h"
-#include "stages/base/files/sha256.h"
 #include "stages/shards/codec/volume_codec.h"
 #include "tests/pipeline/conversion/small_conversion.h"
 #include "tests/testing/fake_dataset.h"

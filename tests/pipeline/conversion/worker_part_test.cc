@@ -9,10 +9,10 @@
 #include <stdexcept>
 
 #include "manifests/documents/commit_record.h"
+#include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/shard_queue.h"
 #include "pipeline/folder/output_folder.h"
-#include "stages/base/files/unfinished_files.h"
 #include "tests/pipeline/conversion/small_conversion.h"
 
 namespace eventgan {

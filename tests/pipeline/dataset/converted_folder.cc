@@ -1,7 +1,7 @@
 #include "tests/pipeline/dataset/converted_folder.h"
 
 #include "manifests/documents/commit_record.h"
-#include "stages/base/files/atomic_file.h"
+#include "manifests/files/atomic_file.h"
 #include "tests/testing/text_file.h"
 
 namespace eventgan::testing {

@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "manifests/documents/commit_record.h"
+#include "manifests/files/sha256.h"
 #include "pipeline/dataset/dataset_description.h"
-#include "stages/base/files/sha256.h"
 #include "tests/pipeline/dataset/converted_folder.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/text_file.h"

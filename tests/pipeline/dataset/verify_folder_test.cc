@@ -3,12 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "manifests/files/atomic_file.h"
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/convert.h"
 #include "pipeline/dataset/finalize.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
-#include "stages/base/files/atomic_file.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/image_file.h"
 #include "tests/testing/small_job.h"

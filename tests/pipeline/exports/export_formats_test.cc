@@ -5,8 +5,8 @@
 #include <sstream>
 #include <string>
 
+#include "manifests/files/input_file.h"
 #include "pipeline/exports/export_job.h"
-#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 namespace {

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "manifests/documents/commit_record.h"
+#include "manifests/files/sha256.h"
+#include "manifests/files/unfinished_files.h"
 #include "pipeline/folder/shard_backup.h"
-#include "stages/base/files/sha256.h"
-#include "stages/base/files/unfinished_files.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

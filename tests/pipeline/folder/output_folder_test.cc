@@ -7,10 +7,10 @@
 #include <thread>
 
 #include "manifests/documents/job_manifest.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/shard.h"
 #include "pipeline/folder/amendments.h"
-#include "stages/base/files/sha256.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "manifests/documents/commit_record.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/sha256.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "manifests/documents/commit_record.h"
-#include "stages/base/files/sha256.h"
+#include "manifests/files/sha256.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

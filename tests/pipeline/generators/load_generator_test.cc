@@ -8,9 +8,9 @@
 #include <set>
 
 #include "manifests/documents/sensor_document.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "pipeline/generators/choose_engine.h"
-#include "stages/base/files/sha256.h"
 #include "stages/generator/shipped_weights.h"
 #include "stages/generator/weights.h"
 #include "stages/generator/weights_file.h"

@@ -10,7 +10,7 @@
 // jpeglib.h needs the one above it.
 #include <jpeglib.h>
 
-#include "stages/base/files/sha256.h"
+#include "manifests/files/sha256.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

@@ -10,9 +10,9 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
 #include "pipeline/simulation/scene.h"
-#include "stages/base/files/unfinished_files.h"
 #include "stages/recordings/recording.h"
 #include "tests/pipeline/simulation/moving_clip.h"
 #include "tests/testing/temporary_folder.h"

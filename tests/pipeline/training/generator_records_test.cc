@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "stages/base/files/sha256.h"
+#include "manifests/files/sha256.h"
 #include "stages/events/simulation/moving_planes.h"
 #include "stages/generator/torch/torch_generator.h"
 #include "stages/generator/weights_file.h"

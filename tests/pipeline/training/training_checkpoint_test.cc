@@ -6,8 +6,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/sha256.h"
 #include "tests/pipeline/training/bar_training.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

@@ -11,8 +11,8 @@
 #include <functional>
 #include <string>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 #include "stages/recordings/recording.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/hdf5.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 #include "stages/recordings/recording.h"
 #include "tests/testing/hdf5_file.h"
 #include "tests/testing/temporary_folder.h"

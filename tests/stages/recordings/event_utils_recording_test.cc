@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/hdf5.h"
 #include "stages/recordings/recording.h"
 #include "tests/testing/hdf5_file.h"
 #include "tests/testing/temporary_folder.h"

@@ -10,8 +10,8 @@
 #include <thread>
 #include <utility>
 
-#include "stages/base/files/sha256.h"
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "manifests/files/sha256.h"
+#include "stages/base/hdf5/hdf5.h"
 #include "stages/shards/shard_reader.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/temporary_folder.h"

@@ -7,7 +7,7 @@
 #include <random>
 #include <set>
 
-#include "stages/base/files/sha256.h"
+#include "manifests/files/sha256.h"
 #include "stages/shards/codec/volume_codec.h"
 #include "stages/shards/detail/shard_objects.h"
 #include "stages/shards/shard_reader.h"

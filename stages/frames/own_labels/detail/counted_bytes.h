@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <iterator>
 
-#include "stages/base/files/input_file.h"
+#include "manifests/files/input_file.h"
 
 namespace eventgan {
 

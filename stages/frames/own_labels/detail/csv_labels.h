@@ -9,7 +9,7 @@
 
 namespace eventgan {
 
-/// A table of boxes (stages/base/files/csv_records.h), a row a box, with a header line of the
+/// A table of boxes (manifests/files/csv_records.h), a row a box, with a header line of the
 /// columns
 ///   image, class, left, top, right, bottom[, track]
 /// in any order, each once, also as filename, label, x1 or xmin, ..., with width and height in

@@ -6,7 +6,7 @@
 
 #include <stdexcept>
 
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/hdf5.h"
 #include "tests/testing/hdf5_file.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "stages/base/archives/detail/numpy_arrays.h"
+#include "stages/base/archives/numpy_layout.h"
 #include "stages/base/archives/zip_archive.h"
 #include "tests/testing/npy_bytes.h"
 #include "tests/testing/shared_data.h"

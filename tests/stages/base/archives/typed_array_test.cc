@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "stages/base/archives/detail/typed_array.h"
+#include "stages/base/archives/array_json.h"
 
 namespace eventgan {
 namespace {

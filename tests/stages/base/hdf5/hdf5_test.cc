@@ -1,4 +1,4 @@
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/hdf5.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-#include "stages/base/hdf5/detail/hdf5_output_file.h"
+#include "stages/base/hdf5/hdf5_output_file.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 

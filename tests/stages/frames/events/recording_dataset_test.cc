@@ -14,8 +14,8 @@
 #include <tuple>
 #include <vector>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 #include "tests/stages/recordings/small_recording.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "stages/base/files/input_file.h"
+#include "manifests/files/input_file.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"

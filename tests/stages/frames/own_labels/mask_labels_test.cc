@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "manifests/files/sha256.h"
 #include "manifests/values/outlines.h"
-#include "stages/base/files/sha256.h"
 #include "stages/frames/find_source.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "tests/testing/image_file.h"

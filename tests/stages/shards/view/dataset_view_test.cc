@@ -5,7 +5,7 @@
 
 #include <stdexcept>
 
-#include "stages/base/files/sha256.h"
+#include "manifests/files/sha256.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/stages/shards/view/example_view.h"
 #include "tests/testing/full_disk.h"

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "manifests/documents/commit_record.h"
-#include "stages/base/files/atomic_file.h"
+#include "manifests/files/atomic_file.h"
 #include "tests/stages/shards/example_shard.h"
 
 namespace eventgan::testing {

@@ -1,4 +1,4 @@
-#include "stages/base/files/file_lock.h"
+#include "manifests/files/file_lock.h"
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -6,7 +6,7 @@
 
 #include <cerrno>
 
-#include "stages/base/files/atomic_file.h"
+#include "manifests/files/atomic_file.h"
 
 namespace eventgan {
 

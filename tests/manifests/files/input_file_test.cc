@@ -1,4 +1,4 @@
-#include "stages/base/files/input_file.h"
+#include "manifests/files/input_file.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -18,8 +18,8 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/sha256.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

@@ -1,4 +1,4 @@
-#include "stages/base/files/csv_records.h"
+#include "manifests/files/csv_records.h"
 
 #include <utf8.h>
 

@@ -1,4 +1,4 @@
-#include "stages/base/files/csv_records.h"
+#include "manifests/files/csv_records.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

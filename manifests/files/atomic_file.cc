@@ -1,4 +1,4 @@
-#include "stages/base/files/atomic_file.h"
+#include "manifests/files/atomic_file.h"
 
 #include <fcntl.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "stages/base/files/unfinished_files.h"
+#include "manifests/files/unfinished_files.h"
 
 namespace eventgan {
 namespace {

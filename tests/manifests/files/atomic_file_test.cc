@@ -1,4 +1,4 @@
-#include "stages/base/files/atomic_file.h"
+#include "manifests/files/atomic_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

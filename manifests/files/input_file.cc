@@ -1,4 +1,4 @@
-#include "stages/base/files/input_file.h"
+#include "manifests/files/input_file.h"
 
 #include <fcntl.h>
 #include <sys/resource.h>

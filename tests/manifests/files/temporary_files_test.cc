@@ -7,8 +7,8 @@
 
 #include <chrono>
 
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/files/unfinished_files.h"
+#include "manifests/files/atomic_file.h"
+#include "manifests/files/unfinished_files.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

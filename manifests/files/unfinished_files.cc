@@ -1,4 +1,4 @@
-#include "stages/base/files/unfinished_files.h"
+#include "manifests/files/unfinished_files.h"
 
 #include <limits.h>
 #include <signal.h>

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "stages/base/files/input_file.h"
+#include "manifests/files/input_file.h"
 
 namespace eventgan {
 

@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <memory>
 
-#include "stages/base/files/atomic_file.h"
-#include "stages/base/hdf5/detail/hdf5.h"
+#include "manifests/files/atomic_file.h"
+#include "stages/base/hdf5/hdf5.h"
 
 namespace eventgan {
 

@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/format_version.h"
+#include "manifests/documents/json_text.h"
 #include "manifests/values/words.h"
 
 namespace eventgan {

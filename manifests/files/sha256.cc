@@ -1,4 +1,4 @@
-#include "stages/base/files/sha256.h"
+#include "manifests/files/sha256.h"
 
 #include <openssl/evp.h>
 
