@@ -8,6 +8,7 @@
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/files/atomic_file.h"
+#include "manifests/files/own_file.h"
 #include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
@@ -69,6 +70,7 @@ int run(const CalibrateArguments& arguments) {
   const LoadedWeights loaded = load_weights(manifest);
   const std::filesystem::path file =
       calibrated_file(manifest, loaded.weights.base_channels, arguments.out);
+  require_replaceable(file, OwnFile::kWeights);
   if (!loaded.warning.empty()) tell_warning(loaded.warning);
 
   const CalibrationOutcome outcome = calibrate_job(arguments, manifest, loaded, signal);

@@ -9,6 +9,7 @@
 
 #include "manifests/documents/sensor_document.h"
 #include "manifests/files/atomic_file.h"
+#include "manifests/files/own_file.h"
 #include "manifests/values/faults.h"
 #include "pipeline/command_line/options.h"
 #include "pipeline/command_line/recording_arguments.h"
@@ -55,14 +56,7 @@ void check_names(const FitArguments& arguments) {
   if (const auto folder = out.parent_path(); !folder.empty() && !is_directory(folder)) {
     throw InputError("--out: expected a folder, got none, in " + folder.string());
   }
-  if (!exists(out)) return;
-  try {
-    open_camera_sensor(out);
-  } catch (const std::exception&) {
-    std::throw_with_nested(
-        UsageError("--out: expected a new file or a sensor's document, got another file, in " +
-                   arguments.out));
-  }
+  require_replaceable(out, OwnFile::kSensor);
 }
 
 int run_fit(const FitArguments& arguments) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "manifests/files/atomic_file.h"
+#include "manifests/files/own_file.h"
 #include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
@@ -29,6 +30,7 @@ int run(const ImportArguments& arguments) {
   if (!arguments.out.ends_with(".safetensors")) {
     throw UsageError("expected an output named *.safetensors, got " + arguments.out);
   }
+  require_replaceable(arguments.out, OwnFile::kWeights);
   StateDict state = read_checkpoint(arguments.in, kGenerator);
   Weights weights;
   try {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "manifests/documents/json_text.h"
+#include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "pipeline/command_line/given_job.h"
@@ -50,7 +51,9 @@ void print_frozen(const std::filesystem::path& folder, const FrozenPlan& frozen,
 
 int freeze(const PlanArguments& arguments, const GivenJob& given, Plan plan) {
   const std::filesystem::path& folder = given.output;
+  require_own_results(folder);
   std::filesystem::create_directories(folder);
+  remove_stale_temporaries(folder);
   keep_manifest(given);
   const FrozenPlan frozen = freeze_plan(folder, std::move(plan), show_phases(arguments.progress),
                                         given.manifest.directory);

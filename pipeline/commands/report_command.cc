@@ -5,6 +5,8 @@
 #include <optional>
 
 #include "manifests/files/atomic_file.h"
+#include "manifests/files/own_file.h"
+#include "manifests/values/faults.h"
 #include "pipeline/command_line/options.h"
 #include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
@@ -30,6 +32,11 @@ struct ReportArguments {
 int run(const ReportArguments& arguments) {
   constexpr int kImageWidth = 640;
   const fs::path& folder = arguments.folder;
+  const fs::path page = arguments.out.value_or(folder / kReportName);
+  if (page.extension() != ".html") {
+    throw UsageError("--out: expected a path of *.html, got " + page.string());
+  }
+  require_replaceable(page, OwnFile::kReport);
   const Survey survey = survey_folder(folder);
   std::vector<std::string> warnings;
   PreviewReader reader(!arguments.frames.empty()
@@ -38,7 +45,7 @@ int run(const ReportArguments& arguments) {
                        warnings);
   PageContext context;
   context.folder = folder;
-  context.file = arguments.out.value_or(folder / kReportName);
+  context.file = page;
   context.warning = weights_warning(survey.parts.manifest);
   context.image = [&](const PickedSample& sample) {
     const PreviewContent content = reader.content(folder / sample.shard, sample.slot);

@@ -13,6 +13,7 @@
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/files/atomic_file.h"
+#include "manifests/files/own_file.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "manifests/values/words.h"
@@ -127,6 +128,9 @@ int run(TradeoffArguments& arguments) {
   const std::filesystem::path out = arguments.out
                                         ? std::filesystem::path(*arguments.out)
                                         : manifest.directory / (manifest.name + "-tradeoff");
+  require_replaceable(out / "tradeoff.json", OwnFile::kTradeoffReport);
+  require_replaceable(out / "tradeoff.md", OwnFile::kTradeoffTable);
+  require_replaceable(out / "tradeoff.svg", OwnFile::kChart);
   std::filesystem::create_directories(out);  // before minutes of measuring
   for (const std::string& real : arguments.real) {
     options.real.push_back(open_recording(real));

@@ -51,6 +51,15 @@ void record_place(const fs::path& folder, const JobManifest& manifest,
   record_manifest_folder(folder, manifest);
 }
 
+/// Before anything is written: this worker's part of the folder holds no file of a person's under a
+/// name that it needs.
+void require_own_files(const fs::path& folder, const Plan& plan, const WorkerPart& part) {
+  require_own_results(folder);
+  for (std::size_t i = 0; i < plan.shards.size(); ++i) {
+    if (part.has(static_cast<int>(i))) require_own_shard(folder, plan.shards[i].name);
+  }
+}
+
 /// Makes the folder ready and freezes the plan in it, or takes the one that is there.
 FrozenPlan prepare_folder(const fs::path& folder, const JobManifest& manifest, Plan plan,
                           const ConversionOptions& options) {
@@ -165,6 +174,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
                                   .trace = options.trace,
                                   .show_phase = options.show_phase,
                                   .limit = options.limit});
+  require_own_files(folder, planned.plan, options.part);
   if (options.on_planned) options.on_planned();
   for (const std::string& warning : planned.warnings) tell(options.warn, warning);
   std::vector<std::string> notes = notes_of(planned.plan.sources);  // as the inputs are today

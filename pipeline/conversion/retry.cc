@@ -288,6 +288,7 @@ class RetrySink final : public SampleSink {
 std::optional<RetryReport> nothing_to_retry(const fs::path& folder, const FrozenOutline& frozen,
                                             const JobManifest& manifest,
                                             const RunOptions& options) {
+  require_own_results(folder);
   restore_shards(folder, frozen);
   const QuarantinedSamples found = find_quarantined(folder, frozen);
   if (found.count > 0) return std::nullopt;
@@ -320,6 +321,7 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
                              folder.string() + ": run it again once the other has finished");
   }
   const FrozenOutline outline{outline_of(frozen.plan), frozen.hash};
+  require_own_results(folder);
   restore_shards(folder, outline);
   const QuarantinedSamples found = find_quarantined(folder, outline);
   RetryReport report = new_report(folder, found, frozen.plan.sample_count());

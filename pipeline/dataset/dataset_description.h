@@ -16,10 +16,8 @@
 
 namespace eventgan {
 
-inline constexpr char kDescriptionName[] = "dataset.json";
 inline constexpr char kDatasetFormat[] = "eventgan-dataset";
 inline constexpr FormatVersion kDatasetVersion{1, 0};
-inline constexpr char kViewName[] = "dataset.h5";
 
 /// What a dataset is put together from.
 struct DatasetParts {

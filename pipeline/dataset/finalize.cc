@@ -21,6 +21,7 @@ namespace fs = std::filesystem;
 FinalizationReport finalize(const std::filesystem::path& folder,
                             const FinalizationOptions& options) {
   FrozenOutline frozen = read_frozen_outline(folder);
+  require_own_results(folder);
   restore_shards(folder, frozen);  // and what a finalize that was killed has left goes
   std::vector<ShardState> shards =
       scan_shards(folder, frozen.plan.shards, frozen.hash, ScanDepth::kRows,

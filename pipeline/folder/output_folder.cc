@@ -20,6 +20,7 @@
 #include "manifests/documents/json_text.h"
 #include "manifests/files/atomic_file.h"
 #include "manifests/files/input_file.h"
+#include "manifests/files/own_file.h"
 #include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "pipeline/folder/amendments.h"
@@ -312,6 +313,23 @@ FrozenPlan freeze_plan(const fs::path& folder, Plan plan, const ShowPhase& show_
                    file.string() + " (--overwrite starts again)");
 }
 
+void require_own_results(const fs::path& folder) {
+  for (const auto& [name, kind] :
+       {std::pair(kPlanName, OwnFile::kPlan), std::pair(kRunName, OwnFile::kRunRecord),
+        std::pair("amendments.json", OwnFile::kAmendments),
+        std::pair("plan.index", OwnFile::kEventIndex),
+        std::pair(kDescriptionName, OwnFile::kDescription), std::pair(kViewName, OwnFile::kView),
+        std::pair("report.html", OwnFile::kReport)}) {
+    require_replaceable(folder / name, kind);
+  }
+}
+
+void require_own_shard(const fs::path& folder, const std::string& shard) {
+  const fs::path record = folder / commit_record_name(shard);
+  require_replaceable(record, OwnFile::kCommitRecord);
+  if (!fs::exists(record)) require_replaceable(folder / shard, OwnFile::kShard);
+}
+
 void discard_output(const fs::path& folder, const Fingerprint& fingerprint,
                     const fs::path& manifest_folder) {
   if (!fs::exists(folder / kPlanName)) return;
@@ -324,7 +342,7 @@ void discard_output(const fs::path& folder, const Fingerprint& fingerprint,
   }
   // What says that something is whole goes before what it says it of; the plan last, so that after
   // an interruption the next run finds the rest.
-  for (const char* name : {"dataset.json", "dataset.h5", "report.html"}) fs::remove(folder / name);
+  for (const char* name : {kDescriptionName, kViewName, "report.html"}) fs::remove(folder / name);
   for (const ShardOutline& shard : shards) {
     fs::remove(folder / commit_record_name(shard.name));
     fs::remove(folder / shard.name);
@@ -334,8 +352,8 @@ void discard_output(const fs::path& folder, const Fingerprint& fingerprint,
 }
 
 bool outdate_dataset(const fs::path& folder, const std::string& shard) {
-  const fs::path description = folder / "dataset.json";
-  if (!fs::exists(description)) return false;
+  const fs::path description = folder / kDescriptionName;
+  if (!fs::exists(description) || !is_replaceable(description, OwnFile::kDescription)) return false;
   std::string text;
   try {
     text = read_text_file(description);
@@ -351,7 +369,7 @@ bool outdate_dataset(const fs::path& folder, const std::string& shard) {
     return false;
   }
   // The view first: killed in between, the next run finds the description and removes it, too.
-  fs::remove(folder / "dataset.h5");
+  fs::remove(folder / kViewName);
   fs::remove(description);
   return true;
 }

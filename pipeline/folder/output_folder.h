@@ -11,6 +11,10 @@
 
 namespace eventgan {
 
+// What completes a dataset: pipeline/dataset writes both.
+inline constexpr char kDescriptionName[] = "dataset.json";
+inline constexpr char kViewName[] = "dataset.h5";
+
 /// A plan as it is in an output folder.
 struct FrozenPlan {
   Plan plan;
@@ -40,6 +44,12 @@ FrozenPlan freeze_plan(const std::filesystem::path& folder, Plan plan,
 FrozenPlan read_frozen_plan(const std::filesystem::path& folder);
 FrozenOutline read_frozen_outline(const std::filesystem::path& folder);
 
+/// Throws UsageError if a person's file has the name of one that a job writes or removes in the
+/// folder, beside its shards: to be asked before anything is written. The same of a shard's name
+/// and that of its commit record.
+void require_own_results(const std::filesystem::path& folder);
+void require_own_shard(const std::filesystem::path& folder, const std::string& shard);
+
 /// Makes room for the job that has this fingerprint, its relative paths starting at
 /// `manifest_folder`: deletes plan.json, every shard and commit record it names, and what was made
 /// from these (dataset.json, dataset.h5, report.html, amendments.json); other files stay. None
@@ -52,8 +62,8 @@ void discard_output(const std::filesystem::path& folder,
                     const std::filesystem::path& manifest_folder);
 
 /// For a shard that is about to be put in place of another one: removes dataset.json and dataset.h5
-/// if they tell of it (or cannot be read), since the view's places within the shard, of boxes and
-/// joints, are those of the former one. Whether they were there.
+/// if they name it (or are damaged), since the view's places within the shard, of boxes and joints,
+/// are those of the former one. Whether they were there. Files that are not the program's stay.
 bool outdate_dataset(const std::filesystem::path& folder, const std::string& shard);
 
 /// FOLDER/run.json says where the manifest was, so that `preview` finds the frames. It is a

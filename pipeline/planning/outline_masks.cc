@@ -15,6 +15,7 @@
 
 #include "manifests/documents/json_text.h"
 #include "manifests/files/atomic_file.h"
+#include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
@@ -176,6 +177,11 @@ OutlineMasksReport make_outline_masks(const JobManifest& manifest,
                                       const OutlineMasksOptions& options) {
   const std::vector<OutlinedSource> sources = open_sources(manifest, options.out);
   std::vector<MaskWork> works = list_work(manifest, sources);
+  std::set<fs::path> folders;
+  for (const MaskWork& work : works) folders.insert(work.mask.parent_path());
+  for (const fs::path& folder : folders) {
+    if (fs::is_directory(folder)) remove_stale_temporaries(folder);
+  }
   const FrameDecoder decoder(manifest.directory);
   const auto progress = options.make_progress ? options.make_progress(std::ssize(works)) : nullptr;
   for_each_index(works.size(), thread_count(options.threads), [&](std::size_t i) {

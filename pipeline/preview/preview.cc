@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "manifests/files/own_file.h"
 #include "manifests/values/faults.h"
 #include "pipeline/dataset/shown_samples.h"
 #include "pipeline/folder/output_folder.h"
@@ -261,8 +262,9 @@ std::vector<fs::path> preview(const fs::path& where, const PreviewOptions& optio
   };
   if (options.video) {
     const Sequence sequence = read_sequence(shards, options);
-    fs::create_directories(options.out);
     const fs::path video = options.out / (file_name(sequence.name) + ".mp4");
+    require_replaceable(video, OwnFile::kVideo);
+    fs::create_directories(options.out);
     auto sample = sequence.samples.begin();
     write_video(video, sequence.frames_per_second, [&]() -> std::optional<ColourFrame> {
       if (sample == sequence.samples.end()) return std::nullopt;
@@ -274,19 +276,22 @@ std::vector<fs::path> preview(const fs::path& where, const PreviewOptions& optio
   if (chosen.empty()) {
     throw InputError("expected a valid sample, got none, in " + where.string());
   }
-  fs::create_directories(options.out);
   std::vector<fs::path> images;
+  for (const ShownSample& place : chosen) {
+    images.push_back(options.out / image_name(shards.files[place.shard], place.slot));
+  }
+  if (options.sheet) images = {options.out / "sheet.png"};
+  for (const fs::path& image : images) require_replaceable(image, OwnFile::kPicture);
+  fs::create_directories(options.out);
   if (options.sheet) {
     constexpr int kColumns = 3, kTileWidth = 400;
     std::vector<ColourFrame> tiles;
     for (const ShownSample& place : chosen) tiles.push_back(draw_tile(content(place), kTileWidth));
-    images.push_back(options.out / "sheet.png");
     write_png(draw_sheet(tiles, kColumns), images.back());
     return images;
   }
-  for (const ShownSample& place : chosen) {
-    images.push_back(options.out / image_name(shards.files[place.shard], place.slot));
-    write_png(draw_preview(content(place)), images.back());
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    write_png(draw_preview(content(chosen[i])), images[i]);
   }
   return images;
 }

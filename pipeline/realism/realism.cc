@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "manifests/files/own_file.h"
 #include "manifests/values/faults.h"
 #include "pipeline/realism/real_interval.h"
 #include "pipeline/runtime/threads.h"
@@ -30,8 +31,10 @@ void write_realism_image(const RealInterval& real, std::vector<NamedVolume> volu
       network_input(real.frames),
       std::move(volumes),
       fmt::format("{}, frames {} and {}", recording, interval.first, interval.last)};
-  write_comparison_png({&pair, 1},
-                       folder / fmt::format("{:06}-{:06}.png", interval.first, interval.last));
+  const std::filesystem::path image =
+      folder / fmt::format("{:06}-{:06}.png", interval.first, interval.last);
+  require_replaceable(image, OwnFile::kPicture);
+  write_comparison_png({&pair, 1}, image);
 }
 
 /// What one interval gives: the camera's scores, then each method's.

@@ -2,13 +2,13 @@
 
 #include <fmt/core.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <system_error>
 
 #include "manifests/documents/json_text.h"
+#include "manifests/files/own_file.h"
 #include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
 
@@ -29,14 +29,6 @@ namespace fs = std::filesystem;
   throw UsageError("--profile: expected " + expected + ", got " + got + ", in " + file.string());
 }
 
-bool is_empty_or_trace(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) return false;  // a file that may not be read is not ours to replace
-  std::string start(kTraceBegins.size(), '\0');
-  stream.read(start.data(), static_cast<std::streamsize>(start.size()));
-  return stream.gcount() == 0 || start == kTraceBegins;
-}
-
 /// Where a trace goes that is told to go to `target`: behind links.
 fs::path checked_target(const fs::path& target) {
   if (target.filename().empty()) refuse("a file", "a folder or nothing", target);
@@ -44,7 +36,9 @@ fs::path checked_target(const fs::path& target) {
   const fs::file_status status = fs::status(target, error);
   if (!fs::exists(status)) return target;
   if (!fs::is_regular_file(status)) refuse("a file", "something else", target);
-  if (!is_empty_or_trace(target)) refuse("a new file or an earlier trace", "another file", target);
+  if (!is_replaceable(target, OwnFile::kTrace)) {
+    refuse("a new file or an earlier trace", "another file", target);
+  }
   const fs::path behind_links = fs::canonical(target, error);
   return error ? target : behind_links;
 }

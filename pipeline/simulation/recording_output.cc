@@ -37,7 +37,7 @@ class MvsecOutput final : public RecordingOutput {
   void add_frame(const GreyImage& frame, double time_s, const FlowField* flow) override {
     writer_.add_frame(frame, time_s, flow);
   }
-  void commit() override { writer_.commit(); }
+  void commit(const std::function<void()>& before) override { writer_.commit(before); }
 
  private:
   MvsecWriter writer_;
@@ -51,7 +51,7 @@ class Aedat4Output final : public RecordingOutput {
   void add_frame(const GreyImage& frame, double time_s, const FlowField*) override {
     writer_.add_frame(microseconds(time_s), frame.pixels);
   }
-  void commit() override { writer_.commit(); }
+  void commit(const std::function<void()>& before) override { writer_.commit(before); }
 
  private:
   Aedat4Writer writer_;
@@ -65,7 +65,7 @@ class RawOutput final : public RecordingOutput {
   void add_frame(const GreyImage&, double time_s, const FlowField*) override {
     end_us_ = microseconds(time_s);
   }
-  void commit() override { writer_.commit(end_us_); }
+  void commit(const std::function<void()>& before) override { writer_.commit(end_us_, before); }
 
  private:
   Evt3Writer writer_;

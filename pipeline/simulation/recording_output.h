@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -21,7 +22,8 @@ class RecordingOutput {
   virtual void add_events(std::span<const Event> events) = 0;
   virtual void add_frame(const GreyImage& frame, double time_s,
                          const FlowField* flow_from_previous) = 0;
-  virtual void commit() = 0;
+  /// `before_publishing` is called once the recording is on disk under another name.
+  virtual void commit(const std::function<void()>& before_publishing) = 0;
 };
 
 /// Opens the writer of the file's extension, a word of kSimulatedFileWords. What a format does not

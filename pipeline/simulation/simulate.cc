@@ -49,7 +49,8 @@ double displacement(const FlowField& flow) {
 
 RecordingSummary record(Scene& scene, const SensorSpec& spec, CounterRandom random,
                         const std::filesystem::path& file, const std::string& settings,
-                        const std::function<void()>& on_frame) {
+                        const std::function<void()>& on_frame,
+                        const std::function<void()>& before_publishing) {
   const ImageSize size = scene.frame().size;
   RecordingSummary summary;
   summary.name = file.stem().string();
@@ -80,7 +81,7 @@ RecordingSummary record(Scene& scene, const SensorSpec& spec, CounterRandom rand
     summary.events += std::ssize(events);
     summary.duration_s += scene.time_s() - std::exchange(from_s, scene.time_s());
   }
-  writer->commit();
+  writer->commit(before_publishing);
   return summary;
 }
 
@@ -208,14 +209,21 @@ void run(SourceWork& work, const SimulationManifest& manifest, bool overwrite,
   for (const PlannedRecording& recording : work.to_do) {
     const CounterRandom random = CounterRandom(manifest.seed).keyed(recording.name);
     const auto scene = make_scene(work, recording, random);
+    std::optional<AtomicFile> labels;
     if (work.stills) {
-      const std::string labels = work.stills->labels(recording.image.value());
-      // Never new labels beside an old recording, even if this ends here.
-      if (overwrite && fs::remove(recording.file)) sync_to_disk(recording.file.parent_path());
-      write_file_atomically(labels_beside(recording.file), labels);
+      labels.emplace(labels_beside(recording.file)).create();
+      labels->write(work.stills->labels(recording.image.value()));
+      labels->sync();
     }
+    // Both are on disk by then, so that a full disk costs nothing of what is there. Never new
+    // labels beside an old recording, even if this ends here.
+    const auto publish_labels = [&] {
+      if (!labels) return;
+      if (overwrite && fs::remove(recording.file)) sync_to_disk(recording.file.parent_path());
+      labels->publish();
+    };
     work.made.push_back(record(*scene, manifest.sensor, random.keyed("sensor"), recording.file,
-                               recording.settings, on_frame));
+                               recording.settings, on_frame, publish_labels));
   }
 }
 

@@ -119,6 +119,10 @@ bool passed(std::chrono::steady_clock::time_point since, double minutes) {
   return std::chrono::steady_clock::now() - since >= std::chrono::duration<double>(minutes * 60);
 }
 
+TrainingFolder folder_of(const TrainingManifest& manifest, const TrainingOptions& options) {
+  return {options.output.value_or(manifest.directory / manifest.output_directory)};
+}
+
 }  // namespace
 
 TrainingRun::TrainingRun(const TrainingManifest& manifest, const TrainingOptions& options)
@@ -127,7 +131,7 @@ TrainingRun::TrainingRun(const TrainingManifest& manifest, const TrainingOptions
       threads_(use_training_threads(options.threads)),
       source_(manifest, open_all(manifest)),
       trainer_(manifest, options.device),
-      folder_{options.output.value_or(manifest.directory / manifest.output_directory)},
+      folder_(folder_of(manifest, options)),
       generator_records_(manifest, folder_),
       settings_(training_settings(manifest, source_.recordings())),
       environment_(training_environment(options.device)),
@@ -284,6 +288,7 @@ double TrainingRun::total_seconds() const {
 }
 
 TrainingReport run_training(const TrainingManifest& manifest, const TrainingOptions& options) {
+  folder_of(manifest, options).require_own(options.overwrite);
   return TrainingRun(manifest, options).run();
 }
 

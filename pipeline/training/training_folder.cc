@@ -10,9 +10,13 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "manifests/files/atomic_file.h"
+#include "manifests/files/own_file.h"
 #include "manifests/files/unfinished_files.h"
+#include "manifests/values/faults.h"
 
 namespace eventgan {
 
@@ -34,7 +38,40 @@ bool is_image(std::string_view name) {
   return !name.empty() && name.find_first_not_of("0123456789") == name.npos;
 }
 
+/// All that a training writes and removes, the checkpoints first: without them nothing goes on from
+/// the rest.
+std::vector<std::pair<fs::path, OwnFile>> files_of(const TrainingFolder& folder) {
+  std::vector<std::pair<fs::path, OwnFile>> files;
+  for (const char* name : {"latest", "previous", "next", "damaged"}) {
+    files.emplace_back(folder.checkpoints() / (std::string(name) + ".safetensors"),
+                       OwnFile::kCheckpoint);
+  }
+  files.insert(files.end(), {{folder.losses(), OwnFile::kTrainingTable},
+                             {folder.curves(), OwnFile::kChart},
+                             {folder.validation(), OwnFile::kValidationTable},
+                             {folder.latest_weights(), OwnFile::kWeights},
+                             {folder.weights(), OwnFile::kWeights}});
+  return files;
+}
+
 }  // namespace
+
+void TrainingFolder::require_own(bool overwrite) const {
+  require_replaceable(lock(), OwnFile::kTrainingLock);
+  fs::path result;
+  bool has_checkpoints = false;
+  for (const auto& [file, kind] : files_of(*this)) {
+    require_replaceable(file, kind);
+    if (!fs::exists(file)) continue;
+    if (kind == OwnFile::kCheckpoint) has_checkpoints = true;
+    result = file;
+  }
+  if (overwrite || has_checkpoints || result.empty()) return;
+  throw UsageError(
+      "expected a training's checkpoints, or an empty folder, got results without "
+      "checkpoints, in " +
+      result.string() + " (--overwrite starts again; or choose another folder)");
+}
 
 void TrainingFolder::prepare() const {
   require_own_folders(*this);
@@ -47,12 +84,7 @@ void TrainingFolder::prepare() const {
 void TrainingFolder::discard() const {
   require_own_folders(*this);
   // The checkpoints first: without them nothing goes on from the rest.
-  for (const fs::path& file :
-       {checkpoints() / "latest.safetensors", checkpoints() / "previous.safetensors",
-        checkpoints() / "next.safetensors", checkpoints() / "damaged.safetensors", losses(),
-        curves(), validation(), latest_weights(), weights()}) {
-    fs::remove(file);
-  }
+  for (const auto& [file, kind] : files_of(*this)) fs::remove(file);
   if (!fs::is_directory(images())) return;
   for (const auto& entry : fs::directory_iterator(images())) {
     if (is_image(entry.path().filename().string())) fs::remove(entry.path());

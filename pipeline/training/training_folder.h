@@ -28,6 +28,11 @@ struct TrainingFolder {
   /// std::runtime_error if one of them below `root` is a symbolic link (require_no_link).
   void prepare() const;
 
+  /// To be asked before anything is written. Throws UsageError if a person's file has the name of
+  /// one that a training writes; and, unless `overwrite`, if results are there without checkpoints:
+  /// nothing says then whose weights they are.
+  void require_own(bool overwrite) const;
+
   /// Deletes all of the above that is there; other files are left alone. Throws as `prepare` does,
   /// before anything is deleted.
   void discard() const;

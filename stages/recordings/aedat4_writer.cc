@@ -211,11 +211,13 @@ std::optional<std::string> aedat4_settings(const std::filesystem::path& path) {
   return found.text().as_string();
 }
 
-void Aedat4Writer::commit() {
+void Aedat4Writer::commit(const std::function<void()>& before_publishing) {
   file_->write_events();
   const std::int64_t table_byte = file_->end_byte;
   file_->write_table();
   file_->output.overwrite(0, file_->header(table_byte));
+  file_->output.sync();
+  if (before_publishing) before_publishing();
   file_->output.publish();
 }
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -41,7 +42,8 @@ class Aedat4Writer {
   /// exposure. Throws std::invalid_argument if these rules are broken; then nothing was added.
   void add_frame(std::int64_t t_us, std::span<const std::uint8_t> pixels);
 
-  void commit();
+  /// `before_publishing` as of MvsecWriter.
+  void commit(const std::function<void()>& before_publishing = {});
 
  private:
   struct File;

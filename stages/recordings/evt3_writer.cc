@@ -50,12 +50,14 @@ void Evt3Writer::add_events(std::span<const StampedEvent> events) {
   }
 }
 
-void Evt3Writer::commit(std::int64_t end_us) {
+void Evt3Writer::commit(std::int64_t end_us, const std::function<void()>& before_publishing) {
   if (end_us < last_us_) {
     throw std::invalid_argument("expected an end that is not before the last event");
   }
   go_to(end_us);
   write_if_full(0);
+  file_.sync();
+  if (before_publishing) before_publishing();
   file_.publish();
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -37,8 +38,8 @@ class Evt3Writer {
   void add_events(std::span<const StampedEvent> events);
 
   /// Publishes the file of a recording that lasts until `end_us`, not before its last event: its
-  /// last word is of that time.
-  void commit(std::int64_t end_us);
+  /// last word is of that time. `before_publishing` as of MvsecWriter.
+  void commit(std::int64_t end_us, const std::function<void()>& before_publishing = {});
 
  private:
   void put(unsigned type, std::int64_t value);

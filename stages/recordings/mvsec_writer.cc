@@ -182,12 +182,14 @@ void MvsecWriter::add_frame(const GreyImage& frame, double time_s,
   file_->event_index.push_back(file_->event_count - 1);
 }
 
-void MvsecWriter::commit() {
+void MvsecWriter::commit(const std::function<void()>& before_publishing) {
   const std::filesystem::path& target = file_->hdf5.target();
   if (file_->times_s.empty()) {
     throw std::logic_error("expected at least one frame, got none, in " + target.string());
   }
   file_->write([&] { file_->close(); });
+  naming(target, [&] { file_->hdf5.output().sync(); });
+  if (before_publishing) before_publishing();
   naming(target, [&] { file_->hdf5.output().publish(); });
   file_->committed = true;
 }

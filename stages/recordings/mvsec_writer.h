@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -40,8 +41,10 @@ class MvsecWriter {
   /// Throws std::invalid_argument if these rules are broken; then nothing was added.
   void add_frame(const GreyImage& frame, double time_s, const FlowField* flow_from_previous);
 
-  /// Publishes the file; std::logic_error if it has no frame.
-  void commit();
+  /// Publishes the file; std::logic_error if it has no frame. `before_publishing` is called once
+  /// all is on disk under the temporary name: what it throws ends this, and the target is what it
+  /// was.
+  void commit(const std::function<void()>& before_publishing = {});
 
  private:
   struct File;

@@ -204,6 +204,46 @@ class ForeignFolders(program.InFolder):
         self.assertEqual(snapshot(self.scratch),
                          {mine.relative_to(self.scratch): b"mine", taken.relative_to(self.scratch): b"a file"})
 
+    def test_no_command_replaces_a_persons_file(self):
+        """Each command that writes, where a person's files have the names of what it writes: refused, and no byte and no
+        time has changed."""
+        job, taken = self.folder / "job" / "manifest.json", self.folder / "taken"
+        weights = program.SOURCE / "manifests" / "weights" / "eventgan-8.safetensors"
+        results = ["dataset.json", "dataset.h5", "run.json", "plan.json", "amendments.json", "report.html", "plan.index"]
+        shards = [path.name for path in sorted(self.out.glob("*-of-*"))]
+        of_job = {name: [["convert", job, "--output", taken], ["convert", job, "--output", taken, "--overwrite"],
+                         ["convert", job, "--output", taken, "--no-finalize"],
+                         ["plan", "--freeze", job, "--output", taken]] for name in results}
+        of_job.update({name: [["convert", job, "--output", taken]] for name in shards})
+        of_job["page.html"] = [["report", self.out, "--out", taken / "page.html"]]
+        of_job["plan.json"] += [["report", self.out, "--out", taken / "plan.json"]]
+        of_job["w.safetensors"] = [["import-weights", weights, taken / "w.safetensors"]]
+        of_job["sensor.json"] = [["fit", self.out, "--out", taken / "sensor.json"]]
+        of_job["trace.json"] = [["convert", job, "--output", taken, "--profile", taken / "trace.json"]]
+        of_job["sheet.png"] = [["preview", self.out, "--out", taken, "--sheet"]]
+        of_job[shards[0].replace(".h5", "_0000.png").replace(".json", "_0000.png")] = [
+            ["preview", self.out, "--out", taken, "--count", "99"]]
+        for name in ["tradeoff.json", "tradeoff.md", "tradeoff.svg"]:
+            of_job[name] = [["tradeoff", job, "--out", taken, "--methods", "difference,esim"]]
+        for name, lines in of_job.items():
+            for arguments in lines:
+                with self.subTest(file=name, command=" ".join(map(str, arguments))):
+                    taken.mkdir()
+                    (taken / name).write_bytes(b'{"mine": [1, 2]}')
+                    before = {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in taken.iterdir()}
+                    self.assertIn(str(taken / name), self.one_line(*arguments, codes=(64,)))
+                    self.assertEqual({path: (path.stat().st_mtime_ns, path.read_bytes()) for path in taken.iterdir()},
+                                     before)
+                shutil.rmtree(taken, ignore_errors=True)
+        for name in results[:2]:  # in the folder of a job that is done
+            shutil.rmtree(taken, ignore_errors=True)
+            shutil.copytree(self.out, taken)
+            (taken / name).write_text("mine")
+            before = snapshot(taken)
+            for arguments in [["finalize", taken], ["retry", taken]]:
+                self.assertIn(str(taken / name), self.one_line(*arguments, codes=(64,)))
+                self.assertEqual(snapshot(taken), before)
+
 
 if __name__ == "__main__":
     program.main()

@@ -84,8 +84,9 @@ ImageSize image_file_size(const std::filesystem::path& file,
                           ImageOrientation orientation = ImageOrientation::kStored);
 
 /// The bytes of a PNG, or of a JPEG of a quality of 1 to 100. Throw std::runtime_error if the image
-/// is empty or too large for the format. Thread safe.
-std::string encode_png(const ColourView& image);
+/// is empty or too large for the format. Thread safe. `is_drawn`: the PNG's text "Software" names
+/// the program, so that it knows its own pictures again (OwnFile::kPicture).
+std::string encode_png(const ColourView& image, bool is_drawn = false);
 std::string encode_jpeg(const ColourView& image, int quality);
 
 /// The bytes of a PNG of numbers [y, x], C order, as many as `size` has pixels: 8 bits with a

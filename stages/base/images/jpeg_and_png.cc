@@ -484,11 +484,17 @@ std::array<png_color, 256> index_palette() {
 
 }  // namespace
 
-std::string encode_png(const ColourView& image) {
+std::string encode_png(const ColourView& image, bool is_drawn) {
   const std::size_t row_bytes = 3 * static_cast<std::size_t>(image.size.width);
   return write_png(
       image.size, 8, PNG_COLOR_TYPE_RGB,
-      [](png_structp png, png_infop info) {
+      [&](png_structp png, png_infop info) {
+        char key[] = "Software", name[] = "eventgan";
+        png_text software{};
+        software.compression = PNG_TEXT_COMPRESSION_NONE;
+        software.key = key;
+        software.text = name;
+        if (is_drawn) png_set_text(png, info, &software, 1);
         // Many times faster than the best compression, and hardly larger for what is drawn.
         png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
         png_set_compression_level(png, 1);

@@ -70,6 +70,8 @@ class Mp4Writer {
     if (avcodec_open2(codec_, encoder, nullptr) < 0) made<AVCodecContext*>(nullptr);
 
     checked(avformat_alloc_output_context2(&format_, nullptr, "mp4", nullptr));
+    // So that the program knows its own videos again (OwnFile::kVideo).
+    checked(av_dict_set(&format_->metadata, "comment", "eventgan preview", 0));
     stream_ = made(avformat_new_stream(format_, nullptr));
     checked(avcodec_parameters_from_context(stream_->codecpar, codec_));
     stream_->time_base = codec_->time_base;

@@ -130,7 +130,8 @@ void write_comparison_png(std::span<const ComparedPair> pairs, const std::filesy
   }
   cv::Mat image;
   cv::vconcat(rows, image);
-  write_file_atomically(path, encode_png({{image.rows, image.cols}, image.data}));
+  write_file_atomically(path,
+                        encode_png({{image.rows, image.cols}, image.data}, /*is_drawn=*/true));
 }
 
 }  // namespace eventgan

@@ -9,7 +9,7 @@
 namespace eventgan {
 
 void write_png(const ColourFrame& image, const std::filesystem::path& path) {
-  write_file_atomically(path, encode_png({image.size, image.bgr.data()}));
+  write_file_atomically(path, encode_png({image.size, image.bgr.data()}, /*is_drawn=*/true));
 }
 
 std::string jpeg_of(const ColourFrame& image, std::size_t most_bytes) try {

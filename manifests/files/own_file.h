@@ -1,0 +1,42 @@
+#pragma once
+
+#include <filesystem>
+
+namespace eventgan {
+
+/// What the program writes where a person's files may be, and recognises again by what stands in
+/// it. The rows are in own_file.cc.
+enum class OwnFile {
+  kPlan,
+  kRunRecord,
+  kAmendments,
+  kEventIndex,
+  kShard,
+  kCommitRecord,
+  kDescription,
+  kView,
+  kReport,
+  kWeights,
+  kCheckpoint,
+  kTrainingLock,
+  kTrainingTable,
+  kValidationTable,
+  kChart,
+  kSensor,
+  kTradeoffReport,
+  kTradeoffTable,
+  kPicture,
+  kVideo,
+  kTrace,
+};
+
+/// Whether `file` may be written as `kind`: nothing is there, an empty file, or one that the
+/// program wrote as that kind. Of a damaged file what is left of it decides.
+bool is_replaceable(const std::filesystem::path& file, OwnFile kind);
+
+/// Throws UsageError "expected ..., or no file, got another file, in PATH" unless is_replaceable.
+/// Every command asks it of all that it is about to write, before it writes anything: no person's
+/// file is replaced or removed. Thread safe.
+void require_replaceable(const std::filesystem::path& file, OwnFile kind);
+
+}  // namespace eventgan
