@@ -9,7 +9,7 @@ namespace eventgan {
 /// manifests/schemas; made from the tables of the documents' fields (detail/fields.h).
 std::map<std::string, std::string> document_schemas();
 
-/// The page of all their keys, manifests/guides/keys.md, from the same tables.
+/// The page of all their keys, in Markdown, from the same tables: `eventgan help keys`.
 std::string keys_page();
 
 }  // namespace eventgan

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "manifests/documents/document_schemas.h"
 #include "manifests/values/faults.h"
 #include "pipeline/runtime/errors.h"
 
@@ -153,15 +154,20 @@ class WrappedHelp : public CLI::Formatter {
 void wrap_help(CLI::App& app) { app.formatter(std::make_shared<WrappedHelp>()); }
 
 void add_help_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("help", "Show the help of the program or of a command");
+  auto* command = app.add_subcommand(
+      "help",
+      "Show the help of the program or of a command\n`help keys` lists every key of the "
+      "manifests, with its values and its default.");
   const auto name = std::make_shared<std::string>();
-  command->add_option("COMMAND", *name, "The command; default: list all commands");
+  command->add_option("COMMAND", *name, "The command, or keys; default: list all commands");
   command->callback([&app, name, &exit_code] {
     const auto known =
         app.get_subcommands([&](const CLI::App* one) { return one->get_name() == *name; });
     if (name->empty()) {
       // App::help() would be that of the command that was given: this one's.
       std::cout << app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal);
+    } else if (*name == "keys") {
+      std::cout << keys_page();
     } else if (!known.empty()) {
       std::cout << known.front()->help(app.get_name());
     } else {

@@ -54,6 +54,12 @@ class CommandLine(program.InFolder):
         self.assertEqual(run("help", "verify"), run("verify", "--help"))
         self.assertEqual(run("help"), run("--help"))
 
+    def test_help_keys_lists_the_keys_of_all_documents(self):
+        page, _ = run("help", "keys")
+        for line in ["## eventgan job manifest, version 1", "| `sources[].root` | path | required | ",
+                     "| `recordings[].path` | path | required | ", "## eventgan sensor, version 1"]:
+            self.assertIn(f"\n{line}", page)
+
     def test_version_names_the_libraries(self):
         version, libraries, engines, processor = run("--version")[0].splitlines()
         self.assertRegex(version, r"^eventgan \d+\.\d+\.\d+$")

@@ -29,8 +29,6 @@ TEST(DocumentSchemas, AreThoseOfTheTree) {
   for (const auto& [name, schema] : document_schemas()) expect_in_tree("schemas/" + name, schema);
 }
 
-TEST(KeysPage, IsThatOfTheTree) { expect_in_tree("guides/keys.md", keys_page()); }
-
 TEST(KeysPage, HasARowForEachKey) {
   EXPECT_THAT(
       keys_page(),
