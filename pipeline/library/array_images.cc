@@ -1,5 +1,7 @@
 #include "pipeline/library/array_images.h"
 
+#include <fmt/core.h>
+
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -44,8 +46,8 @@ std::vector<std::uint8_t> packed(const eventgan_images& images, const std::byte*
           T value;
           std::memcpy(&value, at, sizeof(value));
           throw UsageError("expected floating-point numbers from 0 to 1, got " +
-                           std::to_string(static_cast<double>(value)) + " at row " +
-                           std::to_string(y) + ", column " + std::to_string(x) + " of " + name);
+                           fmt::format("{}", value) + " at row " + std::to_string(y) + ", column " +
+                           std::to_string(x) + " of " + name);
         }
         *level++ = *found;
       }

@@ -1,5 +1,7 @@
 #include "pipeline/library/eventgan.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -38,6 +40,9 @@ struct eventgan_generator {
 
 namespace eventgan {
 namespace {
+
+/// 4 GiB of float32: what a manifest's volume stays below.
+constexpr std::uint64_t kMostVolumeValues = std::uint64_t{1} << 30;
 
 /// Of a thread's last call.
 thread_local std::string last_error;
@@ -304,16 +309,21 @@ int eventgan_sample_events(const float* volume, int32_t bins, int32_t height, in
                        ", " + std::to_string(height) + " and " + std::to_string(width));
     }
     if (!(duration_s > 0) || !std::isfinite(duration_s)) {
-      throw UsageError("expected a duration above 0 s, got " + std::to_string(duration_s));
+      throw UsageError("expected a duration above 0 s, got " + fmt::format("{}", duration_s));
     }
     required(events, "a place for the events");
     required(count, "a place for their number");
+    if (2.0 * bins * height * width > static_cast<double>(kMostVolumeValues)) {
+      throw UsageError(
+          fmt::format("expected a volume of at most {} values, got one of 2 x {} bins and {} x {}",
+                      kMostVolumeValues, bins, height, width));
+    }
     const VolumeShape shape{bins, {height, width}};
     const std::span<const float> values(volume, shape.value_count());
     if (!values.empty()) required(volume, "a volume");
     const std::size_t unsound = first_unsound_value(values);
     if (unsound < values.size()) {
-      throw UsageError("expected finite values >= 0, got " + std::to_string(values[unsound]));
+      throw UsageError("expected finite values >= 0, got " + fmt::format("{}", values[unsound]));
     }
     // They are gathered, sorted with as much room beside them, and copied for the caller.
     const double count_about = std::accumulate(values.begin(), values.end(), 0.0);
@@ -343,6 +353,10 @@ int eventgan_decode(const void* chunk, uint64_t chunk_size, int32_t number_size,
     const auto type = std::ranges::find(kTypes, static_cast<std::size_t>(number_size), stored_size);
     if (number_size < 0 || type == kTypes.end()) {
       throw UsageError("expected numbers of 1, 2 or 4 bytes, got " + std::to_string(number_size));
+    }
+    if (size > kMostVolumeValues) {
+      throw UsageError(fmt::format("expected a volume of at most {} values, got one of {}",
+                                   kMostVolumeValues, size));
     }
     const auto* const bytes = static_cast<const std::byte*>(required(chunk, "a chunk"));
     if (!decode_volume({bytes, chunk_size}, *type, is_deflated ? 1 : 0, scale,

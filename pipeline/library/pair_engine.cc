@@ -1,5 +1,7 @@
 #include "pipeline/library/pair_engine.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <limits>
 #include <new>
@@ -119,7 +121,7 @@ MadeVolume PairEngine::make(const ImagePairs& pairs, std::size_t index, const Kn
   }
   if (!is_sound) {
     throw std::runtime_error("expected finite values >= 0, got " +
-                             std::to_string(values[first_unsound_value(values)]) +
+                             fmt::format("{}", values[first_unsound_value(values)]) +
                              " in the generated volume");
   }
   if (values.data() != volume.data()) lay_into(values, pair, volume);

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import ctypes
 import os
 
@@ -55,8 +54,9 @@ for _name, _result, _arguments in [
     _function = getattr(lib, f"eventgan_{_name}")
     _function.restype, _function.argtypes = _result, _arguments
 
-# A daemon thread goes on while Python ends; the library is taken down behind that.
-atexit.register(lib.eventgan_end)
+# A daemon thread goes on while Python ends; the library is taken down behind that, and behind all handlers of `atexit`,
+# of which one may join a thread that still calls.
+ctypes.pythonapi.Py_AtExit(lib.eventgan_end)
 
 
 def check(code: int) -> None:

@@ -271,6 +271,8 @@ class Generator:
         labels = _engine.Labels(box_count=-1, person_count=-1)
         if boxes is not None:
             boxes = _numbers(boxes, "boxes")
+            if boxes.shape == (0,):  # an empty list
+                boxes = boxes.reshape(0, 4)
             if boxes.ndim != 2 or boxes.shape[1] != 4:
                 raise ValueError(f"expected boxes [n, 4], got shape {_engine.shape_text(boxes)}")
             clipped, unclipped = np.empty(boxes.shape), np.empty(boxes.shape)
@@ -279,6 +281,8 @@ class Generator:
             sample["boxes"] = {"xyxy": clipped, "xyxy_unclipped": unclipped}
         if joints is not None:
             joints = _numbers(joints, "joints")
+            if joints.shape == (0,):
+                joints = joints.reshape(0, 0, 2)
             if joints.ndim != 3 or joints.shape[2] != 2:
                 raise ValueError(f"expected joints [P, J, 2], got shape {_engine.shape_text(joints)}")
             sample["joints"] = np.empty(joints.shape)

@@ -65,9 +65,19 @@ void refuse_corrupt_data(j_common_ptr codec, int level) {
   if (!harmless) leave_with_message(codec);
 }
 
+/// A scan takes as long as an image, whatever few bytes it has: libjpeg-turbo advises a limit. The
+/// largest that encoders write is about a dozen.
+void refuse_many_scans(j_common_ptr codec) {
+  constexpr int kMostScans = 500;
+  const int scans = reinterpret_cast<j_decompress_ptr>(codec)->input_scan_number;
+  if (scans <= kMostScans) return;
+  static_cast<Escape*>(codec->client_data)->leave("expected a JPEG of at most 500 scans, got more");
+}
+
 class JpegFile {
  public:
   explicit JpegFile(std::FILE* file) {
+    progress_.progress_monitor = refuse_many_scans;
     codec_.err = jpeg_std_error(&errors_);
     errors_.error_exit = leave_with_message;
     errors_.emit_message = refuse_corrupt_data;
@@ -75,6 +85,7 @@ class JpegFile {
     try {
       run_guarded(escape_, [&] {
         jpeg_create_decompress(&codec_);
+        codec_.progress = &progress_;
         jpeg_stdio_src(&codec_, file);
       });
     } catch (...) {
@@ -129,6 +140,7 @@ class JpegFile {
  private:
   jpeg_decompress_struct codec_{};
   jpeg_error_mgr errors_{};
+  jpeg_progress_mgr progress_{};
   Escape escape_;
 };
 

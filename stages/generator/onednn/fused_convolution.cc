@@ -53,6 +53,8 @@ dnnl::convolution_forward::primitive_desc describe(const ConvolutionSetup& setup
 
   dnnl::primitive_attr attributes;
   attributes.set_scratchpad_mode(dnnl::scratchpad_mode::user);
+  // Else the environment (ONEDNN_DEFAULT_FPMATH_MODE) may turn float32 into bfloat16.
+  attributes.set_fpmath_mode(dnnl::fpmath_mode::strict);
   attributes.set_post_ops(post_operations(setup));
   return describe_convolution(layouts, numbers, attributes, engine);
 }

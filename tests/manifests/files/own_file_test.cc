@@ -80,7 +80,8 @@ TEST(OwnFile, AMarkMayLieAnywhere) {
   const TemporaryFolder folder;
   const auto file = folder.path() / "a.h5";
   // Across the end of a block of 1 MiB, in which the file is read, and far behind it.
-  for (const std::size_t place : {std::size_t{8}, (std::size_t{1} << 20) - 5, std::size_t{5} << 20}) {
+  for (const std::size_t place :
+       {std::size_t{8}, (std::size_t{1} << 20) - 5, std::size_t{5} << 20}) {
     std::string bytes(place, '.');
     bytes.replace(0, kHdf5.size(), kHdf5);
     write_file(file, bytes);

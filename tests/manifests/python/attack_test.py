@@ -69,6 +69,32 @@ time.sleep(float(sys.argv[1]))
 print("done", flush=True)
 """
 
+JOINED_AT_THE_END = """
+import atexit, queue, sys, threading
+import numpy as np
+
+def finish():
+    images.put(None)
+    worker.join()
+    assert len(made) == 30
+    print("done", flush=True)
+
+def work():
+    while (image := images.get()) is not None:
+        made.append(generator(image, image))
+
+if sys.argv[1] == "before":
+    atexit.register(finish)
+import eventgan
+generator = eventgan.Generator(kind="difference")
+if sys.argv[1] == "after":
+    atexit.register(finish)
+images, made, worker = queue.Queue(), [], threading.Thread(target=work, daemon=True)
+worker.start()
+for _ in range(30):
+    images.put(np.zeros((16, 16), np.uint8))
+"""
+
 INTERRUPT = """
 done = True
 for thread in threads:
@@ -121,6 +147,12 @@ def test_forks_while_other_threads_compute():
 @pytest.mark.parametrize("after_s", [0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5])
 def test_python_ends_while_daemon_threads_compute(after_s):
     run(END, after_s)
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_a_handler_at_the_end_may_join_a_thread_that_calls(when):
+    """Whether it was registered before the package was loaded or after."""
+    run(JOINED_AT_THE_END, when, set_up="")
 
 
 @pytest.mark.parametrize("threads", [1, 3])

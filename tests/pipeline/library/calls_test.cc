@@ -6,9 +6,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -164,6 +166,32 @@ TEST(Decoding, GivesTheValuesOfAChunk) {
   chunk.clear();
   EXPECT_NE(decode(1, 0, 1), EVENTGAN_COMPLETE);
   EXPECT_EQ(eventgan_decode(nullptr, 6, 1, 0, 1, volume.data(), 2), EVENTGAN_USAGE);
+  // Sizes whose bytes are more than 2^64 count as what is left of them: as none here.
+  const std::array<std::byte, 4> zeros{};
+  for (const std::uint64_t size : {std::uint64_t{1} << 62, std::uint64_t{1} << 63}) {
+    for (const int number_size : {1, 2, 4}) {
+      EXPECT_EQ(eventgan_decode(zeros.data(), zeros.size(), number_size, 0, 1, volume.data(), size),
+                EVENTGAN_USAGE)
+          << size;
+    }
+  }
+}
+
+/// 2 bins h w is 2^64, so 0 values; twice the bins is beyond an int.
+TEST(SampledEvents, AreOfAVolumeThatFitsIntoMemory) {
+  eventgan_event* events = nullptr;
+  std::uint64_t count = 0;
+  for (const auto& [bins, height, width] :
+       {std::array{1 << 29, 1 << 17, 1 << 17}, std::array{1 << 30, 1 << 17, 1 << 17},
+        std::array{0x7fffffff, 1, 1}, std::array{9, 46341, 46341}}) {
+    const float value = 0;
+    EXPECT_EQ(eventgan_sample_events(&value, bins, height, width, 1, 0, 0, &events, &count),
+              EVENTGAN_USAGE)
+        << bins;
+  }
+  const float value = -1e-45f;
+  EXPECT_EQ(eventgan_sample_events(&value, 1, 1, 1, 1, 0, 0, &events, &count), EVENTGAN_USAGE);
+  EXPECT_STREQ(eventgan_error(), "expected finite values >= 0, got -1e-45");
 }
 
 TEST_F(Calls, MakeNoMoreThanTheyAreAskedFor) {

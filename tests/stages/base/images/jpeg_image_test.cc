@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cstdio>
+#include <cstdlib>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -9,6 +12,11 @@
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+
+// jpeglib.h needs <cstddef> and <cstdio> above it.
+// clang-format off
+#include <jpeglib.h>
+// clang-format on
 
 namespace eventgan {
 namespace {
@@ -54,6 +62,47 @@ INSTANTIATE_TEST_SUITE_P(
                       JpegKind{"progressive", {64, 96}, CV_8UC3, {cv::IMWRITE_JPEG_PROGRESSIVE, 1}},
                       JpegKind{"restarts", {64, 96}, CV_8UC3, {cv::IMWRITE_JPEG_RST_INTERVAL, 2}}),
     [](const auto& param) { return param.param.name; });
+
+/// A progressive JPEG of 8x8 grey pixels: the mean, then each of `bands` frequencies bit by bit,
+/// from the 11th down: 11 scans a band.
+std::string jpeg_of_scans(int bands) {
+  std::vector<jpeg_scan_info> scans{{1, {0}, 0, 0, 0, 0}};
+  for (int band = 1; band <= bands; ++band) {
+    scans.push_back({1, {0}, band, band, 0, 10});
+    for (int bit = 9; bit >= 0; --bit) scans.push_back({1, {0}, band, band, bit + 1, bit});
+  }
+  jpeg_compress_struct codec{};
+  jpeg_error_mgr errors{};
+  codec.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&codec);
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&codec, &bytes, &size);
+  codec.image_width = codec.image_height = 8;
+  codec.input_components = 1;
+  codec.in_color_space = JCS_GRAYSCALE;
+  jpeg_set_defaults(&codec);
+  codec.scan_info = scans.data();
+  codec.num_scans = static_cast<int>(scans.size());
+  jpeg_start_compress(&codec, TRUE);
+  std::array<JSAMPLE, 8> pixels{0, 30, 60, 90, 120, 150, 180, 210};
+  JSAMPROW row = pixels.data();
+  while (codec.next_scanline < codec.image_height) jpeg_write_scanlines(&codec, &row, 1);
+  jpeg_finish_compress(&codec);
+  std::string jpeg(reinterpret_cast<const char*>(bytes), size);
+  jpeg_destroy_compress(&codec);
+  std::free(bytes);
+  return jpeg;
+}
+
+TEST(JpegImage, MoreScansThanAnyEncoderWritesAreRefused) {
+  const TemporaryFolder folder;
+  write_file(folder / "few.jpg", jpeg_of_scans(45));   // 496
+  write_file(folder / "many.jpg", jpeg_of_scans(63));  // 694
+  EXPECT_EQ(why_jpeg_refused(folder / "few.jpg"), "");
+  EXPECT_EQ(why_jpeg_refused(folder / "many.jpg"),
+            "expected a JPEG of at most 500 scans, got more");
+}
 
 TEST(JpegImage, EveryTruncationIsRefused) {
   for (const int progressive : {0, 1}) {
