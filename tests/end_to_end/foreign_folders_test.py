@@ -209,7 +209,8 @@ class ForeignFolders(program.InFolder):
         time has changed."""
         job, taken = self.folder / "job" / "manifest.json", self.folder / "taken"
         weights = program.SOURCE / "manifests" / "weights" / "eventgan-8.safetensors"
-        results = ["dataset.json", "dataset.h5", "run.json", "plan.json", "amendments.json", "report.html", "plan.index"]
+        results = ["dataset.json", "dataset.h5", "run.json", "plan.json", "amendments.json", "report.html",
+                   "plan.index"]
         shards = [path.name for path in sorted(self.out.glob("*-of-*"))]
         of_job = {name: [["convert", job, "--output", taken], ["convert", job, "--output", taken, "--overwrite"],
                          ["convert", job, "--output", taken, "--no-finalize"],
@@ -230,10 +231,9 @@ class ForeignFolders(program.InFolder):
                 with self.subTest(file=name, command=" ".join(map(str, arguments))):
                     taken.mkdir()
                     (taken / name).write_bytes(b'{"mine": [1, 2]}')
-                    before = {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in taken.iterdir()}
+                    before = snapshot(taken), (taken / name).stat().st_mtime_ns
                     self.assertIn(str(taken / name), self.one_line(*arguments, codes=(64,)))
-                    self.assertEqual({path: (path.stat().st_mtime_ns, path.read_bytes()) for path in taken.iterdir()},
-                                     before)
+                    self.assertEqual((snapshot(taken), (taken / name).stat().st_mtime_ns), before)
                 shutil.rmtree(taken, ignore_errors=True)
         for name in results[:2]:  # in the folder of a job that is done
             shutil.rmtree(taken, ignore_errors=True)

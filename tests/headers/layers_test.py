@@ -75,7 +75,8 @@ class Layers(unittest.TestCase):
 
     def test_detail_is_private_to_its_room(self):
         self.assertEqual([f"{file} includes {included}" for file, included in includes()
-                          if "/detail/" in included and included[0] != "<" and room_of(file) != room_of(included)], [])
+                          if "/detail/" in included and included[0] != "<"
+                          and room_of(file) != room_of(included)], [])
 
     def test_public_headers_bring_no_heavy_library(self):
         self.assertEqual([f"{file} includes {included}" for file, included in includes()
