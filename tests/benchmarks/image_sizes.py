@@ -1,12 +1,10 @@
-#!/usr/bin/python3
 """The whole conversion against the size of the volumes: processor time a pair, and peak memory."""
 
 import dataclasses
 
-from measuring.bench import run_part
 from measuring.conversion import Job, convert, pair_cost
 from measuring.frames import link_frames, original_frames
-from measuring.report import Curves, Section, Table, number
+from measuring.report import Part, Table
 from measuring.spread import rotated, spread
 
 
@@ -28,7 +26,7 @@ SETTINGS = {
 
 def measure(bench):
     settings = SETTINGS[bench.effort]
-    originals, what = original_frames(bench)
+    originals, _ = original_frames(bench)
     folders = [link_frames(bench.scratch / f"sizes-{pairs}", originals, pairs + 1)
                for pairs in (settings.few, settings.many)]
     costs = {size: [] for size in settings.sizes}
@@ -39,22 +37,10 @@ def measure(bench):
             costs[size].append(pair_cost(few, many))
             peaks[size].append(many.peak_mb)
 
-    table = Table(["height x width", "ms a pair", "of them the generator's", "ns a pixel", "peak MB"])
-    lines = {"whole": [], "generator": []}
+    table = Table("image_sizes", ["size", "ms a pair", "of them the generator's", "ns a pixel", "peak MB"])
     for size in settings.sizes:
-        pixels = size[0] * size[1]
         whole = spread([1e3 * cost.cpu_s for cost in costs[size]])
         generator = spread([1e3 * cost.stage_s["generate"] for cost in costs[size]])
-        table.add(f"{size[0]}x{size[1]}", whole.median_and_quartiles(), number(generator.median),
-                  number(1e6 * whole.median / pixels), number(max(peaks[size])))
-        lines["whole"].append((pixels, whole.median))
-        lines["generator"].append((pixels, generator.median))
-    text = (f"{what}, {settings.weights} in float32, uint8, deflate level 1, one thread; {settings.many} pairs less "
-            f"{settings.few}, {settings.rounds} rounds. Processor milliseconds.")
-    return Section("Against the image's size", text, [table],
-                   [Curves(f"Cost of a pair, {settings.weights}, float32", "pixels", "processor ms", lines,
-                           logarithmic=True)])
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+        table.add(f"{size[0]}x{size[1]}", whole, generator.median, 1e6 * whole.median / (size[0] * size[1]),
+                  max(peaks[size]))
+    return Part([table])

@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 """One generator a core with a thread each, against fewer generators with more threads: what a pair takes on all cores.
 
 The program always does the former, since the last bits of a convolution depend on the number of threads within it. Only
@@ -9,11 +8,10 @@ import contextlib
 import dataclasses
 
 from engines import engine_command, play_rounds
-from measuring.bench import run_part
 from measuring.contender import Contender, ContenderFailed
 from measuring.cores import usable
 from measuring.frames import write_input
-from measuring.report import Section, Table, number
+from measuring.report import Part, Table
 from measuring.spread import spread
 
 ENGINES = [("torch", "float32")]
@@ -54,8 +52,8 @@ def start(bench, width, cores, stack):
 def measure(bench):
     settings = SETTINGS[bench.effort]
     cores = len(usable())
-    table = Table(["size and engine", "generators", "threads of each", "wall ms a pair", "times one generator a core",
-                   "busy cores"])
+    table = Table("intra_op", ["size", "engine", "generators", "threads of each", "wall ms a pair",
+                               "times one generator a core", "busy cores"])
     with contextlib.ExitStack() as stack:
         contenders = start(bench, settings.width, cores, stack)
         for size in settings.sizes:
@@ -69,12 +67,6 @@ def measure(bench):
                 ratio = spread([(base["wall_ms"] / cores) / (one["wall_ms"] / generators)
                                 for base, one in zip(whole, rounds)])
                 busy = spread([one["cpu_ms"] / one["wall_ms"] for one in rounds])
-                table.add(f"{size[0]}x{size[1]} {engine} {precision}", generators, threads, wall.median_and_quartiles(),
-                          ratio.median_and_quartiles(), number(busy.median, 2))
-    text = (f"All {cores} cores, base width {settings.width}, {settings.rounds} rounds. busy cores: processor time "
-            "over wall time; near 1 where several threads were allowed, the engine did not take them.")
-    return Section("Generators against threads within one", text, [table])
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+                table.add(f"{size[0]}x{size[1]}", f"{engine} {precision}", generators, threads, wall, ratio,
+                          busy.median)
+    return Part([table])

@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 """Where the `onednn` engine's time goes: by kind of layer, and what is left for the engine's own loops, at several
 widths.
 
@@ -14,13 +13,12 @@ import statistics
 import subprocess
 
 from engines import engine_command
-from measuring.bench import run_part
 from measuring.calibration import NotCalibrated, calibrated
 from measuring.contender import ENVIRONMENT
 from measuring.cores import pin_to
 from measuring.frames import write_input
 from measuring.machine import native_precisions
-from measuring.report import Section, Table, number
+from measuring.report import Part, Table
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,32 +87,20 @@ def measure_passes(bench, settings, weights, precision):
 
 def measure(bench):
     settings = SETTINGS[bench.effort]
-    tables = []
+    table = Table("layers", ["weights", "precision", "layers", "ms", "10^9 multiply-adds a second"])
     for weights in settings.weights:
-        columns, cells = ["layers"], {kind: [] for kind in (*KINDS, OWN, "all")}
         for precision in native_precisions():
             try:
                 prepared = calibrated(bench, weights, settings.size) if precision == "int8" else weights
             except NotCalibrated:
                 continue
             totals, passes = measure_passes(bench, settings, prepared, precision)
-            columns += [f"{precision}: ms", "10^9 multiply-adds a second"]
             for kind in KINDS:
                 milliseconds = statistics.median(one[kind][0] for one in passes)
-                cells[kind] += [number(milliseconds), number(passes[0][kind][1] / milliseconds / 1e6) if milliseconds
-                                else ""]
+                table.add(weights, precision, kind, milliseconds,
+                          passes[0][kind][1] / milliseconds / 1e6 if milliseconds else "")
             convolutions = [sum(sums[0] for sums in one.values()) for one in passes]
-            cells[OWN] += [number(statistics.median(total - part for total, part in zip(totals, convolutions))), ""]
-            cells["all"] += [number(statistics.median(totals)), ""]
-        table = Table(columns, caption=weights)
-        for name, values in cells.items():
-            table.add(name, *values)
-        tables.append(table)
-    text = (f"{settings.size[0]}x{settings.size[1]}, one core, medians of {settings.passes} passes. oneDNN's own times "
-            "of its convolutions (ONEDNN_VERBOSE), the rest by difference: combining phases, rounding and planes, and "
-            "of width 8 all that happens at full resolution.")
-    return Section("Layers", text, tables)
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+            table.add(weights, precision, OWN,
+                      statistics.median(total - part for total, part in zip(totals, convolutions)), "")
+            table.add(weights, precision, "all", statistics.median(totals), "")
+    return Part([table])

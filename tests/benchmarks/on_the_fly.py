@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 """What a training gets of volumes: made on the fly by FramePairs, or read from shards,
 by one and by two workers of a DataLoader."""
 
@@ -11,12 +10,11 @@ import time
 import torch
 from torch.utils.data import DataLoader, Dataset
 
-from measuring.bench import run_part
 from measuring.calibration import NotCalibrated, calibrated
 from measuring.conversion import Job, convert
 from measuring.frames import link_frames, original_frames, small_copies
 from measuring.machine import native_precisions
-from measuring.report import Section, Table
+from measuring.report import Part, Table
 from measuring.spread import rotated, spread
 
 WEIGHTS = "shipped:8"
@@ -67,27 +65,27 @@ def measure(bench):
     try:
         from eventgan import Generator, Shards
     except ImportError as error:
-        return Section("On the fly", f"Skipped: {error}", [])
+        return Part([], {"on_the_fly": str(error)})
     from eventgan.torch import FramePairs, HalfVolumes
 
-    originals, what = original_frames(bench)
+    originals, _ = original_frames(bench)
     folders = {"as they are": link_frames(bench.scratch / "frames", originals, settings.pairs + 1)}
     small = small_copies(bench.scratch / "small", originals, *settings.size)
     folders["of the volume's size"] = link_frames(bench.scratch / "small-frames", small, settings.pairs + 1)
     sources = {name: [(a, b, i) for i, (a, b) in enumerate(zip(frames, frames[1:]))]
                for name, frames in ((name, sorted(folder.iterdir())) for name, folder in folders.items())}
 
-    datasets, jobs, refused = {}, {}, ""
+    datasets, jobs, missing = {}, {}, {}
     for precision in [each for each in native_precisions() if each != "float32"] or ["float32"]:
         try:
             weights = calibrated(bench, WEIGHTS, settings.size) if precision == "int8" else WEIGHTS
         except NotCalibrated as fault:
-            refused += f"\n\nNot measured: {precision} ({fault})."
+            missing[precision] = str(fault)
             continue
         generator = Generator(weights, precision=precision, size=settings.size, preset="kitti")
         datasets |= {f"FramePairs, {precision}, images {name}": FramePairs(generator, source)
                      for name, source in sources.items()}
-        jobs[f"`convert` into shards, {precision}, images as they are"] = Job(folders["as they are"], *settings.size,
+        jobs[f"convert, {precision}, images as they are"] = Job(folders["as they are"], *settings.size,
                                                                               weights, precision)
     stored = bench.scratch / "shards"
     convert(bench.program, next(iter(jobs.values())), lambda folder: shutil.copytree(folder, stored))
@@ -109,18 +107,8 @@ def measure(bench):
         for name, workers in rotated(list(found), turn):
             found[name, workers].append(contenders[name](workers))
 
-    table = Table(["volumes", "one worker, pairs a second", "two workers, pairs a second", "times one's"])
+    table = Table("on_the_fly", ["volumes", "one worker, pairs a second", "two workers, pairs a second", "times one's"])
     for name in contenders:
         one, two = found[name, 1], found[name, 2]
-        table.add(name, spread(one).median_and_quartiles(), spread(two).median_and_quartiles(),
-                  spread([b / a for a, b in zip(one, two)]).median_and_quartiles())
-    text = (f"Volumes of {settings.size[0]}x{settings.size[1]}, weights {WEIGHTS}, batches "
-            f"of {settings.batch} from a DataLoader, {settings.pairs} pairs in each of {settings.rounds} rounds, "
-            f"on {len(os.sched_getaffinity(0))} cores; OMP_NUM_THREADS is not set. Images: {what}. Wall-clock time of "
-            "an epoch with workers that are running already; of `convert`, of the whole program with as many threads. "
-            f"Both images of a pair are decoded from files in memory, both by OpenCV and by the program.{refused}")
-    return Section("On the fly", text, [table])
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+        table.add(name, spread(one), spread(two), spread([b / a for a, b in zip(one, two)]))
+    return Part([table], missing)

@@ -1,13 +1,11 @@
-#!/usr/bin/python3
 """The whole conversion against the number of pairs: pairs a second and peak memory must stay as they are."""
 
 import dataclasses
 
-from measuring.bench import run_part
 from measuring.conversion import Job, convert
 from measuring.cores import usable
 from measuring.frames import link_frames, original_frames, small_copies
-from measuring.report import Curves, Section, Table, number
+from measuring.report import Part, Table
 from measuring.spread import spread
 
 
@@ -40,18 +38,7 @@ def measure(bench):
             rates[count].append(done.pairs / done.wall_s)
             peaks[count].append(done.peak_mb)
 
-    table = Table(["pairs", "pairs/s", "peak MB", "times the first's MB"])
-    lines = {"pairs/s": [], "peak MB": []}
+    table = Table("pair_counts", ["pairs", "pairs/s", "peak MB", "times the first's MB"])
     for count in settings.counts:
-        table.add(count, spread(rates[count]).median_and_quartiles(), number(max(peaks[count])),
-                  number(max(peaks[count]) / max(peaks[settings.counts[0]])))
-        lines["pairs/s"].append((count, spread(rates[count]).median))
-        lines["peak MB"].append((count, max(peaks[count])))
-    text = (f"Frames and volumes of {settings.size[0]}x{settings.size[1]}, {settings.weights} in float32, all "
-            f"{threads} cores, {settings.rounds} rounds.")
-    return Section("Against the number of pairs", text, [table],
-                   [Curves("A run's length", "pairs", "pairs/s, MB", lines)])
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+        table.add(count, spread(rates[count]), max(peaks[count]), max(peaks[count]) / max(peaks[settings.counts[0]]))
+    return Part([table])

@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 """The generator in Python: a call against the engine alone, what importing it takes, many()
 and a DataLoader by one and by two."""
 
@@ -12,13 +11,12 @@ import subprocess
 import sys
 
 from engines import engine_command, play_rounds
-from measuring.bench import run_part
 from measuring.calibration import NotCalibrated, calibrated
 from measuring.contender import Contender, ContenderFailed
 from measuring.cores import pin_to
 from measuring.frames import write_input
 from measuring.machine import native_precisions
-from measuring.report import Section, Table, number
+from measuring.report import Part, Table
 from measuring.spread import rotated, spread
 
 LOADED = ("shipped:8", "bfloat16")  # what many() and the DataLoader are measured with, where the processor has it
@@ -69,10 +67,9 @@ def start_caller(bench, weights, precision, cores=1):
                      environment(bench))
 
 
-def call_table(bench, settings, refused):
-    table = Table(["weights", "the engine, ms", "the call, ms", "call / engine", "medians' difference, ms"],
-                  caption=f"`generator(previous, following)`, {settings.size[0]}x{settings.size[1]}, "
-                  f"{settings.rounds} rounds")
+def call_table(bench, settings, missing):
+    table = Table("python_call", ["weights", "precision", "the engine, ms", "the call, ms", "call / engine",
+                                  "medians' difference, ms"])
     frames = write_input(bench, settings.size)
     for weights, precision in itertools.product(settings.weights, native_precisions()):
         try:
@@ -84,13 +81,12 @@ def call_table(bench, settings, refused):
                     contender.set_input(settings.size, frames)
                 passes = play_rounds(contenders, settings.rounds)
         except (ContenderFailed, NotCalibrated) as fault:
-            refused[f"{weights} {precision}"] = str(fault)
+            missing[f"{weights} {precision}"] = str(fault)
             continue
         times = {name: [one["cpu_ms"] for one in each] for name, each in passes.items()}
         engine, call = (spread(each) for each in times.values())
         ratio = spread([b / a for a, b in zip(*times.values())])
-        table.add(f"{weights} {precision}", engine.median_and_quartiles(), call.median_and_quartiles(),
-                  ratio.median_and_quartiles(4), number(call.median - engine.median, 2))
+        table.add(weights, precision, engine, call, ratio, call.median - engine.median)
     return table
 
 
@@ -102,10 +98,9 @@ def starting_table(bench, settings, precision):
                               stdout=subprocess.PIPE, text=True,
                               check=True, env={**os.environ, **environment(bench)}, preexec_fn=pin_to(1))
         rounds.append(json.loads(done.stdout))
-    table = Table(["step", "ms"],
-                  caption=f"Of a fresh process, behind NumPy's import, {settings.few} rounds, {precision}")
+    table = Table("python_start", ["precision", "step", "ms"])
     for step, times in zip(steps, zip(*rounds)):
-        table.add(step, spread(times).median_and_quartiles())
+        table.add(precision, step, spread(times))
     return table
 
 
@@ -126,38 +121,23 @@ def rate_table(bench, settings, precision):
     def ms_a_pair(name, count, key):
         return [answer[key] / pairs[name] for answer in answers[name, count]]
 
-    table = Table(["volumes by", "one, wall ms a pair", "two", "times as fast", "the best rounds",
-                   "one, processor ms a pair", "two", "times by that"],
-                  caption=f"{LOADED[0]} {precision}, {settings.size[0]}x{settings.size[1]}, {settings.few} rounds, of "
-                  f"{few} pairs and {many} of a DataLoader")
+    table = Table("python_workers", [
+        "weights", "precision", "volumes by", "one, wall ms a pair", "two, wall ms a pair", "times as fast",
+        "times as fast, best rounds", "one, processor ms a pair", "one, its caller's", "two, processor ms a pair",
+        "two, their caller's", "times as fast at most"])
     for name in contenders:
         one, two = (ms_a_pair(name, count, "wall_ms") for count in (1, 2))
         own, both = (spread(ms_a_pair(name, count, "cpu_ms")).median for count in (1, 2))
         callers = [spread(ms_a_pair(name, count, "caller_ms")).median for count in (1, 2)]
-        shown = (f"{number(own)} + {number(callers[0])}", f"{number(both)} + {number(callers[1])}")
-        table.add(name, spread(one).median_and_quartiles(), spread(two).median_and_quartiles(),
-                  spread([a / b for a, b in zip(one, two)]).median_and_quartiles(), number(min(one) / min(two)), *shown,
-                  number(2 * own / (both + callers[1])))
+        table.add(*LOADED[:1], precision, name, spread(one), spread(two), spread([a / b for a, b in zip(one, two)]),
+                  min(one) / min(two), own, callers[0], both, callers[1], 2 * own / (both + callers[1]))
     return table
 
 
 def measure(bench):
     settings = SETTINGS[bench.effort]
-    title = "The call in Python"
-    refused = {}
-    tables = [call_table(bench, settings, refused)]
+    missing = {}
+    tables = [call_table(bench, settings, missing)]
     precision = LOADED[1] if LOADED[1] in native_precisions() else "float32"
     tables += [starting_table(bench, settings, precision), rate_table(bench, settings, precision)]
-    text = ("The engine is timed in a C++ program of its own, in turns with the call; both get the same "
-            "two images on one core, and processor time is compared. The call also has what comes before the engine: "
-            "the images' preparation, and the memory of the volume. The images are NumPy's, uint8, of the volume's "
-            "size.\n\nA DataLoader's workers give batches of four, which go through shared memory; they run already, "
-            "and OMP_NUM_THREADS is not set. Processor time is that of the threads or workers, and of the process that "
-            "gets the batches. The last column is what two cores that do nothing else could reach at most: it holds "
-            "where other work disturbs wall time.")
-    text += "".join(f"\n\nNot taking part: {name} ({why})." for name, why in refused.items())
-    return Section(title, text, tables)
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+    return Part(tables, missing)

@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 """What a trainer's reader costs: samples with labels from `eventgan` against the same volumes alone from h5py."""
 
 import dataclasses
@@ -11,8 +10,7 @@ import time
 import h5py
 import numpy as np
 
-from measuring.bench import run_part
-from measuring.report import Section, Table, number
+from measuring.report import Part, Table
 from measuring.spread import spread
 
 
@@ -80,7 +78,8 @@ def measure(bench):
     sys.path.insert(0, str(bench.build / "python"))
     from eventgan import Shards
 
-    table = Table(["volumes, order", "h5py, volume alone, ms", "eventgan, volume and labels, ms", "times h5py's"])
+    table = Table("reading", ["dtype", "order", "h5py, volume alone, ms", "eventgan, volume and labels, ms",
+                              "times h5py's"])
     for dtype in settings.dtypes:
         paths = demo_shards(bench, settings, dtype)
         orders = {"in order": None, "shuffled": np.random.default_rng(7)}
@@ -93,13 +92,5 @@ def measure(bench):
                     order = np.arange(len(reader)) if random is None else random.permutation(len(reader))
                     times.append(1e3 * seconds(reader, order) / len(reader))
                     reader.close()
-            table.add(f"{dtype}, {name}", spread(plain).median_and_quartiles(), spread(ours).median_and_quartiles(),
-                      number(spread([o / p for o, p in zip(ours, plain)]).median))
-    text = (f"{settings.shards} shards of {settings.size[0]}x{settings.size[1]}, eight samples each, deflate level "
-            f"1, from files in memory; processor time a sample, {settings.rounds} rounds. The first reading of each "
-            "shard's labels is in it, not the opening of files.")
-    return Section("Reading", text, [table])
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+            table.add(dtype, name, spread(plain), spread(ours), spread([o / p for o, p in zip(ours, plain)]).median)
+    return Part([table])

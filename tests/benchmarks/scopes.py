@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 """What `"scope": "motion"` saves and loses at other thresholds and sides of tiles: how its defaults were chosen.
 
 By `eventgan tradeoff`, on a camera that rests, one held by hand and one that drives, as far as their data is at hand.
@@ -9,9 +8,9 @@ import itertools
 import json
 import subprocess
 
-from measuring.bench import DATA, run_part
+from measuring.bench import DATA
 from measuring.frames import link_frames, original_frames
-from measuring.report import Section, Table, number
+from measuring.report import Part, Table
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,20 +66,11 @@ def trade(bench, settings, folder, job, threshold, side):
 
 def measure(bench):
     settings = SETTINGS[bench.effort]
-    tables = []
+    table = Table("scopes", ["camera", "motion_threshold", "tile_px", "generator: whole / motion", "error L2",
+                             "F1 over time"])
     for name, job in jobs(bench).items():
-        table = Table(["threshold, side of a tile", "generator: whole / motion", "error L2", "F1 over time"],
-                      caption=name)
         for threshold, side in itertools.product(settings.thresholds, settings.sides):
-            whole, motion = trade(bench, settings, bench.folder(f"{len(tables)}-{threshold}-{side}"), job, threshold,
-                                  side)
-            table.add(f"{threshold}, {side}", number(whole["generator_s"]["median"] / motion["generator_s"]["median"]),
-                      number(motion["relative_l2"], 2), number(motion["f1_time"], 4))
-        tables.append(table)
-    text = (f"{settings.weights}, onednn in float32, one thread, {settings.pairs} pairs, medians of {settings.rounds} "
-            "rounds. Errors are against the whole volume.")
-    return Section("Scope", text, tables)
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+            whole, motion = trade(bench, settings, bench.folder(f"{name}-{threshold}-{side}"), job, threshold, side)
+            table.add(name, threshold, side, whole["generator_s"]["median"] / motion["generator_s"]["median"],
+                      motion["relative_l2"], motion["f1_time"])
+    return Part([table])

@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 """What reading images ahead is worth: conversions from a disk on which every read waits, as on one behind a network.
 
 The disk is a FUSE file system (python3-fusepy; /dev/fuse) that passes through to files in memory; its own work takes
@@ -17,10 +16,9 @@ try:
 except ImportError:
     fusepy = None
 
-from measuring.bench import run_part
 from measuring.conversion import Job, convert
 from measuring.frames import link_frames, original_frames
-from measuring.report import Section, Table, number
+from measuring.report import Part, Table
 from measuring.spread import spread
 
 
@@ -90,11 +88,10 @@ def slow_disk(root, mount, delay_s):
 
 
 def measure(bench):
-    title = "Slow disk"
     if fusepy is None or not os.path.exists("/dev/fuse"):
-        return Section(title, "Not measured: it needs python3-fusepy and /dev/fuse.", [])
+        return Part([], {"slow_disk": "it needs python3-fusepy and /dev/fuse"})
     settings = SETTINGS[bench.effort]
-    originals, kind = original_frames(bench)
+    originals, _ = original_frames(bench)
     frames = link_frames(bench.scratch / "frames", originals, settings.frames)
     mount = bench.scratch / "disk"
     job = Job(frames, *settings.size, weights=settings.weights, precision=settings.precision, threads=THREADS)
@@ -105,19 +102,12 @@ def measure(bench):
             with slow_disk(frames, mount, delay / 1000) as reads:
                 on_disk[delay].append(convert(bench.program, dataclasses.replace(job, frames=mount)))
                 reads_of[delay] = reads.value
-    table = Table(["images", "reads", "they wait, s in all", "conversion, s", "times that from memory"])
+    table = Table("slow_disk", ["each read waits, ms", "reads", "they wait, s in all", "conversion, s",
+                                "times that from memory"])
     seconds = [run.wall_s for run in in_memory]
-    table.add("in memory", "-", "-", spread(seconds).median_and_quartiles(), "1")
+    table.add("from memory", "", "", spread(seconds), 1)
     for delay, runs in on_disk.items():
         times = [run.wall_s for run in runs]
         ratio = spread([slow / fast for slow, fast in zip(times, seconds)]).median
-        table.add(f"each read waits {delay} ms", str(reads_of[delay]), number(delay / 1000 * reads_of[delay]),
-                  spread(times).median_and_quartiles(), number(ratio))
-    text = (f"{settings.frames} frames ({kind}), {settings.size[0]}x{settings.size[1]}, {settings.weights}, "
-            f"{settings.precision}, {THREADS} threads; "
-            f"{settings.rounds} rounds, each from a freshly mounted disk. A read is at most 128 KiB.")
-    return Section(title, text, [table])
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+        table.add(delay, reads_of[delay], delay / 1000 * reads_of[delay], spread(times), ratio)
+    return Part([table])

@@ -1,17 +1,15 @@
-#!/usr/bin/python3
 """Each stage around the generator alone, in memory: time, bytes a second, pairs or frames a second."""
 
 import json
 import subprocess
 
-from measuring.bench import run_part
 from measuring.cores import pin_to
-from measuring.report import Section, Table, number
+from measuring.report import Part, Table
 
 PROGRAMS = "eventgan_*_benchmark"
 OF_OTHER_PARTS = {"eventgan_engine_benchmark", "eventgan_cut_out_benchmark"}
 # Google Benchmark's own arguments. Its repetitions are interleaved over all benchmarks of a program.
-ARGUMENTS = {
+SETTINGS = {
     "full": ["--benchmark_min_time=0.3", "--benchmark_repetitions=5"],
     "quick": ["--benchmark_min_time=0.05", "--benchmark_repetitions=3"],
     "trial": ["--benchmark_min_time=0.001", "--benchmark_repetitions=1", "--benchmark_filter=-level:[469]"],
@@ -42,23 +40,17 @@ def median_run(runs):
 
 
 def measure(bench):
-    table = Table(["stage", "ms", "slowest − fastest", "wall ms", "MB/s", "items/s"])
+    table = Table("stages", ["stage", "benchmark", "ms", "slowest less fastest", "wall ms", "MB/s", "items/s"])
     programs = sorted(path for path in (bench.build / "tests").glob(PROGRAMS) if path.name not in OF_OTHER_PARTS)
     if not programs:
         raise SystemExit(f"expected programs {PROGRAMS}, got none, in {bench.build / 'tests'}")
     for program in programs:
         stage = program.name.removeprefix("eventgan_").removesuffix("_benchmark")
-        for name, runs in run_program(program, ARGUMENTS[bench.effort]).items():
+        for name, runs in run_program(program, SETTINGS[bench.effort]).items():
             times = [run["cpu_time"] * MS[run["time_unit"]] for run in runs]
             middle = median_run(runs)
-            bytes_per_second = middle.get("bytes_per_second")
-            items_per_second = middle.get("items_per_second")
-            table.add(f"{stage}: {name}", number(sorted(times)[len(times) // 2]), number(max(times) - min(times), 2),
-                      number(middle["real_time"] * MS[middle["time_unit"]]),
-                      number(bytes_per_second / 1e6) if bytes_per_second else "",
-                      number(items_per_second) if items_per_second else "")
-    return Section("Stages", "One core, processor time, medians over interleaved repetitions.", [table])
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+            table.add(stage, name, sorted(times)[len(times) // 2], max(times) - min(times),
+                      middle["real_time"] * MS[middle["time_unit"]],
+                      middle["bytes_per_second"] / 1e6 if "bytes_per_second" in middle else "",
+                      middle.get("items_per_second", ""))
+    return Part([table])

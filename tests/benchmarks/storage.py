@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 """How volumes are stored: type and deflate level against bytes, time and error, on volumes of the shipped weights."""
 
 import dataclasses
@@ -8,10 +7,9 @@ import time
 import h5py
 import numpy as np
 
-from measuring.bench import run_part
 from measuring.conversion import Job, convert
 from measuring.frames import link_frames, original_frames
-from measuring.report import Section, Table, number
+from measuring.report import Part, Table
 from measuring.spread import spread
 
 EXACT = ("float32", 0)  # what the others are compared with
@@ -54,7 +52,7 @@ def relative_error(volumes, exact):
 
 def measure(bench):
     settings = SETTINGS[bench.effort]
-    originals, what = original_frames(bench)
+    originals, _ = original_frames(bench)
     frames = link_frames(bench.scratch / "storage", originals, settings.pairs + 1)
     choices = [(dtype, level) for dtype in settings.dtypes for level in settings.levels]
     runs, reading, errors = ({choice: [] for choice in choices} for _ in range(3))
@@ -68,20 +66,12 @@ def measure(bench):
             reading[choice].append(1e3 * read.seconds / settings.pairs)
             errors[choice].append(relative_error(read.volumes, exact))
 
-    table = Table(["type, deflate level", "kB a pair", "times smaller than float32, 0", "finish ms", "write ms",
-                   "h5py reads in ms", "error L2"])
+    table = Table("storage", ["dtype", "deflate level", "kB a pair", "times smaller than float32, 0", "finish ms",
+                              "write ms", "h5py reads in ms", "error L2"])
     largest = runs[EXACT][0].stored_bytes
     for choice in choices:
         stored = runs[choice][0].stored_bytes
         stages = [[1e3 * run.stage_s[stage] / run.pairs for run in runs[choice]] for stage in ("finish", "write")]
-        table.add(f"{choice[0]}, {choice[1]}", number(stored / settings.pairs / 1e3), number(largest / stored),
-                  spread(stages[0]).median_and_quartiles(), number(spread(stages[1]).median),
-                  number(spread(reading[choice]).median), number(max(errors[choice]), 2))
-    text = (f"Volumes of the shipped weights from {settings.pairs} pairs of {what}, "
-            f"{settings.size[0]}x{settings.size[1]}; {settings.rounds} rounds. Processor milliseconds a pair; finish: "
-            "statistics, quantisation and compression. The error is that of what a reader gets, against float32.")
-    return Section("Storage", text, [table])
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+        table.add(*choice, stored / settings.pairs / 1e3, largest / stored, spread(stages[0]),
+                  spread(stages[1]).median, spread(reading[choice]).median, float(max(errors[choice])))
+    return Part([table])

@@ -1,13 +1,11 @@
-#!/usr/bin/python3
 """The whole conversion against threads, as many cores for each: pairs a second, peak memory, and the same bytes."""
 
 import dataclasses
 
-from measuring.bench import run_part
 from measuring.conversion import Job, convert, pair_cost
 from measuring.cores import usable
 from measuring.frames import link_frames, original_frames
-from measuring.report import Curves, Section, Table, number
+from measuring.report import Part, Table
 from measuring.spread import rotated, spread
 
 
@@ -38,7 +36,7 @@ def thread_counts(cores):
 def measure(bench):
     settings = SETTINGS[bench.effort]
     counts = thread_counts(len(usable()))
-    originals, what = original_frames(bench)
+    originals, _ = original_frames(bench)
     # The same pairs for every number of threads: the shards are compared.
     most = counts[-1]
     folders = [link_frames(bench.scratch / f"threads-{pairs}", originals, pairs * most + 1)
@@ -54,21 +52,9 @@ def measure(bench):
             peaks[count].append(many.peak_mb)
             digests[count].add(many.digest)
 
-    table = Table(["threads", "pairs/s", "times one thread's", "peak MB", "bytes"])
-    ratios = []
+    table = Table("threads", ["threads", "pairs/s", "times one thread's", "peak MB", "bytes"])
     for count in counts:
         ratio = spread([rate / one for rate, one in zip(rates[count], rates[1])])
         same = digests[count] == digests[1] and len(digests[1]) == 1
-        table.add(count, spread(rates[count]).median_and_quartiles(), ratio.median_and_quartiles(),
-                  number(max(peaks[count])), "equal" if same else "DIFFERENT")
-        ratios.append((count, ratio.median))
-    text = (f"{what}, {settings.size[0]}x{settings.size[1]}, {settings.weights} in float32, uint8, deflate "
-            f"level 1, pinned to as many cores as threads; {settings.many * most} pairs less {settings.few * most}, "
-            f"{settings.rounds} rounds. Wall time.")
-    curves = Curves("Threads", "threads", "times one thread's pairs/s",
-                    {"measured": ratios, "ideal": [(n, n) for n in counts]}, ideal="ideal")
-    return Section("Against threads", text, [table], [curves])
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+        table.add(count, spread(rates[count]), ratio, max(peaks[count]), "equal" if same else "DIFFERENT")
+    return Part([table])

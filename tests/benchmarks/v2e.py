@@ -1,10 +1,7 @@
-#!/usr/bin/python3
 """v2e's emulator beside the project's models and network: time from two frames to a volume, and the scores of `eventgan
-realism`.
+realism`. v2e runs without noise, as the models do, and without SuperSloMo, whose time would be added.
 
-    tests/benchmarks/v2e.py --v2e V2E > tests/benchmarks/measured/v2e.md
-
-V2E is a checkout of SensorsINI/v2e; its folder `stubs`, if there is one, stands in for packages that are not installed.
+The checkout's folder `stubs`, if there is one, stands in for packages that are not installed.
 """
 
 import atexit
@@ -26,13 +23,13 @@ import numpy as np
 import PIL.Image
 import torch
 
-from measuring.bench import DATA, run_part
+from measuring.bench import DATA
 from measuring.calibration import NotCalibrated, calibrated
 from measuring.conversion import Job, convert, pair_cost
 from measuring.frames import link_frames, original_frames, small_copies
 from measuring.machine import native_precisions
-from measuring.realism_scores import BINS, event_volume, normalized, scores
-from measuring.report import Section, Table, number
+from measuring.realism_scores import event_volume, normalized, scores
+from measuring.report import Part, Table
 from measuring.spread import rotated, spread
 from storage import Read
 
@@ -206,7 +203,7 @@ def cost_of_call(settings, folders, generator, job):
     return Cost(statistics.fmean(seconds[settings.few:]), None, statistics.fmean(events) if job.generator else None)
 
 
-def time_table(bench, settings, what, images, refused):
+def add_times(table, bench, settings, what, images, refused):
     """`images`: files of one size, in order."""
     size = PIL.Image.open(images[0]).size[::-1]
     scratch = bench.folder(f"times-{size[0]}x{size[1]}")
@@ -226,26 +223,25 @@ def time_table(bench, settings, what, images, refused):
     for turn in range(settings.rounds):
         for name in rotated(list(contenders), turn):
             costs[name].append(contenders[name]())
-    table = Table(["made by", "ms a pair", "of it the volume", "events a pair", "times the first row's speed"],
-                  caption=f"Time: {what}, {size[0]}x{size[1]}, {settings.rounds} rounds of "
-                  f"{settings.many - settings.few} pairs")
     first = next(iter(costs.values()))
     for name, rounds in costs.items():
-        table.add(name, spread([1e3 * one.whole_s for one in rounds]).median_and_quartiles(),
-                  "" if rounds[0].volume_s is None else number(1e3 * spread([one.volume_s for one in rounds]).median),
-                  "" if rounds[0].events is None else f"{rounds[0].events:,.0f}",
-                  spread([base.whole_s / one.whole_s for base, one in zip(first, rounds)]).median_and_quartiles())
-    return table
+        table.add(what, f"{size[0]}x{size[1]}", name, spread([1e3 * one.whole_s for one in rounds]),
+                  "" if rounds[0].volume_s is None else 1e3 * spread([one.volume_s for one in rounds]).median,
+                  "" if rounds[0].events is None else round(rounds[0].events),
+                  spread([base.whole_s / one.whole_s for base, one in zip(first, rounds)]))
 
 
-def time_tables(bench, settings, refused):
+def time_table(bench, settings, refused):
+    table = Table("v2e_times", ["frames", "size", "made by", "ms a pair", "of it the volume", "events a pair",
+                                "times the first row's speed"])
     originals, what = original_frames(bench)
-    yield time_table(bench, settings, what, small_copies(bench.scratch / "copies", originals, *settings.size), refused)
+    add_times(table, bench, settings, what, small_copies(bench.scratch / "copies", originals, *settings.size), refused)
     slider = DATA / SLIDER["slider_depth"][0]
     if slider.exists():
         with h5py.File(slider) as file:
-            yield time_table(bench, settings, "slider_depth",
-                             save_images(bench.folder("slider"), file["davis/left/image_raw"]), refused)
+            images = save_images(bench.folder("slider"), file["davis/left/image_raw"])
+        add_times(table, bench, settings, "slider_depth", images, refused)
+    return table
 
 
 @dataclasses.dataclass(frozen=True)
@@ -305,10 +301,10 @@ def recording_scores(bench, settings, name, refused):
     for v2e_name, mode in V2E_MODES.items():
         threshold = fitted(recorded.frames.astype(np.float32), recorded.times_s, recorded.events, **mode)
         made = emulate(recorded.frames.astype(np.float32), recorded.times_s, threshold, **mode)
-        found[v2e_name] = (mean_scores([normalized(one.volume) for one in made], recorded), number(threshold))
+        found[v2e_name] = (mean_scores([normalized(one.volume) for one in made], recorded), threshold)
     for kind in ("difference", "esim"):
         means, its_settings = models[kind]
-        found[kind] = (means, number(float(re.search(r"contrast threshold (\S+)", its_settings)[1])))
+        found[kind] = (means, float(re.search(r"contrast threshold (\S+)", its_settings)[1]))
     for job_name, job in network_jobs(bench, settings, folder, recorded.frames.shape[1:], refused).items():
         read = Read()
         convert(bench.program, job, read)
@@ -325,65 +321,29 @@ SCORES = {"f1_raw": "F1 voxels", "f1_time": "F1 over time", "f1_time_polarity": 
           "events_per_pixel": "events per pixel", "positive_share": "positive share"}
 
 
-def score_tables(bench, settings, refused):
-    """A table a recording, one of means over them, and what is missing."""
+def score_table(bench, settings, refused):
+    """Of each recording, and the means over them."""
     at_hand = [name for name, (path, _) in settings.recordings.items() if (DATA / path).exists()]
     refused |= {f"scores on {name}": f"no {DATA / settings.recordings[name][0]}" for name in settings.recordings
                 if name not in at_hand}
     found = {name: recording_scores(bench, settings, name, refused) for name in at_hand}
+    table = Table("v2e_scores", ["recording", "frames", "made by", "threshold", *SCORES.values()])
     for name, contenders in found.items():
-        table = Table(["made by", "threshold", *SCORES.values()],
-                      caption=f"Scores: {name}, frames {settings.recordings[name][1]}")
         for contender, (means, threshold) in contenders.items():
-            table.add(contender, threshold, *(number(means[key]) for key in SCORES))
-        yield table
-    if len(found) > 1:
-        table = Table(["made by", *SCORES.values()], caption=f"Scores: means over the {len(found)} recordings")
-        for contender in next(iter(found.values())):
-            table.add(contender,
-                      *(number(np.mean([one[contender][0][key] for one in found.values()])) for key in SCORES))
-        yield table
+            table.add(name, settings.recordings[name][1], contender, threshold,
+                      *(float(means[key]) for key in SCORES))
+    for contender in next(iter(found.values()), {}):
+        table.add("mean", "", contender, "",
+                  *(float(np.mean([one[contender][0][key] for one in found.values()])) for key in SCORES))
+    return table
 
 
 def measure(bench):
     settings = SETTINGS[bench.effort]
-    title = "Beside v2e"
-    if bench.v2e is None:
-        return Section(title, "Skipped: no --v2e.", [])
-    if not (bench.v2e / "v2ecore").is_dir():
-        return Section(title, f"Skipped: expected a checkout of SensorsINI/v2e with v2ecore, got none, in {bench.v2e}.",
-                       [])
+    if bench.v2e is None or not (bench.v2e / "v2ecore").is_dir():
+        return Part([], {"v2e": f"expected a checkout of SensorsINI/v2e with v2ecore, got none, in {bench.v2e}"})
     # at the end: installed packages come first
     sys.path += [str(bench.build / "python"), str(bench.v2e), str(bench.v2e / "stubs")]
     torch.set_num_threads(1)
     refused = {}
-    tables = [*time_tables(bench, settings, refused), *score_tables(bench, settings, refused)]
-    text = f"""One core; processor time from two decoded frames of the volume's size to a volume of 2 x {BINS} channels:
-neither reading nor storing counts for anybody. Of the project's own it is the stage `generate` of `eventgan convert`, a
-long run less a short one, and, where a row says so, the call of `eventgan.Generator` in the process in which v2e runs,
-too, on the same frames, which it prepares itself; of v2e `EventEmulator.generate_events` and the events' way into the
-volume, by PyTorch {torch.__version__} in one thread, the first pairs left out. Pair by pair v2e is given both frames of
-each pair, as a dataset's pairs are drawn; as one video it goes on from frame to frame and keeps its levels; blended,
-seven frames between those of a pair are mixed from both and given to it too. The times of v2e and of the models depend
-on the number of events. 0.2 is the default threshold of all three, 0.5 about what slider_depth's camera has; v2e's
-logarithm is linear below 20 grey levels, the models have 0.02 added to u/255, so at one threshold v2e makes more
-events. esim moves by up to 5 px.
-
-v2e has its emulator's defaults, but thresholds as told (spread over the pixels 15 % of them, as by default) and no leak
-events: it runs without noise, as the models do. numba does not matter: the emulator does not use it. SuperSloMo, with
-which v2e would make frames in between, is not run: its time would be added. Without such frames the events of a pair
-have only as many different times as the pixel with most events has events; blended ones mend that, as `difference`
-does, but nothing moves in them.
-
-Scores are those of manifests/guides/realism.md, means over the pairs, on parts of recordings that the shipped weights
-have not seen; from earlier parts of all but emlb_demo01 they were learned. v2e's threshold is fitted as realism fits
-those of difference and esim: one for both polarities, by bisection, until all pairs together have the camera's number
-of events within {100 * FIT_TOLERANCE} %. The network is not told that number. difference and esim are scored by
-`eventgan realism`, the others by the same equations in NumPy, which agreed with it within {AGREEMENT:g} on the camera's
-volumes and the network's in float32. int8 was calibrated on the frames of the first table, at each recording's size."""
-    text += "".join(f"\n\nNot measured: {name} ({why})." for name, why in refused.items())
-    return Section(title, text, tables)
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+    return Part([time_table(bench, settings, refused), score_table(bench, settings, refused)], refused)

@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 """The whole `eventgan convert` on real frames: processor seconds a pair, split by stage, beside the generator's alone.
 
 What a pair costs is the difference between a long and a short run, so that starting up does not count.
@@ -6,12 +5,11 @@ What a pair costs is the difference between a long and a short run, so that star
 
 import dataclasses
 
-from measuring.bench import run_part
 from measuring.calibration import NotCalibrated, calibrated
 from measuring.conversion import ConversionRefused, Job, convert, pair_cost
 from measuring.frames import link_frames, original_frames
 from measuring.machine import native_precisions
-from measuring.report import Section, Table, number
+from measuring.report import Part, Table
 from measuring.spread import rotated, spread
 
 STAGES = ["read", "generate", "finish", "write"]
@@ -65,30 +63,22 @@ def measure_costs(bench, jobs, rounds, refused):
 
 
 def milliseconds(values):
-    return number(1e3 * spread(values).median)
+    return 1e3 * spread(values).median
 
 
 def measure(bench):
     settings = SETTINGS[bench.effort]
-    originals, what = original_frames(bench)
+    originals, _ = original_frames(bench)
     folders = [link_frames(bench.scratch / f"frames-{pairs}", originals, pairs + 1)
                for pairs in (settings.few, settings.many)]
     jobs, refused = make_jobs(bench, settings, folders)
     costs, libraries = measure_costs(bench, jobs, settings.rounds, refused)
 
-    table = Table(["weights and precision", "ms a pair", *STAGES, "other", "whole / generator"])
+    table = Table("whole_conversion", ["weights and precision", "ms a pair", *STAGES, "other", "whole / generator"])
     for name, rounds in costs.items():
         stages = [[cost.stage_s.get(stage, 0) for cost in rounds] for stage in STAGES]
         other = [cost.cpu_s - sum(cost.stage_s.values()) for cost in rounds]
         ratio = spread([cost.cpu_s / cost.stage_s["generate"] for cost in rounds])
         table.add(name, milliseconds([cost.cpu_s for cost in rounds]), *map(milliseconds, stages), milliseconds(other),
-                  ratio.median_and_quartiles())
-    text = (f"{what}, {settings.size[0]}x{settings.size[1]}, uint8, deflate level 1, one thread; {settings.many} pairs "
-            f"less {settings.few}, {settings.rounds} rounds. Processor milliseconds a pair; other: the process's but "
-            "no stage's.")
-    text += "".join(f"\n\nNot measured: {name} ({why})." for name, why in refused.items())
-    return Section("The whole conversion", text, [table], libraries=libraries)
-
-
-if __name__ == "__main__":
-    run_part(__doc__, measure)
+                  ratio)
+    return Part([table], refused, libraries)

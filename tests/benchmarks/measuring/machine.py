@@ -40,13 +40,11 @@ def _memory_gb():
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9
 
 
-def description(bench, command, libraries):
-    """Markdown lines; `libraries` are the engines' own words."""
+def description(bench, libraries):
+    """By heading; `libraries` are the engines' own words."""
     here = flags()
     version = subprocess.run([bench.program, "--version"], capture_output=True, text=True, check=True).stdout
-    engines = sorted(text for text in libraries if text not in version)
-    yield f"- processor: {processor_name()}, {len(usable())} of {os.cpu_count()} cores, {_memory_gb():.0f} GB"
-    yield f"- instructions: {', '.join(flag for flag in TELLING_FLAGS if flag in here) or 'none of the telling ones'}"
-    yield f"- program: {'; '.join(version.splitlines()[:2])}"  # its engines and processor are told as they were used
-    yield f"- engines: {'; '.join(engines)}"
-    yield f"- command: `{command}`"
+    return {"processor": f"{processor_name()}, {len(usable())} of {os.cpu_count()} cores, {_memory_gb():.0f} GB",
+            "instructions": " ".join(flag for flag in TELLING_FLAGS if flag in here),
+            "program": "; ".join(version.splitlines()[:2]),  # its engines are in the next, as they were used
+            "engines": "; ".join(sorted(text for text in libraries if text not in version))}

@@ -1,77 +1,44 @@
-"""What a part of the benchmarks hands back, and that as Markdown."""
+"""What a part of the benchmarks hands back, and its tables as CSV."""
 
+import csv
 import dataclasses
-import textwrap
+
+from measuring.spread import Spread
 
 
 @dataclasses.dataclass
 class Table:
-    columns: list          # headings; the first column is text, the others numbers
-    rows: list = dataclasses.field(default_factory=list)  # of texts, as many as columns
-    caption: str = ""
+    name: str      # of its file
+    columns: list  # headings
+    rows: list = dataclasses.field(default_factory=list)  # of texts, numbers and spreads, as many as columns
 
     def add(self, *cells):
         if len(cells) != len(self.columns):
             raise ValueError(f"expected {len(self.columns)} cells, got {cells}")
-        self.rows.append([str(cell) for cell in cells])
+        self.rows.append(cells)
+
+    def write(self, folder):
+        """A column of spreads becomes three: the medians and both quartiles."""
+        widths = [3 if any(isinstance(cell, Spread) for cell in column) else 1 for column in zip(*self.rows)]
+        headings = [part for name, width in zip(self.columns, widths)
+                    for part in (name, f"{name} q1", f"{name} q3")[:width]]
+        write_lines(folder / f"{self.name}.csv",
+                    [headings, *([part for cell, width in zip(row, widths) for part in _parts(cell)[:width]]
+                                 for row in self.rows)])
 
 
 @dataclasses.dataclass
-class Curves:
-    """One panel of the image."""
-    title: str
-    x_label: str
-    y_label: str
-    lines: dict            # name → [(x, y)]
-    ideal: str = ""        # name of a line that is drawn dashed
-    logarithmic: bool = False  # both axes; else y starts at 0
-
-
-@dataclasses.dataclass
-class Section:
-    title: str
-    text: str
+class Part:
     tables: list
-    curves: list = dataclasses.field(default_factory=list)
+    missing: dict = dataclasses.field(default_factory=dict)  # why it was not measured, by name
     libraries: set = dataclasses.field(default_factory=set)  # with their versions, as far as the part knows them
 
 
-def markdown(sections):
-    return "\n".join(part for section in sections for part in _section_lines(section))
+def _parts(cell):
+    numbers = (cell.median, cell.lower, cell.upper) if isinstance(cell, Spread) else (cell, "", "")
+    return [f"{number:.4g}" if isinstance(number, float) else number for number in numbers]
 
 
-def wrapped(text):
-    """Each paragraph, and each line of a list, in lines of at most 120 characters."""
-    def filled(line):
-        return textwrap.fill(line, 120, subsequent_indent="  " * line.startswith("- "), break_long_words=False,
-                             break_on_hyphens=False)
-
-    return "\n\n".join("\n".join(map(filled, part.splitlines())) if part.startswith("- ") else filled(part)
-                       for part in text.strip().split("\n\n"))
-
-
-def _section_lines(section):
-    yield f"## {section.title}\n"
-    yield wrapped(section.text) + "\n"
-    for table in section.tables:
-        if table.caption:
-            yield f"{table.caption}\n"
-        yield _row(table.columns)
-        yield _row(["---"] + ["---:"] * (len(table.columns) - 1))
-        for row in table.rows:
-            yield _row(row)
-        yield ""
-
-
-def _row(cells):
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
-
-
-def number(value, digits=3):
-    """`digits` significant ones, without an exponent where that can be read."""
-    if value == 0:
-        return "0"
-    if abs(value) < 1e-3 or abs(value) >= 1e6:
-        return f"{value:.{digits - 1}e}"
-    text = f"{value:.{digits}g}"
-    return f"{value:.0f}" if "e" in text else text
+def write_lines(path, lines):
+    with path.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows(lines)

@@ -3,8 +3,6 @@
 import dataclasses
 import statistics
 
-from measuring.report import number
-
 
 @dataclasses.dataclass(frozen=True)
 class Spread:
@@ -12,24 +10,13 @@ class Spread:
     lower: float   # a quarter of the rounds is below
     median: float
     upper: float   # a quarter is above
-    most: float
-
-    def quartiles(self, digits=3):
-        """The middle half of the rounds as text."""
-        return f"{number(self.lower, digits)}–{number(self.upper, digits)}"
-
-    def median_and_quartiles(self, digits=3):
-        if self.least == self.most:
-            return number(self.median, digits)
-        return f"{number(self.median, digits)} ({self.quartiles(digits)})"
 
 
 def spread(values):
     values = sorted(values)
     if len(values) == 1:
-        return Spread(*values * 5)
-    lower, median, upper = statistics.quantiles(values, n=4, method="inclusive")
-    return Spread(values[0], lower, median, upper, values[-1])
+        return Spread(*values * 4)
+    return Spread(values[0], *statistics.quantiles(values, n=4, method="inclusive"))
 
 
 def rotated(items, turn):
