@@ -143,6 +143,8 @@ def test_pictures_of_joints_have_no_polarity(tmp_path):
     with open(tmp_path / "real" / "clips" / "joints.csv", "w", newline="") as file:
         csv.writer(file).writerow(["image", *(f"{name}_{axis}" for name in CDEHP for axis in "xy"), "uncertain"])
         csv.writer(file).writerow(["a.png", *joints.ravel(), "green_elbow red_knee"])
+    (tmp_path / "real" / "surfaces").mkdir()
+    (tmp_path / "real" / "surfaces" / "joints.csv").write_text("image,head_x,head_y,a_shoulder_x,a_shoulder_y\n")
     [folder] = labelled_recordings.recordings_in(args, args.real)
     [item] = labelled_recordings.test_items(args, folder, (192, 320))
     assert item["volume"].min() == 0 and item["volume"].max() == 1
