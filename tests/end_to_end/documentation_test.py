@@ -126,7 +126,7 @@ def unknown_words(words):
                                                          if not preset.get("hidden")}
         if word == "-m" and rest and rest[0].startswith("eventgan."):
             return unknown_options(rest, "-m", *rest[:2])
-        for script in (word, f"manifests/python/examples/{word}"):
+        for script in (word, f"manifests/python/examples/{word}", f"tests/experiments/{word}"):
             if name.endswith(".py") and (SOURCE / script).is_file():
                 return unknown_options(rest, script, *(word for word in rest[:1] if re.fullmatch("[a-z]+", word)))
     return None

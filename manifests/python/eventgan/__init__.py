@@ -20,7 +20,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from . import evaluate, reconstruction, shards, torch
+    from . import evaluate, shards, torch
     from .generator import Generator, sample_events
     from .open_shards import Sample, open_shard
     from .outlines import mask, rings
@@ -37,7 +37,7 @@ _MODULE_OF = {
     "ProgramError": "program", "convert": "program", "init": "program", "open": "program", "mask": "outlines",
     "rings": "outlines", "show": "plotting", "signed_channel": "representations",
 }
-_MODULES = ("evaluate", "reconstruction", "shards", "torch")
+_MODULES = ("evaluate", "shards", "torch")
 
 __all__ = [*_MODULE_OF, *_MODULES]
 

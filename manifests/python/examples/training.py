@@ -466,12 +466,6 @@ def write_predictions(args: argparse.Namespace, shards: Shards, entries: Iterabl
           f"{shlex.join(line + (['--hidden'] if what == 'poses' else []))}")
 
 
-def markdown(cells: Sequence[Sequence[str]]) -> str:
-    """A table: the headings' line, then the others; numbers are set to the right."""
-    head, *lines = cells
-    return "\n".join(f"| {' | '.join(line)} |" for line in [head, ["---", *["---:"] * (len(head) - 1)], *lines])
-
-
 def draw_item(item: dict, found: torch.Tensor, texts: Iterable[str]) -> np.ndarray:
     """The item's volume, or its signed channel, with its boxes, and those that were found [n, 4] with their texts."""
     volume = item["volume"].numpy()

@@ -231,60 +231,6 @@ def test_pairs_on_the_fly_are_of_a_sequence_or_moved(tmp_path, monkeypatch):
     assert (still[0] != train_on_the_fly.labelled_clips(tmp_path, seed=2)[3][0][0]).any()
 
 
-DETECTORS = [*(row for name in ("EventGAN", "log difference", "ESIM") for row in (name, f"{name}, as bright")), "Frame"]
-POSES = ["EventGAN", "EventGAN, without noise", "EventGAN, last layer 1 epoch", "EventGAN, last layer 5 epochs",
-         "camera"]
-
-
-@pytest.mark.parametrize(("what", "trainer", "score", "names"), [
-    ("detection", ("yolov3", "matplotlib", "tqdm"), "ap_voc", DETECTORS),
-    ("pose", ("pose_resnet", "easydict", "yaml"), "pckh", POSES)])
-def test_the_experiments_in_small(tmp_path, what, trainer, score, names):
-    trainer = need_trainer(*trainer)
-    line = [sys.executable, EXAMPLES / "experiment.py", what, "--program", PROGRAM, "--trainer", trainer, "--out",
-            tmp_path / "out", "--small"]
-    first, again = (subprocess.run(line, capture_output=True, text=True, env=ONE_THREAD) for _ in range(2))
-    assert first.returncode == 0, first.stdout + first.stderr
-    assert first.stdout.count("examples/train_") == len(names) and "examples/train_" not in again.stdout  # done before
-    rows = json.loads((tmp_path / "out" / f"{what}.json").read_text())
-    assert list(rows) == names and all(len(row[score]) == 1 for row in rows.values())
-    assert all(name in again.stdout for name in names)
-    camera = tmp_path / "out" / "camera"
-    events, labelled = Shards(camera / "events"), Shards(camera / "labelled")
-    for folder in (camera / "events", camera / "labelled"):
-        subprocess.run([PROGRAM, "verify", folder], check=True, capture_output=True)  # nothing has changed them
-    if what == "detection":
-        train_shards = Shards(tmp_path / "out" / "scenes" / "ESIM", split="train")
-        factor = np.mean([s["volume"].mean() for s in train_shards]) / np.mean([s["volume"].mean() for s in events])
-        assert (f"{camera / 'events'} are scaled by {factor:.2f}, to the brightness of those of "
-                f"{tmp_path / 'out' / 'scenes' / 'ESIM'}\n" in first.stdout)
-        for i in range(len(labelled)):
-            seen, drawn = events.labels(i), labelled.labels(i)
-            assert seen["pair"]["sample_id"].startswith(drawn["pair"]["sample_id"] + "/")
-            # the camera's image is whole pixels high
-            np.testing.assert_allclose(seen["boxes"]["xyxy"], drawn["boxes"]["xyxy"], atol=0.51)
-            np.testing.assert_array_equal(seen["boxes"]["ignore"], drawn["boxes"]["ignore"])
-            np.testing.assert_array_equal(seen["boxes"]["difficulty"] > 0, drawn["boxes"]["difficulty"] > 0)
-    else:
-        joints = {sample["pair"]["sample_id"]: sample["persons"]["joints"]
-                  for sample in map(labelled.labels, range(len(labelled)))}
-        assert len(events) == len(labelled)
-        for sample in map(events.labels, range(len(events))):
-            np.testing.assert_allclose(sample["persons"]["joints"], joints[sample["pair"]["sample_id"].split("/")[0]],
-                                       atol=0.51)
-
-
-def test_the_trade_in_small(tmp_path):
-    trainer = need_trainer("yolov3", "matplotlib", "tqdm")
-    line = [sys.executable, EXAMPLES / "experiment.py", "trade", "--program", PROGRAM, "--trainer", trainer, "--out",
-            tmp_path / "out", "--small"]
-    done = subprocess.run(line, capture_output=True, text=True, env=ONE_THREAD)
-    assert done.returncode == 0, done.stdout + done.stderr
-    errors = {name: row["error"] for name, row in json.loads((tmp_path / "out" / "trade.json").read_text()).items()}
-    assert (errors.pop("EventGAN") == errors.pop("EventGAN, as bright") == [0] and errors
-            and all(0 < error < 1 for [error] in errors.values()))
-
-
 def test_volumes_are_changed_as_they_are_read(folder, tmp_path, monkeypatch):
     """As bright, without noise, frames: what predictions.json is of, from the stored volumes,
     which stay as they are."""
@@ -355,7 +301,7 @@ def test_minutes_are_those_of_the_steps(tmp_path, monkeypatch):
 
 
 def test_what_is_to_be_run_can_be_run():
-    for path in EXAMPLES.glob("*.py"):
+    for path in (*EXAMPLES.glob("*.py"), *(SOURCE / "tests" / "experiments").glob("*.py")):
         text = path.read_text()
         runs = '__name__ == "__main__"' in text
         assert os.access(path, os.X_OK) == text.startswith("#!/usr/bin/python3\n") == runs, path

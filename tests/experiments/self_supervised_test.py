@@ -1,26 +1,22 @@
-"""manifests/python/examples/self_supervised.py: its networks and losses against the published code's numbers,
+"""self_supervised.py: its networks and losses against the published code's numbers,
 its scores, a small run."""
 
 import json
 import os
-import pathlib
 import subprocess
 import sys
 
 import numpy as np
 import pytest
-from conftest import SOURCE
+from conftest import DATA, EXPERIMENTS
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("cv2")
 pytest.importorskip("matplotlib")
 h5py = pytest.importorskip("h5py")
-EXAMPLES = SOURCE / "manifests" / "python" / "examples"
-sys.path.append(str(EXAMPLES))
 
 import self_supervised
 
-DATA = pathlib.Path(os.environ.get("EVENTGAN_TEST_DATA", SOURCE.parent / "shared" / "data"))
 
 
 @pytest.fixture
@@ -152,7 +148,7 @@ def recording_folder(tmp_path):
 
 def test_a_small_run_fills_the_table_and_goes_on(recording_folder, tmp_path):
     def run(*more, expect=0):
-        done = subprocess.run([sys.executable, EXAMPLES / "self_supervised.py", "--program",
+        done = subprocess.run([sys.executable, EXPERIMENTS / "self_supervised.py", "--program",
                                os.environ["EVENTGAN_PROGRAM"], "--recordings", recording_folder, "--out",
                                tmp_path / "out", "--steps", "2", "--with", "difference", "real", *more],
                               capture_output=True, text=True, env={**os.environ, "OMP_NUM_THREADS": "1"})
@@ -163,7 +159,7 @@ def test_a_small_run_fills_the_table_and_goes_on(recording_folder, tmp_path):
     results = json.loads((tmp_path / "out" / "results.json").read_text())
     assert set(results["runs"]) == {f"{row} {half} 0" for row in ("difference", "real") for half in (0, 1)}
     assert set(results["runs"]["real 0 0"]) == {"other_scene"}
-    assert "| difference | " in first and (tmp_path / "out" / "one_scene.png").exists()
+    assert "ssim,difference,mean," in first and (tmp_path / "out" / "one_scene.png").exists()
     second = run("--seeds", "2")
     assert "real 0 0" not in second and "real 0 1" in second
     assert (json.loads((tmp_path / "out" / "results.json").read_text())["runs"]["real 0 0"]

@@ -26,7 +26,8 @@ import h5py
 import numpy as np
 import torch
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package, if it is not installed
+_PYTHON = pathlib.Path(__file__).resolve().parents[2] / "manifests" / "python"
+sys.path += [str(_PYTHON), str(_PYTHON / "examples")]  # the package, if it is not installed, and the trainers
 
 from eventgan import Generator, Shards
 

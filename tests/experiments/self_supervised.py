@@ -2,9 +2,8 @@
 """Networks for optical flow and for images, learnt without labels on generated events of some recordings, tested on the
 real events of others.
 
-    self_supervised.py --program build/release/eventgan --recordings ../shared/data/recordings
-    ../shared/data/davis/slider_depth_mvsec_layout.hdf5 \\
-        --peers ../shared/peers --out flows
+    self_supervised.py --program build/release/eventgan --recordings recordings slider_depth_mvsec_layout.hdf5
+    --peers peers --out flows
 
 The networks and their losses are those that `eventgan train` has besides the generator (EventGAN, section 3.3). The
 flow network learns from events how each pixel moves: the previous frame, moved by the flow, should look like the next
@@ -21,6 +20,8 @@ from __future__ import annotations
 
 import argparse
 import collections
+import csv
+import io
 import itertools
 import json
 import os
@@ -361,7 +362,7 @@ def read_args() -> argparse.Namespace:
     parser.add_argument("--peers", type=pathlib.Path,
                         help="folder with v2e, a checkout of SensorsINI/v2e; without it its rows are left out")
     parser.add_argument("--out", required=True, type=pathlib.Path,
-                        help="folder for volumes, networks, results.json, table.md and images; run the "
+                        help="folder for volumes, networks, results.json, table.csv and images; run the "
                         "same command again to resume")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--steps", type=int, default=400, help="batches that each network learns from")
@@ -390,30 +391,26 @@ def write(file: pathlib.Path, content: str) -> None:
     new.replace(file)
 
 
-def table_of(scores: dict[str, dict[str, list[dict[str, float]]]], reference: dict[str, dict[str, float]]) -> str:
-    """Markdown. `scores`: by row and recording those of each seed; `reference`: by recording those of the previous
-    frame as it is, neither moved nor changed. ±: standard deviation over the seeds. In means each recording counts the
-    same."""
-
-    def spread(values: np.ndarray, digits: int) -> str:
-        return f"{values.mean():.{digits}f}" + (f" ± {values.std():.{digits}f}" if len(values) > 1 else "")
-
-    lines = []
-    for title, name, digits, mean in (("error of the moved frame, grey levels", "error", 1, "mean ÷ that without flow"),
-                                      ("SSIM of the reconstruction", "ssim", 3, "mean"),
-                                      ("SSIM of the reconstruction at pixels with events",
-                                       "ssim_at_events", 3, "mean")):
-        plain = np.array([each[name] for each in reference.values()])
-        scale = plain if name == "error" else np.ones_like(plain)
-        cells = [[title, *reference, mean], ["previous frame as it is", *(f"{value:.{digits}f}" for value in plain),
-                                             f"{(plain / scale).mean():.3f}"]]
-        for row, by_recording in scores.items():
-            # [recording, seed]
-            values = np.array([[each[name] for each in by_recording[recording]] for recording in reference])
-            cells.append([row, *(spread(each, digits) for each in values),
-                          spread((values / scale[:, None]).mean(0), 3)])
-        lines += [training.markdown(cells), ""]
-    return "\n".join(lines)
+def table_of(scores: dict[str, dict[str, list[dict[str, float]]]],
+             reference: dict[str, dict[str, float]]) -> Iterator[list[str]]:
+    """The lines of table.csv. `scores`: by row and recording those of each seed; `reference`: by recording those of the
+    previous frame as it is, neither moved nor changed. sd: standard deviation over the seeds. In means each recording
+    counts the same; that of the error is of shares of the error without flow."""
+    yield ["score", "learnt on", "recording", "value", "sd"]
+    for title, name, digits, of_mean in (("error in grey levels", "error", 1, "error as a share of that without flow"),
+                                         ("ssim", "ssim", 3, "ssim"),
+                                         ("ssim at pixels with events", "ssim_at_events", 3,
+                                          "ssim at pixels with events")):
+        plain = np.array([[each[name]] for each in reference.values()])  # [recording, 1]
+        rows = {"previous frame as it is": plain}
+        rows |= {row: np.array([[each[name] for each in by_recording[recording]] for recording in reference])
+                 for row, by_recording in scores.items()}
+        for row, values in rows.items():  # [recording, seed]
+            means = (values / plain if name == "error" else values).mean(0)
+            for score, recording, of_seeds, places in (*((title, *each, digits) for each in zip(reference, values)),
+                                                       (of_mean, "mean", means, 3)):
+                yield [score, row, recording, f"{of_seeds.mean():.{places}f}",
+                       f"{of_seeds.std():.{places}f}" if len(of_seeds) > 1 else ""]
 
 
 def in_colour(flow: np.ndarray, longest: float) -> np.ndarray:
@@ -501,9 +498,10 @@ def main() -> None:
                   flush=True)
     scores = {row: {path.stem: [runs[f"{row} {half} {seed}"][path.stem] for seed in range(args.seeds)]
                     for half in (0, 1) for path in halves[1 - half]} for row in args.rows}
-    table = table_of(scores, results["reference"])
-    write(args.out / "table.md", table)
-    print(table)
+    table = io.StringIO()
+    csv.writer(table, lineterminator="\n").writerows(table_of(scores, results["reference"]))
+    write(args.out / "table.csv", table.getvalue())
+    print(table.getvalue())
     for half in (0, 1):
         networks = {row: load(weights(row, half)) for row in args.rows if row in DRAWN}
         for path in halves[1 - half] if networks else []:

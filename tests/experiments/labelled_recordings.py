@@ -70,12 +70,14 @@ class Task:
 
 
 def recordings_in(args: argparse.Namespace, folder: pathlib.Path) -> list[pathlib.Path]:
-    """The task's recordings: of joints, folders with a joints.csv; of persons, folders of windows (NAME.npz and
-    NAME.txt) or of drawn events (images/ with labels/ beside it); of these and others, folders of drawn events
-    (images/) with boxes in the boxes.csv of the folder above."""
+    """The task's recordings: of joints, folders with a joints.csv in CDEHP's form (DHP19's pictures are surfaces, which
+    decay, and not of events); of persons, folders of windows (NAME.npz and NAME.txt) or of drawn events (images/ with
+    labels/ beside it); of these and others, folders of drawn events (images/) with boxes in the boxes.csv of the folder
+    above."""
     folders = [each for each in (folder, *sorted(folder.iterdir())) if each.is_dir()]
     if args.task.joints:
-        found = [each for each in folders if (each / "joints.csv").exists()]
+        found = [path.parent for path in (each / "joints.csv" for each in folders)
+                 if path.exists() and "uncertain" in path.read_text(encoding="utf-8").partition("\n")[0]]
     else:
         found = [each for each in folders if PERSON in args.task.classes
                  and (any(each.glob("*.npz")) and any(each.glob("*.txt")) or

@@ -36,11 +36,14 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+
+EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "manifests" / "python" / "examples"
+sys.path.append(str(EXAMPLES))  # the trainers, which find the package if it is not installed
+
 import training
 from eventgan import Shards, read_description
 from eventgan.evaluate import PAPER_COLUMNS, Samples, evaluate_detections, evaluate_poses, table
 
-EXAMPLES = pathlib.Path(__file__).resolve().parent
 SIZE = {"width": 346, "height": 260}
 GENERATORS = {"EventGAN": {"weights": "shipped"}, "log difference": {"kind": "difference"}, "ESIM": {"kind": "esim"}}
 TRADE = {

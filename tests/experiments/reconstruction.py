@@ -26,7 +26,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from .open_shards import PathLike
+from eventgan.open_shards import PathLike
 
 BINS = 5  # of FireNet+'s grids
 _CHANNELS = 16

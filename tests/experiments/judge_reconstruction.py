@@ -8,7 +8,7 @@ volumes, and from a camera's.
 Each recording's windows, the intervals between its frames, are given to the network one after the other: as the
 camera's volumes, and as those that each method makes of the frames. Image t is compared (SSIM) with the frame at the
 end of window t, as a whole and around the pixels where the camera has events, and with the image of the camera's
-events. All images are normalised by their 1st and 99th percentile. OUT gets results.json, judge.md, and an image of
+events. All images are normalised by their 1st and 99th percentile. OUT gets results.json, judge.csv, and an image of
 each recording; the same command resumes.
 
 Recordings of large sensors are reduced to the size of a DAVIS before anything else, events and frames alike: EVREAL
@@ -32,6 +32,7 @@ the camera's events does not ask the frames at all.
 from __future__ import annotations
 
 import argparse
+import csv
 import hashlib
 import json
 import pathlib
@@ -42,10 +43,11 @@ from typing import Any
 import cv2
 import numpy as np
 import torch
+from recordings import METHODS, frames_of, real_volumes  # first: it finds the package and the trainers
+
 import training
 from eventgan.drawing import write
-from eventgan.reconstruction import load_firenet, reconstruct, robust_normalized, ssim, ssim_map
-from recordings import METHODS, frames_of, real_volumes
+from reconstruction import load_firenet, reconstruct, robust_normalized, ssim, ssim_map
 
 LONGEST_PX = 346  # a DAVIS346's
 SETTLING = 3  # images: the SSIM of the long recordings rises until then
@@ -234,12 +236,14 @@ def main() -> None:
             raise SystemExit(f"expected windows from frame {args.after[name]} on that count, got none, in {name}")
     text = "; ".join(f"{name}: {len(one['counted'])} of {one['windows']} windows count"
                      for name, one in results.items()) + ".\n"
-    for title, by_row in scores_of(results, rows).items():
-        text += "\n" + training.markdown([[title, *results, "mean"],
-                                          *([row, *(f"{value:.3f}" for value in of_row.values())]
-                                            for row, of_row in by_row.items())]) + "\n"
-    (args.out / "judge.md").write_text(text, encoding="utf-8")
     print(text)
+    with open(args.out / "judge.csv", "w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["measure", "events of", *results, "mean"])
+        for title, by_row in scores_of(results, rows).items():
+            writer.writerows([title, row, *(f"{value:.3f}" for value in of_row.values())]
+                             for row, of_row in by_row.items())
+    print((args.out / "judge.csv").read_text(encoding="utf-8"))
 
 
 if __name__ == "__main__":

@@ -12,8 +12,10 @@ from __future__ import annotations
 
 import argparse
 import collections
+import csv
 import dataclasses
 import functools
+import itertools
 import json
 import math
 import multiprocessing
@@ -23,7 +25,7 @@ import platform
 import subprocess
 import sys
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import cv2
@@ -69,7 +71,7 @@ TASKS = {
         classes=(PERSON,), stills=("lsp_extended",), clips={}, joints=True, polarity=False,
         network=real_joints.POSE,
         development={"cdehp": 48}, learnt={"cdehp": 48 + 60},  # the first clip, and the first two of four
-        columns={"pck": "PCK@0.2 of the torso", "pckh": "PCKh@0.5", "mpjpe": "MPJPE, px"},
+        columns={"pck": "PCK@0.2 of the torso", "pckh": "PCKh@0.5", "mpjpe": "MPJPE px"},
         methods=IN_LAYERS, steps=3000),
 }
 
@@ -258,10 +260,10 @@ def yolo(args: argparse.Namespace, name: str, seed: int) -> dict[str, Any]:
             continue
         windows = windows_folder(args, recording, SIZE, "eta98")
         folder = args.out / "runs" / f"YOLOv3-tiny-{file_name(name)}-{seed}"
-        command = [sys.executable, pathlib.Path(__file__).with_name("train_yolov3.py"), "--trainer", args.trainer,
-                   "--data", args.out / "shards" / file_name(name), "--test", windows, "--out", folder, "--classes",
-                   PERSON, "--scale", "1", "--steps", YOLO_STEPS, "--seed", seed, "--threads", "1", "--every",
-                   "1000", "--images", "0"]
+        script = pathlib.Path(train_detector.__file__).with_name("train_yolov3.py")
+        command = [sys.executable, script, "--trainer", args.trainer, "--data", args.out / "shards" / file_name(name),
+                   "--test", windows, "--out", folder, "--classes", PERSON, "--scale", "1", "--steps", YOLO_STEPS,
+                   "--seed", seed, "--threads", "1", "--every", "1000", "--images", "0"]
         found = folder / f"predictions-{key_of(recording)}.json"
         if not found.exists():
             subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
@@ -273,52 +275,51 @@ def yolo(args: argparse.Namespace, name: str, seed: int) -> dict[str, Any]:
     return scores
 
 
-def spread(values: Iterable[float]) -> str:
-    values = [*values]
-    return f"{np.mean(values):.2f} ± {np.std(values):.2f}"
+def table_of(results: Results, order: Sequence[str], titles: Mapping[str, str],
+             reference: str | None = None) -> list[dict[str, Any]]:
+    """The lines of a CSV file, for each recording: the mean and the standard deviation over the seeds, and the
+    difference from the row `reference`, seed by seed, with its range. `titles`: scores with their titles."""
+    first = next(iter(titles))
+    names = dict.fromkeys(name for of_seeds in results.values() for scores in of_seeds for name in scores
+                          if "development" not in name)
+    lines: list[dict[str, Any]] = []
+    for name, row in itertools.product(names, order):
+        own = [scores[name] for scores in results.get(row, []) if name in scores]
+        if not own:
+            continue
+        line: dict[str, Any] = {"recording": name, "trained on": row, "seeds": len(own)}
+        for key, title in titles.items():
+            values = [each[key] for each in own if key in each]
+            line |= {title: f"{np.mean(values):.2f}" if values else "",
+                     f"{title} sd": f"{np.std(values):.2f}" if values else ""}
+        if reference:
+            others = [scores[name] for scores in results[reference] if name in scores]
+            apart = [mine[first] - each[first] for mine, each in zip(own, others)]
+            line["against"] = "" if row == reference else reference
+            line |= {f"{titles[first]} difference{which}": "" if row == reference else f"{of_all(apart):.2f}"
+                     for which, of_all in (("", np.mean), (" least", min), (" most", max))}
+        lines.append(line)
+    return lines
 
 
-def tables(results: Results, order: Sequence[str], titles: Mapping[str, str], title: str,
-           reference: str | None = None) -> str:
-    """Markdown, for each recording: the mean and the standard deviation over the seeds, and the difference from the row
-    `reference`, seed by seed, with its range. `titles`: scores with their titles."""
-    first = [*titles][0]
-    names = [*dict.fromkeys(name for of_seeds in results.values() for scores in of_seeds for name in scores
-                            if "development" not in name)]
-    columns = [*titles.values(), *([f"{titles[first]} against {reference}"] if reference else [])]
-    text = ""
-    for name in names:
-        cells = [[f"{title}: {name}", "seeds", *columns]]
-        for row in order:
-            own = [scores[name] for scores in results.get(row, []) if name in scores]
-            if not own:
-                continue
-            cells.append([row, str(len(own)),
-                          *(spread(each[key] for each in own) if key in own[0] else "-" for key in titles)])
-            if reference:
-                other = [scores[name] for scores in results[reference] if name in scores]
-                apart = [mine[first] - each[first] for mine, each in zip(own, other)]
-                cells[-1].append("" if row == reference
-                                 else f"{np.mean(apart):+.2f} ({min(apart):+.2f} to {max(apart):+.2f})")
-        text += training.markdown(cells) + "\n\n" if len(cells) > 1 else ""
-    return text
+def write_table(path: pathlib.Path, lines: Sequence[Mapping[str, Any]]) -> None:
+    if lines:
+        with open(path, "w", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, lines[0], lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(lines)
+        print(path.read_text(encoding="utf-8"))
 
 
-def conditions(args: argparse.Namespace, images: int) -> str:
-    """What the tables were computed with, in Markdown."""
+def conditions(args: argparse.Namespace, task: str, images: int) -> dict[str, Any]:
+    """What the tables were computed with."""
     with open("/proc/cpuinfo", encoding="utf-8") as file:
         found = {name.strip(): value.strip() for name, _, value in (line.partition(":") for line in file)}
-    processor = (f"{found.get('model name', platform.machine())}, "
-                 f"{'AMX' if 'amx_tile' in found.get('flags', '') else 'no AMX'}")
-    version = subprocess.run([args.program, "--version"], capture_output=True,
-                             text=True, check=True).stdout.splitlines()[0]
-    [name] = [f"--task {name} " * (name != "persons") for name, task in TASKS.items() if task is args.task]
-    return ("# Real cameras: measured\n\n" + "\n".join([
-        f"- command: `experiment.py real {name}--frames labelled_frames --real real_labels --peers peers`",
-        f"- processor: {processor}, {len(os.sched_getaffinity(0))} cores",
-        f"- program: {version}; PyTorch {torch.__version__}",
-        f"- {images} labelled images, {STEPS} steps of {BATCH} unless a row says otherwise; mean ± standard deviation "
-        "over the seeds", "- what is in brackets is the range of the differences, seed by seed"]) + "\n\n")
+    version = subprocess.run([args.program, "--version"], capture_output=True, text=True, check=True).stdout
+    return {"command": f"experiment.py real --task {task} --frames labelled_frames --real real_labels --peers peers",
+            "processor": found.get("model name", platform.machine()), "amx": "amx_tile" in found.get("flags", ""),
+            "cores": len(os.sched_getaffinity(0)), "program": version.splitlines()[0], "pytorch": torch.__version__,
+            "images": images, "steps": args.task.steps or STEPS, "batch": BATCH}
 
 
 def draw_curves(args: argparse.Namespace, results: Results, images: int) -> None:
@@ -370,7 +371,7 @@ def _run(task: tuple[argparse.Namespace, Row | str, int]) -> tuple[str, int, dic
 
 @dataclasses.dataclass(frozen=True)
 class Section:
-    """Rows with a table of their own, which are compared with one of them."""
+    """Rows with a table of their own, OUT/TASK_TITLE.csv, which are compared with one of them."""
 
     title: str
     rows: Sequence[Row]
@@ -382,18 +383,17 @@ def sections(args: argparse.Namespace) -> list[Section]:
     task = args.task
     if task.methods:
         found = task_rows(task)
-        return [Section(task.classes[0] if not task.joints else "joints", found[:1] if args.quick else found,
-                        found[0].name)]
+        return [Section("", found[:1] if args.quick else found, found[0].name)]
     main = rows([folder.name for folder in recordings_in(args, args.real)])
     if args.quick:
-        return [Section("Augmented", [row for row in main if row.name == "EventGAN 16, augmented"], None)]
+        return [Section("augmented", [row for row in main if row.name == "EventGAN 16, augmented"], None)]
     main = [row for row in main if args.peers or row.sources != ("v2e",)]
     longer = f"EventGAN 16, augmented, {SENSOR_STEPS} steps"
-    return [Section("Plain", [row for row in main if row.augmentation == PLAIN], "EventGAN 16"),
-            Section("Augmented", [row for row in main if row.augmentation == FULL], "EventGAN 16, augmented"),
-            Section("Drawn sensors", drawn_sensors(), longer),
-            Section("Objects that move on their own", in_layers(), longer),
-            Section("One thing changed", ablations(), None, ABLATION_SEEDS)]
+    return [Section("plain", [row for row in main if row.augmentation == PLAIN], "EventGAN 16"),
+            Section("augmented", [row for row in main if row.augmentation == FULL], "EventGAN 16, augmented"),
+            Section("drawn_sensors", drawn_sensors(), longer),
+            Section("in_layers", in_layers(), longer),
+            Section("one_change", ablations(), None, ABLATION_SEEDS)]
 
 
 def run(args: argparse.Namespace) -> None:
@@ -407,9 +407,10 @@ def run(args: argparse.Namespace) -> None:
     args.steps = None
     if args.quick:
         args.out, args.steps, args.seeds = args.out / "quick", 60, 1
-    if args.task != "persons":
-        args.out = args.out / args.task
-    args.task = TASKS[args.task]
+    task = args.task
+    if task != "persons":
+        args.out = args.out / task
+    args.task = TASKS[task]
     args.out.mkdir(parents=True, exist_ok=True)
     parts = sections(args)
     # those with a base come last, when it has been trained
@@ -438,13 +439,13 @@ def run(args: argparse.Namespace) -> None:
             results[name].append(scores)
             print(f"{done} of {len(tasks)}: {name}, seed {seed}: "
                   + ", ".join(f"{key} {value[first]:.2f}" for key, value in scores.items()), flush=True)
-    text = conditions(args, len(items_of(args, learnt[0].sources[0])))
+    found = conditions(args, task, len(items_of(args, learnt[0].sources[0])))
+    (args.out / "conditions.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     for part in parts:
-        text += tables(results, [*(row.name for row in part.rows), CONSTANT], args.task.columns, part.title,
-                       part.reference)
-    text += tables(results, [name for name in results if name.startswith("YOLO")], args.task.columns, "YOLOv3-tiny")
-    print(text)
-    (args.out / "real.md").write_text(text, encoding="utf-8")
+        write_table(args.out / f"{'_'.join(filter(None, (task, part.title)))}.csv",
+                    table_of(results, [*(row.name for row in part.rows), CONSTANT], args.task.columns, part.reference))
+    write_table(args.out / f"{task}_yolov3_tiny.csv",
+                table_of(results, [name for name in results if name.startswith("YOLO")], args.task.columns))
     (args.out / "real.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     if args.quick and args.task.methods:
         # dozens of labels and 60 steps say nothing about a recording

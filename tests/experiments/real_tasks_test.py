@@ -1,4 +1,4 @@
-"""manifests/python/examples/{labelled_recordings,real_boxes,real_joints,real_cameras}.py: cars and joints. Scores,
+"""labelled_recordings.py, real_boxes.py, real_joints.py and real_cameras.py: cars and joints. Scores,
 sides, signed channels of pictures and constant answers against numbers worked out here; `experiment.py real --task`
 with few steps on a part of the data, where there is data."""
 
@@ -14,13 +14,11 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import SOURCE
+from conftest import DATA, EXPERIMENTS
 
 torch = pytest.importorskip("torch")
 cv2 = pytest.importorskip("cv2")
 pytest.importorskip("eventgan._engine")
-EXAMPLES = SOURCE / "manifests" / "python" / "examples"
-sys.path.append(str(EXAMPLES))
 import labelled_events
 import labelled_recordings
 import real_boxes
@@ -28,7 +26,6 @@ import real_cameras
 import real_joints
 from labelled_recordings import JOINTS
 
-DATA = pathlib.Path(os.environ.get("EVENTGAN_TEST_DATA", SOURCE.parent / "shared" / "data"))
 RIGHT, LEFT = ([i for i, name in enumerate(JOINTS) if name.startswith(side)] for side in ("right", "left"))
 CDEHP = ["head", *(f"{side}_{name}" for name in ("shoulder", "elbow", "hand", "hip", "knee", "foot")
                    for side in ("red", "green"))]
@@ -146,6 +143,8 @@ def test_pictures_of_joints_have_no_polarity(tmp_path):
     with open(tmp_path / "real" / "clips" / "joints.csv", "w", newline="") as file:
         csv.writer(file).writerow(["image", *(f"{name}_{axis}" for name in CDEHP for axis in "xy"), "uncertain"])
         csv.writer(file).writerow(["a.png", *joints.ravel(), "green_elbow red_knee"])
+    (tmp_path / "real" / "surfaces").mkdir()
+    (tmp_path / "real" / "surfaces" / "joints.csv").write_text("image,head_x,head_y,a_shoulder_x,a_shoulder_y\n")
     [folder] = labelled_recordings.recordings_in(args, args.real)
     [item] = labelled_recordings.test_items(args, folder, (192, 320))
     assert item["volume"].min() == 0 and item["volume"].max() == 1
@@ -304,12 +303,13 @@ def test_what_learnt_from_photographs_finds_something_in_real_events(tmp_path, t
     if not (DATA / "labelled_frames").is_dir() or not (DATA / "real_labels").is_dir():
         pytest.skip("no ../shared/data")
     part_of_data(tmp_path / "frames", 40)
-    line = [sys.executable, EXAMPLES / "experiment.py", "real", "--task", task, "--program",
+    line = [sys.executable, EXPERIMENTS / "experiment.py", "real", "--task", task, "--program",
             os.environ["EVENTGAN_PROGRAM"], "--frames", tmp_path / "frames", "--real", DATA / "real_labels", "--out",
             tmp_path / "out", "--quick"]
     done = subprocess.run(line, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
-    text = (tmp_path / "out" / "quick" / task / "real.md").read_text()
-    assert real_cameras.CONSTANT in text and f"--task {task} " in text
+    out = tmp_path / "out" / "quick" / task
+    assert real_cameras.CONSTANT in (out / f"{task}.csv").read_text()
+    assert f"--task {task} " in json.loads((out / "conditions.json").read_text())["command"]
     again = subprocess.run(line, capture_output=True, text=True)
     assert again.returncode == 0 and "epoch" not in again.stdout, again.stdout + again.stderr

@@ -1,0 +1,80 @@
+"""experiment.py: the paper's experiments with a simulated camera, in small."""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from conftest import EXPERIMENTS, SOURCE
+
+from eventgan import Shards
+
+pytest.importorskip("torch")
+PROGRAM = os.environ["EVENTGAN_PROGRAM"]
+TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
+ONE_THREAD = {**os.environ, "OMP_NUM_THREADS": "1"}
+
+
+def need_trainer(name, *modules):
+    if not (TRAINERS / name).is_dir():
+        pytest.skip(f"no ../shared/trainers/{name}")
+    for module in modules:
+        pytest.importorskip(module)
+    return TRAINERS / name
+
+
+DETECTORS = [*(row for name in ("EventGAN", "log difference", "ESIM") for row in (name, f"{name}, as bright")), "Frame"]
+POSES = ["EventGAN", "EventGAN, without noise", "EventGAN, last layer 1 epoch", "EventGAN, last layer 5 epochs",
+         "camera"]
+
+
+@pytest.mark.parametrize(("what", "trainer", "score", "names"), [
+    ("detection", ("yolov3", "matplotlib", "tqdm"), "ap_voc", DETECTORS),
+    ("pose", ("pose_resnet", "easydict", "yaml"), "pckh", POSES)])
+def test_the_experiments_in_small(tmp_path, what, trainer, score, names):
+    trainer = need_trainer(*trainer)
+    line = [sys.executable, EXPERIMENTS / "experiment.py", what, "--program", PROGRAM, "--trainer", trainer, "--out",
+            tmp_path / "out", "--small"]
+    first, again = (subprocess.run(line, capture_output=True, text=True, env=ONE_THREAD) for _ in range(2))
+    assert first.returncode == 0, first.stdout + first.stderr
+    assert first.stdout.count("examples/train_") == len(names) and "examples/train_" not in again.stdout  # done before
+    rows = json.loads((tmp_path / "out" / f"{what}.json").read_text())
+    assert list(rows) == names and all(len(row[score]) == 1 for row in rows.values())
+    assert all(name in again.stdout for name in names)
+    camera = tmp_path / "out" / "camera"
+    events, labelled = Shards(camera / "events"), Shards(camera / "labelled")
+    for folder in (camera / "events", camera / "labelled"):
+        subprocess.run([PROGRAM, "verify", folder], check=True, capture_output=True)  # nothing has changed them
+    if what == "detection":
+        train_shards = Shards(tmp_path / "out" / "scenes" / "ESIM", split="train")
+        factor = np.mean([s["volume"].mean() for s in train_shards]) / np.mean([s["volume"].mean() for s in events])
+        assert (f"{camera / 'events'} are scaled by {factor:.2f}, to the brightness of those of "
+                f"{tmp_path / 'out' / 'scenes' / 'ESIM'}\n" in first.stdout)
+        for i in range(len(labelled)):
+            seen, drawn = events.labels(i), labelled.labels(i)
+            assert seen["pair"]["sample_id"].startswith(drawn["pair"]["sample_id"] + "/")
+            # the camera's image is whole pixels high
+            np.testing.assert_allclose(seen["boxes"]["xyxy"], drawn["boxes"]["xyxy"], atol=0.51)
+            np.testing.assert_array_equal(seen["boxes"]["ignore"], drawn["boxes"]["ignore"])
+            np.testing.assert_array_equal(seen["boxes"]["difficulty"] > 0, drawn["boxes"]["difficulty"] > 0)
+    else:
+        joints = {sample["pair"]["sample_id"]: sample["persons"]["joints"]
+                  for sample in map(labelled.labels, range(len(labelled)))}
+        assert len(events) == len(labelled)
+        for sample in map(events.labels, range(len(events))):
+            np.testing.assert_allclose(sample["persons"]["joints"], joints[sample["pair"]["sample_id"].split("/")[0]],
+                                       atol=0.51)
+
+
+def test_the_trade_in_small(tmp_path):
+    trainer = need_trainer("yolov3", "matplotlib", "tqdm")
+    line = [sys.executable, EXPERIMENTS / "experiment.py", "trade", "--program", PROGRAM, "--trainer", trainer, "--out",
+            tmp_path / "out", "--small"]
+    done = subprocess.run(line, capture_output=True, text=True, env=ONE_THREAD)
+    assert done.returncode == 0, done.stdout + done.stderr
+    errors = {name: row["error"] for name, row in json.loads((tmp_path / "out" / "trade.json").read_text()).items()}
+    assert (errors.pop("EventGAN") == errors.pop("EventGAN, as bright") == [0] and errors
+            and all(0 < error < 1 for [error] in errors.values()))
