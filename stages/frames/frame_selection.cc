@@ -8,7 +8,7 @@
 #include "manifests/values/counter_random.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
+#include "manifests/values/text_lines.h"
 #include "stages/frames/source_folders.h"
 
 namespace eventgan {

@@ -11,6 +11,9 @@
 
 namespace eventgan {
 
+/// Of frames that labels number: beyond is damage, not a frame.
+inline constexpr std::int64_t kMaxFrameNumber = 999'999'999;
+
 /// One of 0 to 9, whatever the locale.
 inline bool is_digit(char c) { return c >= '0' && c <= '9'; }
 

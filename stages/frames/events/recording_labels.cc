@@ -18,9 +18,9 @@
 #include "manifests/files/csv_records.h"
 #include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text_lines.h"
 #include "stages/base/archives/array_json.h"
 #include "stages/base/archives/numpy_arrays.h"
-#include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
 
 namespace eventgan {

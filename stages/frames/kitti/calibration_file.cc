@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/kitti/kitti_label.h"
+#include "manifests/values/text_lines.h"
 
 namespace eventgan {
 

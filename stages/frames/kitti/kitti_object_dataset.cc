@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "manifests/values/text.h"
+#include "manifests/values/text_lines.h"
 #include "stages/base/images/image_file.h"
 #include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "manifests/values/text.h"
+#include "manifests/values/text_lines.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/raw_drive.h"
 #include "stages/frames/kitti/tracklets.h"

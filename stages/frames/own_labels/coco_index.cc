@@ -14,7 +14,7 @@
 #include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
+#include "manifests/values/text_lines.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/own_labels/detail/counted_bytes.h"
 #include "stages/frames/source_folders.h"

@@ -10,7 +10,7 @@
 
 #include "manifests/files/csv_records.h"
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
+#include "manifests/values/text_lines.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/source_folders.h"
 

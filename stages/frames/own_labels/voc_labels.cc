@@ -11,8 +11,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "manifests/values/text_lines.h"
 #include "stages/frames/index_mask.h"
-#include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/own_labels/detail/file_per_image.h"
 #include "stages/frames/own_labels/detail/find_labels.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
+#include "manifests/values/text_lines.h"
 #include "stages/frames/own_labels/detail/file_per_image.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/own_labels/detail/yolo_text.h"

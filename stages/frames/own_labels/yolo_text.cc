@@ -14,7 +14,7 @@
 #include "manifests/documents/json_text.h"
 #include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
+#include "manifests/values/text_lines.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
