@@ -7,10 +7,10 @@
 #include <span>
 
 #include "stages/base/archives/cdf_matrix.h"
+#include "stages/base/archives/mat_json.h"
 #include "stages/base/images/image_file.h"
 #include "stages/frames/events/recording_labels.h"
 #include "stages/frames/index_mask.h"
-#include "stages/frames/mpii/detail/mat_json.h"
 #include "stages/frames/own_labels/detail/coco_entry.h"
 #include "stages/frames/own_labels/detail/csv_labels.h"
 #include "stages/frames/own_labels/detail/mot_labels.h"

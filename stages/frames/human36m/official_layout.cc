@@ -17,6 +17,7 @@
 #include "manifests/values/faults.h"
 #include "stages/base/archives/array_json.h"
 #include "stages/base/archives/cdf_matrix.h"
+#include "stages/frames/human36m/derived_frame.h"
 #include "stages/frames/human36m/detail/camera_book.h"
 #include "stages/frames/human36m/detail/human36m_dataset.h"
 #include "stages/frames/human36m/detail/pose_table.h"

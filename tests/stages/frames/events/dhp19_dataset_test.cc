@@ -12,7 +12,7 @@
 
 #include "manifests/values/faults.h"
 #include "stages/frames/frame_selection.h"
-#include "tests/stages/frames/mpii/mat_writer.h"
+#include "tests/stages/base/archives/mat_writer.h"
 #include "tests/testing/hdf5_file.h"
 #include "tests/testing/npy_bytes.h"
 #include "tests/testing/temporary_folder.h"

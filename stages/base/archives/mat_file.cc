@@ -1,4 +1,4 @@
-#include "stages/frames/mpii/detail/mat_file.h"
+#include "stages/base/archives/mat_file.h"
 
 #include <zlib.h>
 

@@ -1,4 +1,4 @@
-#include "stages/frames/mpii/detail/mat_file.h"
+#include "stages/base/archives/mat_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/mpii/detail/mat_json.h"
-#include "tests/stages/frames/mpii/mat_writer.h"
+#include "stages/base/archives/mat_json.h"
+#include "tests/stages/base/archives/mat_writer.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

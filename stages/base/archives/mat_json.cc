@@ -1,4 +1,4 @@
-#include "stages/frames/mpii/detail/mat_json.h"
+#include "stages/base/archives/mat_json.h"
 
 #include <utf8.h>
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "stages/frames/mpii/detail/mat_file.h"
+#include "stages/base/archives/mat_file.h"
 
 namespace eventgan {
 
