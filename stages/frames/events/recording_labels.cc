@@ -21,7 +21,7 @@
 #include "manifests/values/text_lines.h"
 #include "stages/base/archives/array_json.h"
 #include "stages/base/archives/numpy_arrays.h"
-#include "stages/frames/label_name.h"
+#include "stages/frames/dataset/label_name.h"
 
 namespace eventgan {
 namespace {

@@ -20,7 +20,7 @@
 #include "stages/base/archives/zip_archive.h"
 #include "stages/frames/human36m/derived_frame.h"
 #include "stages/frames/human36m/detail/human36m_dataset.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 namespace {

@@ -19,7 +19,7 @@
 #include "stages/frames/human36m/detail/camera_book.h"
 #include "stages/frames/human36m/detail/human36m_dataset.h"
 #include "stages/frames/human36m/detail/pose_table.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 namespace {

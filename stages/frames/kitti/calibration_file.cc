@@ -2,7 +2,7 @@
 
 #include "manifests/values/faults.h"
 #include "manifests/values/text_lines.h"
-#include "stages/frames/full_rank.h"
+#include "stages/frames/dataset/full_rank.h"
 
 namespace eventgan {
 

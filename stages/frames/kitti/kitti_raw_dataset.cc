@@ -11,7 +11,7 @@
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/raw_drive.h"
 #include "stages/frames/kitti/tracklets.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 namespace {

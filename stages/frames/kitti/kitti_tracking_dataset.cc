@@ -14,8 +14,8 @@
 #include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/raw_drive.h"
-#include "stages/frames/numbered_sequence.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/numbered_sequence.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 namespace {}  // namespace

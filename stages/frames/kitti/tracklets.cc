@@ -18,7 +18,7 @@
 #include "manifests/values/text_lines.h"
 #include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/numbered_sequence.h"
+#include "stages/frames/listing/numbered_sequence.h"
 
 namespace eventgan {
 namespace {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 

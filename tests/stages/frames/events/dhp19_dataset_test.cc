@@ -11,7 +11,8 @@
 #include <string>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/frame_selection.h"
+#include "stages/frames/sources/frame_selection.h"
+#include "stages/frames/sources/open_dataset.h"
 #include "tests/stages/base/archives/mat_writer.h"
 #include "tests/testing/hdf5_file.h"
 #include "tests/testing/npy_bytes.h"
