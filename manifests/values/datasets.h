@@ -37,7 +37,7 @@ struct WindowSpec {
 enum class LabelFormat { kMot, kCoco, kYolo, kVoc, kCsv, kMasks };
 
 /// A format of labels. What finds and reads them is in its own file
-/// (stages/frames/own_labels/own_labels.h).
+/// (stages/frames/own_labels/label_readers.h).
 struct LabelFormatRow {
   std::string_view word;  ///< the manifest's
   LabelFormat value;
@@ -54,7 +54,7 @@ inline constexpr std::array kLabelFormats{
     LabelFormatRow{"masks", LabelFormat::kMasks, "index masks"}};
 
 /// What a manifest may say of a kind of dataset. What finds and reads it is in its own file
-/// (stages/frames/dataset_kinds.h).
+/// (stages/frames/sources/dataset_kinds.h).
 struct DatasetRow {
   std::string_view word;  ///< the manifest's, and that of shards, plans and reports
   DatasetKind value;

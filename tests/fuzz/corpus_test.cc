@@ -7,15 +7,15 @@
 #include <span>
 
 #include "stages/base/archives/cdf_matrix.h"
+#include "stages/base/archives/mat_json.h"
 #include "stages/base/images/image_file.h"
+#include "stages/frames/decoding/index_mask.h"
 #include "stages/frames/events/recording_labels.h"
-#include "stages/frames/index_mask.h"
-#include "stages/frames/mpii/detail/mat_json.h"
 #include "stages/frames/own_labels/detail/coco_entry.h"
 #include "stages/frames/own_labels/detail/csv_labels.h"
 #include "stages/frames/own_labels/detail/mot_labels.h"
 #include "stages/frames/own_labels/detail/voc_labels.h"
-#include "stages/frames/own_labels/detail/yolo_text.h"
+#include "stages/frames/own_labels/yolo_text.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/safetensors.h"
 #include "stages/recordings/detail/aedat4_recording.h"

@@ -16,7 +16,13 @@ FLOORS = [
     ["stages/base/hdf5", "stages/base/images"],
     ["stages/base/archives", "stages/base/videos"],
     ["stages/recordings"],
-    ["stages/frames", "stages/labels", "stages/events", "stages/generator", "stages/training",
+    ["stages/frames/dataset"],
+    ["stages/frames/listing", "stages/frames/decoding"],
+    ["stages/frames/naming", "stages/frames/kitti", "stages/frames/mpii", "stages/frames/human36m"],
+    ["stages/frames/own_labels"],
+    ["stages/frames/sequences"],
+    ["stages/frames/events"],
+    ["stages/frames/sources", "stages/labels", "stages/events", "stages/generator", "stages/training",
      "stages/shards", "stages/synthetic", "stages/exports"],
     ["pipeline/runtime"],
     ["pipeline/planning"],
@@ -33,7 +39,7 @@ FLOORS = [
 # Headers of a heavy library that several rooms share: sources and headers in detail/ may include them, public headers not.
 HEAVY_HEADERS = {
     "manifests/documents/json_text.h", "manifests/documents/strict_json.h", "pipeline/command_line/usage.h",
-    "stages/base/archives/array_json.h", "stages/base/hdf5/hdf5.h", "stages/base/hdf5/hdf5_output_file.h",
+    "stages/base/archives/array_json.h", "stages/base/archives/mat_json.h", "stages/base/hdf5/hdf5.h", "stages/base/hdf5/hdf5_output_file.h",
 }
 HEAVY_LIBRARIES = re.compile(r"(?:nlohmann|opencv2|oneapi|tbb|fmt|CLI|libav\w+|flatbuffers|torch|c10)/|"
                              r"hdf5\.h|matio\.h|pugixml\.hpp|zip\.h|yaml-cpp/|jpeglib\.h|png\.h|tiff\w*\.h|H5public\.h")

@@ -20,14 +20,13 @@
 
 #include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
+#include "stages/base/archives/mat_file.h"
+#include "stages/base/archives/mat_json.h"
 #include "stages/base/archives/numpy_arrays.h"
-#include "stages/frames/dataset_kinds.h"
-#include "stages/frames/human36m/detail/pose_table.h"
+#include "stages/frames/dataset/full_rank.h"
+#include "stages/frames/human36m/derived_frame.h"
 #include "stages/frames/human36m/human36m_dataset.h"
-#include "stages/frames/kitti/detail/calibration_file.h"
-#include "stages/frames/mpii/detail/mat_file.h"
-#include "stages/frames/mpii/detail/mat_json.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/source_folders.h"
 #include "stages/recordings/dhp19_events.h"
 
 namespace eventgan {

@@ -12,7 +12,7 @@
 #include "manifests/documents/strict_json.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/outlines.h"
-#include "stages/frames/kitti/kitti_label.h"
+#include "manifests/values/text_lines.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
 
 namespace eventgan {

@@ -14,10 +14,10 @@
 #include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/label_name.h"
-#include "stages/frames/own_labels/detail/counted_bytes.h"
-#include "stages/frames/source_folders.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/dataset/label_name.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/naming/counted_bytes.h"
 
 namespace eventgan {
 namespace {

@@ -8,10 +8,11 @@
 #include <unordered_map>
 #include <utility>
 
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/naming/found_frames.h"
 #include "stages/frames/own_labels/detail/coco_entry.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
-#include "stages/frames/own_labels/own_labels.h"
+#include "stages/frames/own_labels/label_readers.h"
 
 namespace eventgan {
 namespace {

@@ -13,10 +13,11 @@
 
 #include "manifests/documents/json_text.h"
 #include "manifests/files/csv_records.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/label_name.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/dataset/label_name.h"
+#include "stages/frames/naming/found_frames.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
+#include "stages/frames/own_labels/label_readers.h"
 
 namespace eventgan {
 namespace {

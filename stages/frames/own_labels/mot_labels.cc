@@ -13,12 +13,13 @@
 
 #include "manifests/files/csv_records.h"
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/numbered_sequence.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/listing/numbered_sequence.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/naming/found_frames.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
-#include "stages/frames/own_labels/detail/yolo_text.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/own_labels/label_readers.h"
+#include "stages/frames/own_labels/yolo_text.h"
 
 namespace eventgan {
 namespace {
@@ -165,7 +166,7 @@ MotSequence parse_mot_sequence(std::string_view text, const std::string& path) {
   };
   MotSequence sequence;
   sequence.frames_per_second = value("frameRate", 1e-6, 1e6);
-  if (const auto length = value("seqLength", 1, kMaxKittiFrame)) {
+  if (const auto length = value("seqLength", 1, kMaxFrameNumber)) {
     sequence.length = static_cast<std::int64_t>(*length);
   }
   const auto height = value("imHeight", 1, kFarthest_px), width = value("imWidth", 1, kFarthest_px);
@@ -201,7 +202,7 @@ std::map<std::int64_t, Outcome<ImageLabels>> parse_mot_labels(std::string_view t
     const std::string place = place_in_file(path, line->line);
     if (!line->fault.empty()) throw InputError(line->fault + ", in " + place);
     const auto frame = parse_whole(line->fields[kFrame]);
-    if (!frame || *frame < 1 || *frame > kMaxKittiFrame) {
+    if (!frame || *frame < 1 || *frame > kMaxFrameNumber) {
       throw InputError("expected a frame number from 1, got " + in_quotes(line->fields[0]) +
                        ", in " + place);
     }

@@ -11,11 +11,12 @@
 #include <unordered_map>
 #include <utility>
 
-#include "stages/frames/index_mask.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/label_name.h"
-#include "stages/frames/own_labels/detail/file_per_image.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/dataset/label_name.h"
+#include "stages/frames/decoding/index_mask.h"
+#include "stages/frames/naming/file_per_image.h"
+#include "stages/frames/naming/found_frames.h"
+#include "stages/frames/own_labels/label_readers.h"
 
 namespace eventgan {
 namespace {

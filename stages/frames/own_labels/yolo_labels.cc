@@ -9,11 +9,12 @@
 #include <vector>
 
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/own_labels/detail/file_per_image.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
-#include "stages/frames/own_labels/detail/yolo_text.h"
-#include "stages/frames/sequences/image_folder.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/listing/image_folder.h"
+#include "stages/frames/naming/file_per_image.h"
+#include "stages/frames/naming/found_frames.h"
+#include "stages/frames/own_labels/label_readers.h"
+#include "stages/frames/own_labels/yolo_text.h"
 
 namespace eventgan {
 

@@ -1,4 +1,4 @@
-#include "stages/frames/own_labels/detail/yolo_text.h"
+#include "stages/frames/own_labels/yolo_text.h"
 
 #include <yaml-cpp/yaml.h>
 
@@ -14,11 +14,11 @@
 #include "manifests/documents/json_text.h"
 #include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/label_name.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/dataset/label_name.h"
+#include "stages/frames/listing/image_folder.h"
+#include "stages/frames/naming/found_frames.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
-#include "stages/frames/sequences/image_folder.h"
 
 namespace eventgan {
 namespace {

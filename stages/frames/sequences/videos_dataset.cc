@@ -18,12 +18,12 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "stages/frames/decoding/frame_decoder.h"
-#include "stages/frames/own_labels/detail/absent_frames.h"
-#include "stages/frames/own_labels/own_labels.h"
+#include "stages/frames/decoding/video_clip.h"
+#include "stages/frames/listing/image_folder.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/naming/absent_frames.h"
+#include "stages/frames/own_labels/label_readers.h"
 #include "stages/frames/sequences/frames_dataset.h"
-#include "stages/frames/sequences/image_folder.h"
-#include "stages/frames/sequences/video_clip.h"
-#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 
@@ -304,8 +304,6 @@ class VideosDataset final : public Dataset {
 };
 
 }  // namespace
-
-bool is_video_name(const fs::path& file) { return video_rank(file) < kVideoExtensions.size(); }
 
 std::unique_ptr<Dataset> open_videos_dataset(const SourceSpec& spec, const fs::path& base) {
   return std::make_unique<VideosDataset>(spec, base);

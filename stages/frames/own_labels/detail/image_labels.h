@@ -13,7 +13,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/frames.h"
 #include "manifests/values/labels.h"
-#include "stages/frames/own_labels/own_labels.h"
+#include "stages/frames/naming/own_labels.h"
 
 namespace eventgan {
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "stages/frames/own_labels/detail/yolo_text.h"
+#include "stages/frames/own_labels/yolo_text.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
