@@ -24,7 +24,7 @@ enum class RecordingFormat {
 };
 
 /// What manifests, commands and pages may say of a format. What recognises and opens it is in its
-/// own file (stages/recordings/detail/recording_reader.h).
+/// own file (stages/recordings/readers/detail/recording_reader.h).
 struct RecordingFormatRow {
   std::string_view word;  ///< the training manifest's
   RecordingFormat value;

@@ -10,7 +10,7 @@
 #include "stages/events/event_volume.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/frames/decoding/prepared_frame.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 namespace {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "manifests/values/training.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 #include "stages/training/training_sample.h"
 
 namespace eventgan {

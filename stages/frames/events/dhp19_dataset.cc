@@ -28,7 +28,7 @@
 #include "stages/frames/mpii/detail/mat_file.h"
 #include "stages/frames/mpii/detail/mat_json.h"
 #include "stages/frames/source_folders.h"
-#include "stages/recordings/dhp19_events.h"
+#include "stages/recordings/readers/dhp19_events.h"
 
 namespace eventgan {
 namespace {

@@ -16,7 +16,7 @@
 #include "stages/frames/events/recording_labels.h"
 #include "stages/frames/own_labels/detail/yolo_text.h"
 #include "stages/frames/source_folders.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 namespace {
