@@ -53,8 +53,8 @@ StoredEvent CompactEvents::operator[](std::int64_t place) const {
           static_cast<double>(polarity_[i])};
 }
 
-RecentlyUsed& recent_events() {
-  static RecentlyUsed recent(std::int64_t{1} << 24);
+RecentEvents& recent_events() {
+  static RecentEvents recent(std::int64_t{1} << 24);
   return recent;
 }
 
@@ -71,7 +71,8 @@ void EventParts::add_part(CompactEvents events) {
   firsts_.push_back(count_);
   order_.add_all(events.times_s(), count_);
   count_ += events.size();
-  kept_part(firsts_.size() - 1, [&] { return std::move(events); });
+  recent_.get({this, firsts_.size() - 1},
+              [&] { return std::make_shared<const CompactEvents>(std::move(events)); });
 }
 
 void EventParts::pack_parts(std::string& bytes) const {
@@ -95,22 +96,13 @@ bool EventParts::unpack_parts(std::string_view bytes, std::size_t parts) {
   return true;
 }
 
-EventParts::Events EventParts::kept_part(std::size_t number,
-                                         const std::function<CompactEvents()>& read) const {
-  return std::static_pointer_cast<const CompactEvents>(recent_.get(this, number, [&] {
-    auto events = std::make_shared<const CompactEvents>(read());
-    const std::int64_t weight = events->size();
-    return RecentlyUsed::Made{std::move(events), weight};
-  }));
-}
-
 EventParts::Events EventParts::part(std::size_t number) const {
-  return kept_part(number, [&] {
+  return recent_.get({this, number}, [&] {
     const std::int64_t end = number + 1 < firsts_.size() ? firsts_[number + 1] : count_;
-    CompactEvents events = read_part(number);
-    if (events.size() == end - firsts_[number]) return events;
+    auto events = std::make_shared<const CompactEvents>(read_part(number));
+    if (events->size() == end - firsts_[number]) return events;
     throw InputError("expected " + std::to_string(end - firsts_[number]) +
-                     " events as before, got " + std::to_string(events.size()) + ", in " + name_);
+                     " events as before, got " + std::to_string(events->size()) + ", in " + name_);
   });
 }
 

@@ -4,9 +4,9 @@
 
 namespace eventgan {
 
-RecentlyUsed& open_files() {
+OpenFiles& open_files() {
   constexpr std::size_t kMost = 1024;
-  static RecentlyUsed files(static_cast<std::int64_t>(files_to_keep_open(kMost)));
+  static OpenFiles files(static_cast<std::int64_t>(files_to_keep_open(kMost)));
   return files;
 }
 

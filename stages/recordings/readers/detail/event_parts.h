@@ -2,15 +2,16 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "manifests/values/recently_used.h"
 #include "stages/recordings/order/event_check.h"
-#include "stages/recordings/readers/detail/recently_used.h"
 #include "stages/recordings/readers/detail/stored_recording.h"
 
 namespace eventgan {
@@ -34,15 +35,27 @@ class CompactEvents {
   std::map<std::int64_t, StoredEvent> others_;  ///< by their places
 };
 
+class EventParts;
+
+/// Parts of files by their numbers; each weighs as many as it has events.
+class RecentEvents : public RecentlyUsed<std::pair<const EventParts*, std::size_t>,
+                                         std::shared_ptr<const CompactEvents>> {
+ public:
+  explicit RecentEvents(std::int64_t most)
+      : RecentlyUsed(most, [](const auto& events) { return events->size(); }) {}
+};
+
 /// The events that were read last, of the whole process: sixteen million, or 220 MB.
-RecentlyUsed& recent_events();
+RecentEvents& recent_events();
 
 /// The events of a file that is read in parts: a table as a whole, the packets of AEDAT4. A part is
 /// read when one of its events is first asked for, and then as long as recent_events() keeps it,
 /// not again.
 class EventParts : public EventStore {
  public:
-  ~EventParts() override { recent_.forget(this); }
+  ~EventParts() override {
+    recent_.forget({this, 0}, {this, std::numeric_limits<std::size_t>::max()});
+  }
 
   std::int64_t count() const final { return count_; }
   std::vector<StoredEvent> read(std::int64_t first, std::int64_t count) const final;
@@ -53,7 +66,7 @@ class EventParts : public EventStore {
 
  protected:
   /// `name` is for messages.
-  explicit EventParts(std::string name, RecentlyUsed& recent = recent_events())
+  explicit EventParts(std::string name, RecentEvents& recent = recent_events())
       : name_(std::move(name)), recent_(recent) {}
 
   /// While it is opened: the next part, which has events of times from `begin_s` to `end_s`.
@@ -72,15 +85,13 @@ class EventParts : public EventStore {
 
  private:
   using Events = std::shared_ptr<const CompactEvents>;
-  /// The part as it is kept, else what `read` gives.
-  Events kept_part(std::size_t number, const std::function<CompactEvents()>& read) const;
   Events part(std::size_t number) const;
   /// Calls `take(events, begin, end)` for the places in each part that has some of these.
   template <class Take>
   void for_each_part(std::int64_t first, std::int64_t count, Take take) const;
 
   std::string name_;
-  RecentlyUsed& recent_;
+  RecentEvents& recent_;
   std::vector<std::int64_t> firsts_;  ///< the number of each part's first event
   std::int64_t count_ = 0;
   EventOrder order_;

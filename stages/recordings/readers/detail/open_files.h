@@ -8,12 +8,13 @@
 #include <utility>
 
 #include "manifests/files/input_file.h"
-#include "stages/recordings/readers/detail/recently_used.h"
+#include "manifests/values/recently_used.h"
 
 namespace eventgan {
 
-/// As many files as this process keeps open (files_to_keep_open).
-RecentlyUsed& open_files();
+/// As many files as this process keeps open (files_to_keep_open), by their OpenedAtUse.
+using OpenFiles = RecentlyUsed<const void*, std::shared_ptr<const void>>;
+OpenFiles& open_files();
 
 /// A file, or what is read of an open one, that is open while it is used: those used last stay open
 /// (open_files), the others are opened again. A folder may have more recordings than a process may
@@ -23,14 +24,13 @@ class OpenedAtUse {
  public:
   /// `open` gives the same each time or throws InputError.
   explicit OpenedAtUse(std::function<Opened()> open) : open_(std::move(open)) {}
-  ~OpenedAtUse() { open_files().forget(this); }
+  ~OpenedAtUse() { open_files().forget(this, this); }
   OpenedAtUse(const OpenedAtUse&) = delete;
   OpenedAtUse& operator=(const OpenedAtUse&) = delete;
 
   std::shared_ptr<const Opened> get() const {
-    return std::static_pointer_cast<const Opened>(open_files().get(this, 0, [&] {
-      return RecentlyUsed::Made{std::make_shared<const Opened>(open_()), 1};
-    }));
+    return std::static_pointer_cast<const Opened>(
+        open_files().get(this, [&] { return std::make_shared<const Opened>(open_()); }));
   }
 
  private:

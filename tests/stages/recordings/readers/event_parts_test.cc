@@ -51,7 +51,7 @@ TEST(CompactEvents, HoldAnyNumbers) {
 /// Three parts, of times 1, 2, 2; 3; 5, 6 s.
 class TestParts final : public EventParts {
  public:
-  explicit TestParts(RecentlyUsed& recent) : EventParts("FILE", recent) {
+  explicit TestParts(RecentEvents& recent) : EventParts("FILE", recent) {
     for (const auto& times_s : parts)
       add_part(std::ssize(times_s), times_s.front(), times_s.back());
   }
@@ -73,7 +73,7 @@ std::vector<double> times_of(const std::vector<StoredEvent>& events) {
 }
 
 TEST(EventParts, AreReadWhereTheyAreAskedForAndOnce) {
-  RecentlyUsed recent(100);
+  RecentEvents recent(100);
   const TestParts events(recent);
   EXPECT_EQ(events.count(), 6);
   EXPECT_THAT(events.reads, IsEmpty());
@@ -86,7 +86,7 @@ TEST(EventParts, AreReadWhereTheyAreAskedForAndOnce) {
 }
 
 TEST(EventParts, TellInWhichPartTheEventsBehindATimeBegin) {
-  RecentlyUsed recent(100);
+  RecentEvents recent(100);
   const TestParts events(recent);
   const std::pair<double, std::int64_t> expected[] = {{0.5, 0}, {1, 0}, {1.5, 0}, {2, 3}, {2.5, 3},
                                                       {3, 4},   {4, 4}, {5, 4},   {6, 6}, {9, 6}};
@@ -98,7 +98,7 @@ TEST(EventParts, TellInWhichPartTheEventsBehindATimeBegin) {
 }
 
 TEST(EventParts, ThatAreNotAsTheyWereAreRefused) {
-  RecentlyUsed recent(100);
+  RecentEvents recent(100);
   TestParts events(recent);
   events.parts[1].push_back(4);
   EXPECT_THAT(times_of(events.read(0, 3)), ElementsAre(1, 2, 2));
@@ -107,7 +107,7 @@ TEST(EventParts, ThatAreNotAsTheyWereAreRefused) {
 }
 
 TEST(EventParts, ThoseUsedLongestAgoGo) {
-  RecentlyUsed recent(4);
+  RecentEvents recent(4);
   const TestParts events(recent);
   events.read(0, 4);  // parts 0 and 1: four events
   events.read(0, 1);
@@ -123,7 +123,7 @@ TEST(EventParts, ThoseUsedLongestAgoGo) {
 }
 
 TEST(EventParts, TheLatestStaysHoweverLargeItIs) {
-  RecentlyUsed recent(1);
+  RecentEvents recent(1);
   const TestParts events(recent);
   events.read(0, 1);
   events.read(1, 2);
