@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "manifests/values/datasets.h"
+#include "manifests/values/rows.h"
 #include "stages/frames/dataset.h"
 #include "stages/frames/find_source.h"
 
@@ -57,10 +58,16 @@ extern const DatasetReader kKittiObjectReader, kKittiTrackingReader, kKittiRawRe
     kHuman36mReader, kMpiiListReader, kRecordingReader, kDhp19Reader, kFramesReader;
 
 /// Every kind's, in the order of kDatasets.
-inline constexpr std::array kDatasetReaders{
-    &kKittiObjectReader, &kKittiTrackingReader, &kKittiRawReader, &kMpiiReader,  &kHuman36mReader,
-    &kMpiiListReader,    &kRecordingReader,     &kDhp19Reader,    &kFramesReader};
-static_assert(kDatasetReaders.size() == kDatasets.size());
+inline constexpr auto kDatasetReaders =
+    parts_of<DatasetReader>(kDatasets, {{DatasetKind::kKittiObject, &kKittiObjectReader},
+                                        {DatasetKind::kKittiTracking, &kKittiTrackingReader},
+                                        {DatasetKind::kKittiRaw, &kKittiRawReader},
+                                        {DatasetKind::kMpii, &kMpiiReader},
+                                        {DatasetKind::kHuman36m, &kHuman36mReader},
+                                        {DatasetKind::kMpiiList, &kMpiiListReader},
+                                        {DatasetKind::kRecording, &kRecordingReader},
+                                        {DatasetKind::kDhp19, &kDhp19Reader},
+                                        {DatasetKind::kFrames, &kFramesReader}});
 
 const DatasetReader& dataset_reader(DatasetKind kind);
 

@@ -17,6 +17,7 @@
 #include "manifests/values/frames.h"
 #include "manifests/values/job.h"
 #include "manifests/values/labels.h"
+#include "manifests/values/rows.h"
 #include "stages/frames/source_folders.h"
 
 namespace eventgan {
@@ -217,9 +218,13 @@ extern const LabelReader kCsvReader;
 extern const LabelReader kMasksReader;
 
 /// Every format's, in the order of kLabelFormats.
-inline constexpr std::array kLabelReaders{&kMotReader, &kCocoReader, &kYoloReader,
-                                          &kVocReader, &kCsvReader,  &kMasksReader};
-static_assert(kLabelReaders.size() == kLabelFormats.size());
+inline constexpr auto kLabelReaders =
+    parts_of<LabelReader>(kLabelFormats, {{LabelFormat::kMot, &kMotReader},
+                                          {LabelFormat::kCoco, &kCocoReader},
+                                          {LabelFormat::kYolo, &kYoloReader},
+                                          {LabelFormat::kVoc, &kVocReader},
+                                          {LabelFormat::kCsv, &kCsvReader},
+                                          {LabelFormat::kMasks, &kMasksReader}});
 
 const LabelReader& label_reader(LabelFormat format);
 

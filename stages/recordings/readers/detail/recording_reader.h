@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "manifests/values/recording_formats.h"
+#include "manifests/values/rows.h"
 #include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
@@ -74,9 +75,16 @@ extern const RecordingReader kMvsecReader, kEventganReader, kEcdReader, kAedat4R
     kM3edReader, kEventUtilsReader, kV2eReader, kPropheseeReader, kTableReader;
 
 /// Every format's, in the order of kRecordingFormats.
-inline constexpr std::array kRecordingReaders{
-    &kMvsecReader, &kEventganReader,   &kEcdReader, &kAedat4Reader,    &kDsecReader,
-    &kM3edReader,  &kEventUtilsReader, &kV2eReader, &kPropheseeReader, &kTableReader};
-static_assert(kRecordingReaders.size() == kRecordingFormats.size());
+inline constexpr auto kRecordingReaders = parts_of<RecordingReader>(
+    kRecordingFormats, {{RecordingFormat::kMvsec, &kMvsecReader},
+                        {RecordingFormat::kEventgan, &kEventganReader},
+                        {RecordingFormat::kEcd, &kEcdReader},
+                        {RecordingFormat::kAedat4, &kAedat4Reader},
+                        {RecordingFormat::kDsec, &kDsecReader},
+                        {RecordingFormat::kM3ed, &kM3edReader},
+                        {RecordingFormat::kEventUtils, &kEventUtilsReader},
+                        {RecordingFormat::kV2e, &kV2eReader},
+                        {RecordingFormat::kProphesee, &kPropheseeReader},
+                        {RecordingFormat::kTable, &kTableReader}});
 
 }  // namespace eventgan
