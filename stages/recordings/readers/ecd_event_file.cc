@@ -108,15 +108,15 @@ EcdEventFile::EcdEventFile(const std::filesystem::path& path)
   });
 }
 
-const EventOrder& EcdEventFile::order() const {
+const TimeOrder& EcdEventFile::order() const {
   std::call_once(order_once_, [&] {
     order_ = known_order(index_key_, file_.end_byte(), [&] { return look_at_times(); });
   });
   return order_;
 }
 
-EventOrder EcdEventFile::look_at_times() const {
-  EventOrder order;
+TimeOrder EcdEventFile::look_at_times() const {
+  TimeOrder order;
   std::int64_t block = begin_;
   for (std::int64_t begin = begin_; begin < file_.end_byte();) {
     const std::int64_t end = std::min(begin + kBytesPerRead, file_.end_byte());

@@ -85,7 +85,7 @@ bool EventParts::unpack_parts(std::string_view bytes, std::size_t parts) {
   std::vector<std::int64_t> firsts;
   std::int64_t count = 0;
   if (!unpack(bytes, firsts) || firsts.size() != parts || !unpack(bytes, count)) return false;
-  auto order = EventOrder::take_bytes(bytes);
+  auto order = TimeOrder::take_bytes(bytes);
   const auto before = [](std::int64_t a, std::int64_t b) { return a >= b; };
   const bool ascend = std::ranges::adjacent_find(firsts, before) == firsts.end();
   const bool within = firsts.empty() ? count == 0 : firsts[0] == 0 && firsts.back() < count;

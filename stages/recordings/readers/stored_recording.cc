@@ -28,8 +28,8 @@ constexpr std::int64_t kEventsPerRead = std::int64_t{1} << 17;
 
 }  // namespace
 
-EventOrder EventStore::order() const {
-  EventOrder order;
+TimeOrder EventStore::order() const {
+  TimeOrder order;
   for (std::int64_t first = 0; first < count(); first += kEventsPerRead) {
     const std::int64_t events = std::min(kEventsPerRead, count() - first);
     try {
@@ -137,7 +137,7 @@ class StoredRecording final : public Recording {
   }
 
  private:
-  const EventOrder& order() const {
+  const TimeOrder& order() const {
     std::call_once(order_once_, [&] {
       order_ = known_order(parts_.index_key, event_count_, [&] { return parts_.events->order(); });
     });
@@ -187,7 +187,7 @@ class StoredRecording final : public Recording {
   std::int64_t event_count_;
   std::vector<double> frame_times_s_;
   mutable std::once_flag order_once_;
-  mutable EventOrder order_;
+  mutable TimeOrder order_;
 };
 
 }  // namespace

@@ -11,7 +11,7 @@
 
 #include "manifests/values/events.h"
 #include "stages/recordings/order/event_check.h"
-#include "stages/recordings/order/event_order.h"
+#include "stages/recordings/order/time_order.h"
 #include "stages/recordings/readers/detail/open_files.h"
 
 namespace eventgan {
@@ -51,15 +51,15 @@ class EcdEventFile {
   std::vector<Event> events(std::int64_t begin, std::int64_t end, EventCheck check) const;
 
  private:
-  const EventOrder& order() const;
-  EventOrder look_at_times() const;
+  const TimeOrder& order() const;
+  TimeOrder look_at_times() const;
   [[noreturn]] void refuse(const EventFault& fault, std::int64_t line_begin) const;
 
   std::string index_key_;  ///< before it is opened: of no later file in its place
   RecordingFile file_;
   std::int64_t begin_ = 0;  ///< of the first line that is no comment
   mutable std::once_flag order_once_;
-  mutable EventOrder order_;  ///< by bytes
+  mutable TimeOrder order_;  ///< by bytes
 };
 
 }  // namespace eventgan

@@ -62,7 +62,7 @@ class EventParts : public EventStore {
   std::vector<double> times_s(std::int64_t first, std::int64_t count) const final;
 
   /// Known since it was opened.
-  EventOrder order() const final { return order_; }
+  TimeOrder order() const final { return order_; }
 
  protected:
   /// `name` is for messages.
@@ -94,7 +94,7 @@ class EventParts : public EventStore {
   RecentEvents& recent_;
   std::vector<std::int64_t> firsts_;  ///< the number of each part's first event
   std::int64_t count_ = 0;
-  EventOrder order_;
+  TimeOrder order_;
 };
 
 }  // namespace eventgan

@@ -9,7 +9,7 @@
 
 #include "manifests/values/frames.h"
 #include "stages/recordings/order/event_check.h"
-#include "stages/recordings/order/event_order.h"
+#include "stages/recordings/order/time_order.h"
 #include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
@@ -32,7 +32,7 @@ class EventStore {
 
   /// What all times tell; places are events' positions. Reads them once, which takes as long as the
   /// file is large; what cannot be read is told by it, not thrown.
-  virtual EventOrder order() const;
+  virtual TimeOrder order() const;
 };
 
 /// The frames of a recording. Thread safe.

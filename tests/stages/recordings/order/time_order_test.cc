@@ -1,4 +1,4 @@
-#include "stages/recordings/order/event_order.h"
+#include "stages/recordings/order/time_order.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -28,18 +28,18 @@ using ::testing::ThrowsMessage;
 constexpr double kNoTime = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
-EventOrder order_of(const std::vector<double>& times_s) {
-  EventOrder order;
+TimeOrder order_of(const std::vector<double>& times_s) {
+  TimeOrder order;
   order.add_all(times_s, 0);
   return order;
 }
 
-bool touches_fall(const EventOrder& order, double after_s, double until_s) {
+bool touches_fall(const TimeOrder& order, double after_s, double until_s) {
   return order.fall_in(after_s, until_s) != nullptr;
 }
 
 /// What is wrong with the events up to a time, at which place.
-std::pair<std::string, std::int64_t> fault_of(const EventOrder& order, double after_s,
+std::pair<std::string, std::int64_t> fault_of(const TimeOrder& order, double after_s,
                                               double until_s) {
   std::pair<std::string, std::int64_t> found;
   require_order(order, after_s, until_s, [&](const EventFault& fault, std::int64_t place) {
@@ -48,21 +48,21 @@ std::pair<std::string, std::int64_t> fault_of(const EventOrder& order, double af
   return found;
 }
 
-TEST(EventOrder, OfNoEventsHasNoSpan) {
+TEST(TimeOrder, OfNoEventsHasNoSpan) {
   EXPECT_EQ(order_of({}).span(), std::nullopt);
   EXPECT_EQ(order_of({kNoTime, kNever}).span(), std::nullopt);
   EXPECT_EQ(order_of({}).block_after(0).end, 0);
   EXPECT_FALSE(touches_fall(order_of({}), -1, 1));
 }
 
-TEST(EventOrder, EqualTimesAreNoFall) {
-  const EventOrder order = order_of({1, 2, 2, kNoTime, 2, 3});
+TEST(TimeOrder, EqualTimesAreNoFall) {
+  const TimeOrder order = order_of({1, 2, 2, kNoTime, 2, 3});
   EXPECT_THAT(order.falls(), IsEmpty());
   EXPECT_EQ(order.span(), (std::array{1.0, 3.0}));
 }
 
-TEST(EventOrder, AnExchangedPairIsAFallOfItsOwn) {
-  const EventOrder order = order_of({1, 2, 4, 3, 5, 6});
+TEST(TimeOrder, AnExchangedPairIsAFallOfItsOwn) {
+  const TimeOrder order = order_of({1, 2, 4, 3, 5, 6});
   ASSERT_THAT(order.falls(), SizeIs(1));
   EXPECT_THAT(fault_of(order, 0, 3), Pair(HasSubstr("got 3 s after 4 s"), 3));
   EXPECT_THAT(fault_of(order, 0, 2.5), Pair(IsEmpty(), 0));
@@ -73,16 +73,16 @@ TEST(EventOrder, AnExchangedPairIsAFallOfItsOwn) {
   EXPECT_FALSE(touches_fall(order, 4, 5));
 }
 
-TEST(EventOrder, ARecordingBehindAnotherFallsThroughout) {
-  const EventOrder order = order_of({1, 2, 3, 1, 2, 3});
+TEST(TimeOrder, ARecordingBehindAnotherFallsThroughout) {
+  const TimeOrder order = order_of({1, 2, 3, 1, 2, 3});
   ASSERT_THAT(order.falls(), SizeIs(1));
   EXPECT_TRUE(touches_fall(order, 0, 1));
   EXPECT_TRUE(touches_fall(order, 2.5, 9));
   EXPECT_FALSE(touches_fall(order, 3, 9));
 }
 
-TEST(EventOrder, WhatCouldNotBeReadMayBeAnyTime) {
-  EventOrder order;
+TEST(TimeOrder, WhatCouldNotBeReadMayBeAnyTime) {
+  TimeOrder order;
   order.add_all(std::vector<double>{1, 2}, 0);
   order.add_unreadable(std::make_exception_ptr(InputError("damage")));
   order.end_block(4);
@@ -96,8 +96,8 @@ TEST(EventOrder, WhatCouldNotBeReadMayBeAnyTime) {
   EXPECT_EQ(order.to_bytes(), std::nullopt);
 }
 
-TEST(EventOrder, WhatCouldNotBeReadIsNotKeptEvenWithinAFall) {
-  EventOrder order;
+TEST(TimeOrder, WhatCouldNotBeReadIsNotKeptEvenWithinAFall) {
+  TimeOrder order;
   order.add_all(std::vector<double>{1, 5, 3}, 0);
   EXPECT_NE(order.to_bytes(), std::nullopt);
   order.add_unreadable(std::make_exception_ptr(InputError("damage")));
@@ -105,11 +105,11 @@ TEST(EventOrder, WhatCouldNotBeReadIsNotKeptEvenWithinAFall) {
   EXPECT_EQ(order.to_bytes(), std::nullopt);
 }
 
-TEST(EventOrder, TooManyFallsAreTakenTogether) {
+TEST(TimeOrder, TooManyFallsAreTakenTogether) {
   std::vector<double> times;
   constexpr int kPairs = 100'000;
   for (int i = 0; i < kPairs; ++i) times.insert(times.end(), {3.0 * i + 1, 3.0 * i});
-  const EventOrder order = order_of(times);
+  const TimeOrder order = order_of(times);
   EXPECT_LE(order.falls().size(), 65'536u);
   for (int i = 0; i < kPairs; i += 99) EXPECT_TRUE(touches_fall(order, 3.0 * i, 3.0 * i + 0.5));
 }
@@ -133,7 +133,7 @@ class Listed final : public EventStore {
 
 // Whatever is exchanged: a window has all events of its time, or it is refused; and those that
 // touch no exchanged time are not.
-TEST(EventOrder, NoWindowLosesAnEventInSilence) {
+TEST(TimeOrder, NoWindowLosesAnEventInSilence) {
   std::mt19937 random(7);
   for (int trial = 0; trial < 12; ++trial) {
     std::vector<double> times;

@@ -21,7 +21,7 @@ namespace eventgan {
 ///
 /// Times that are not finite are passed over: a stretch of events that has some is refused when it
 /// is read.
-class EventOrder {
+class TimeOrder {
  public:
   /// Events of these times may lie elsewhere than among those of their time: for no time in
   /// [from_s, until_s) does a place divide the events up to it from those after it.
@@ -74,7 +74,7 @@ class EventOrder {
   /// As it is now, for take_bytes; none where something could not be read, which may be read later.
   std::optional<std::string> to_bytes() const;
   /// Takes these off the front of `bytes`; none if they are no such.
-  static std::optional<EventOrder> take_bytes(std::string_view& bytes);
+  static std::optional<TimeOrder> take_bytes(std::string_view& bytes);
 
   /// The earliest and the latest time; none if no time is finite.
   std::optional<std::array<double, 2>> span() const;
@@ -101,13 +101,13 @@ class EventOrder {
 
 /// What EventIndexes has under the key of a file whose places end at `end`, else what `look` finds,
 /// which it has from then on. Of an empty key always that.
-EventOrder known_order(const std::string& index_key, std::int64_t end,
-                       const std::function<EventOrder()>& look);
+TimeOrder known_order(const std::string& index_key, std::int64_t end,
+                      const std::function<TimeOrder()>& look);
 
 /// Nothing where the events of times in (after_s, until_s] lie among the others of theirs; else
 /// `refuse(fault, place)`, which throws, is called with what is wrong at which place, or where
 /// nothing could be read, what was thrown then is thrown again.
-void require_order(const EventOrder& order, double after_s, double until_s,
+void require_order(const TimeOrder& order, double after_s, double until_s,
                    const std::function<void(const EventFault&, std::int64_t)>& refuse);
 
 }  // namespace eventgan

@@ -1,4 +1,4 @@
-#include "stages/recordings/order/event_order.h"
+#include "stages/recordings/order/time_order.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 
 namespace eventgan {
 
-void EventOrder::add_other(double time_s, std::int64_t place) {
+void TimeOrder::add_other(double time_s, std::int64_t place) {
   if (!std::isfinite(time_s)) return;
   const double before_s = latest_s_;
   latest_s_ = std::max(latest_s_, time_s);
@@ -20,12 +20,12 @@ void EventOrder::add_other(double time_s, std::int64_t place) {
   if (time_s < before_s) add_fall({time_s, before_s, place, before_s, time_s});
 }
 
-void EventOrder::add_unreadable(std::exception_ptr error) {
+void TimeOrder::add_unreadable(std::exception_ptr error) {
   add_fall({latest_s_, kInfinity, 0, latest_s_, latest_s_, std::move(error)});
   is_unread_ = any_unread_ = true;
 }
 
-void EventOrder::add_all(std::span<const double> times_s, std::int64_t first) {
+void TimeOrder::add_all(std::span<const double> times_s, std::int64_t first) {
   constexpr std::int64_t kEventsPerBlock = std::int64_t{1} << 13;
   for (const double time_s : times_s) {
     add(time_s, first);
@@ -35,7 +35,7 @@ void EventOrder::add_all(std::span<const double> times_s, std::int64_t first) {
 }
 
 /// Falls end at ever later times, so that only the last ones can touch a new one.
-void EventOrder::add_fall(Fall fall) {
+void TimeOrder::add_fall(Fall fall) {
   constexpr std::size_t kMost = std::size_t{1} << 16;  // beyond it they are taken together
   while (!falls_.empty() && (falls_.back().until_s >= fall.from_s || falls_.size() == kMost)) {
     const double from_s = std::min(falls_.back().from_s, fall.from_s), until_s = fall.until_s;
@@ -47,31 +47,31 @@ void EventOrder::add_fall(Fall fall) {
   falls_.push_back(std::move(fall));
 }
 
-void EventOrder::end_block(std::int64_t end) {
+void TimeOrder::end_block(std::int64_t end) {
   if (end == this->end()) return;
   blocks_.push_back({end, latest_s_});
 }
 
-EventOrder::Places EventOrder::block_after(double time_s) const {
+TimeOrder::Places TimeOrder::block_after(double time_s) const {
   const auto block = std::ranges::upper_bound(blocks_, time_s, {}, &Block::latest_s);
   const std::int64_t begin = block == blocks_.begin() ? 0 : std::prev(block)->end;
   return {begin, block == blocks_.end() ? begin : block->end};
 }
 
-const EventOrder::Fall* EventOrder::fall_in(double after_s, double until_s) const {
+const TimeOrder::Fall* TimeOrder::fall_in(double after_s, double until_s) const {
   const auto fall = std::ranges::upper_bound(falls_, after_s, {}, &Fall::until_s);
   if (fall != falls_.end() && fall->from_s <= until_s) return &*fall;
   return nullptr;
 }
 
-std::optional<std::array<double, 2>> EventOrder::span() const {
+std::optional<std::array<double, 2>> TimeOrder::span() const {
   if (!any_) return std::nullopt;
   return std::array{earliest_s_, latest_s_};
 }
 
 namespace {
 
-/// EventOrder::Fall as bytes.
+/// TimeOrder::Fall as bytes.
 struct PackedFall {
   double from_s = 0, until_s = 0;
   std::int64_t place = 0;
@@ -80,7 +80,7 @@ struct PackedFall {
 
 }  // namespace
 
-std::optional<std::string> EventOrder::to_bytes() const {
+std::optional<std::string> TimeOrder::to_bytes() const {
   if (any_unread_) return std::nullopt;
   std::vector<PackedFall> falls;
   for (const Fall& fall : falls_) {
@@ -95,8 +95,8 @@ std::optional<std::string> EventOrder::to_bytes() const {
   return bytes;
 }
 
-std::optional<EventOrder> EventOrder::take_bytes(std::string_view& bytes) {
-  EventOrder order;
+std::optional<TimeOrder> TimeOrder::take_bytes(std::string_view& bytes) {
+  TimeOrder order;
   std::vector<PackedFall> falls;
   if (!unpack(bytes, order.any_) || !unpack(bytes, order.earliest_s_) ||
       !unpack(bytes, order.latest_s_) || !unpack(bytes, falls) || !unpack(bytes, order.blocks_)) {
@@ -112,23 +112,23 @@ std::optional<EventOrder> EventOrder::take_bytes(std::string_view& bytes) {
   return order;
 }
 
-EventOrder known_order(const std::string& index_key, std::int64_t end,
-                       const std::function<EventOrder()>& look) {
+TimeOrder known_order(const std::string& index_key, std::int64_t end,
+                      const std::function<TimeOrder()>& look) {
   EventIndexes* const indexes = index_key.empty() ? nullptr : EventIndexes::current();
   if (indexes == nullptr) return look();
   if (const auto bytes = indexes->find(index_key)) {
     std::string_view rest = *bytes;
-    auto order = EventOrder::take_bytes(rest);
+    auto order = TimeOrder::take_bytes(rest);
     if (order && rest.empty() && order->end() == end) return *std::move(order);
   }
-  EventOrder order = look();
+  TimeOrder order = look();
   if (auto bytes = order.to_bytes()) indexes->keep(index_key, *std::move(bytes));
   return order;
 }
 
-void require_order(const EventOrder& order, double after_s, double until_s,
+void require_order(const TimeOrder& order, double after_s, double until_s,
                    const std::function<void(const EventFault&, std::int64_t)>& refuse) {
-  const EventOrder::Fall* const fall = order.fall_in(after_s, until_s);
+  const TimeOrder::Fall* const fall = order.fall_in(after_s, until_s);
   if (fall == nullptr) return;
   if (fall->unread) std::rethrow_exception(fall->unread);
   try {
