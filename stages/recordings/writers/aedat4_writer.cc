@@ -15,18 +15,15 @@
 #include "manifests/files/atomic_file.h"
 #include "manifests/files/input_file.h"
 #include "stages/recordings/readers/aedat4_packets.h"
+#include "stages/recordings/writers/detail/require.h"
 
 namespace eventgan {
 namespace {
 
 constexpr std::size_t kEventsPerPacket = 8192;
-constexpr char kSettings[] = "simulation";
+constexpr char kSettingsKey[] = "simulation";
 enum Stream : int { kEventStream, kFrameStream };
 enum Compression : int { kLz4 = 1 };
-
-void require(bool condition, const char* rule) {
-  if (!condition) throw std::invalid_argument(rule);
-}
 
 std::string_view bytes_of(const flatbuffers::FlatBufferBuilder& builder) {
   return {reinterpret_cast<const char*>(builder.GetBufferPointer()), builder.GetSize()};
@@ -76,7 +73,7 @@ std::string streams_xml(ImageSize size, const std::string& settings) {
     add_attribute(info, "sizeY", "int", std::to_string(size.height));
     add_attribute(info, "source", "string", "eventgan");
     if (number == kEventStream && !settings.empty()) {
-      add_attribute(info, kSettings, "string", settings);
+      add_attribute(info, kSettingsKey, "string", settings);
     }
   };
   add(kEventStream, "events", "Array of events (polarity ON/OFF).", "EVTS");
@@ -205,7 +202,7 @@ std::optional<std::string> aedat4_settings(const std::filesystem::path& path) {
   pugi::xml_document document;
   if (xml == nullptr || !document.load_buffer(xml->data(), xml->size())) return {};
   const pugi::xml_node found = document.find_node([](const pugi::xml_node& node) {
-    return std::string_view(node.attribute("key").value()) == kSettings;
+    return std::string_view(node.attribute("key").value()) == kSettingsKey;
   });
   if (!found) return {};
   return found.text().as_string();

@@ -2,23 +2,18 @@
 
 #include <limits>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "stages/base/hdf5/hdf5_output_file.h"
 #include "stages/recordings/readers/hdf5_layouts.h"
 #include "stages/recordings/writers/detail/growing_dataset.h"
+#include "stages/recordings/writers/detail/require.h"
 
 namespace eventgan {
 namespace {
 
-constexpr hsize_t kEventsPerChunk = 32768;
 constexpr std::int64_t kMicrosecondsPerMillisecond = 1000;
-
-void require(bool condition, const char* rule) {
-  if (!condition) throw std::invalid_argument(rule);
-}
 
 template <class Number>
 GrowingDataset<Number> column(hid_t file, const std::string& path) {

@@ -11,19 +11,14 @@
 #include "stages/recordings/order/event_check.h"
 #include "stages/recordings/readers/hdf5_layouts.h"
 #include "stages/recordings/writers/detail/growing_dataset.h"
+#include "stages/recordings/writers/detail/require.h"
 
 namespace eventgan {
 namespace {
 
-// Events are chunked by column, since x, y, t and p compress best each among its like.
-constexpr hsize_t kEventsPerChunk = 32768;
 constexpr char kCamera[] = "left";
 constexpr double kBeforeAll = -std::numeric_limits<double>::infinity();
 constexpr double kAfterAll = std::numeric_limits<double>::max();
-
-void require(bool condition, const std::string& rule) {
-  if (!condition) throw std::invalid_argument(rule);
-}
 
 bool is_field(const FlowField& flow, ImageSize size) {
   return flow.size == size && flow.x_px.size() == size.pixel_count() &&
@@ -88,6 +83,7 @@ void MvsecWriter::File::create_objects(const std::string& settings) {
     create_group(hdf5.id(), path).close(path);
   }
   const Hdf5Layout layout = mvsec_layout(kCamera);
+  // Events are chunked by column, since x, y, t and p compress best each among its like.
   events.emplace(hdf5.id(), layout.events, Dims{4}, Dims{kEventsPerChunk, 1}, kEventsPerChunk);
   const Dims sides = image();
   frames.emplace(hdf5.id(), layout.frames, sides, Dims{1, sides[0], sides[1]}, 1);

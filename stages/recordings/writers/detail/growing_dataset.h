@@ -10,6 +10,7 @@ namespace eventgan {
 
 /// A middling level: higher ones gain little on events and cost several times as much.
 inline constexpr int kRecordingDeflateLevel = 4;
+inline constexpr hsize_t kEventsPerChunk = 32768;
 
 /// A new dataset whose number of rows grows: [rows, inner...] of `Number`, chunked and filtered,
 /// without time stamps. Rows are kept until `rows_per_write` have come, so that every chunk is

@@ -212,11 +212,11 @@ TEST_F(Aedat4Test, ReadsAFileWithoutFrames) {
 
 /// Of `packets` packets of a thousand events, one each microsecond.
 TestFile long_file(int packets) {
-  constexpr std::int64_t kEvents = 1000;
+  constexpr std::int64_t kInPacket = 1000;
   TestFile file;
   for (int i = 0; i < packets; ++i) {
     std::vector<aedat4::Event> events;
-    for (std::int64_t k = 0; k < kEvents; ++k) events.emplace_back(i * kEvents + k, 1, 2, 1);
+    for (std::int64_t k = 0; k < kInPacket; ++k) events.emplace_back(i * kInPacket + k, 1, 2, 1);
     file.packets.push_back(events_packet(events));
   }
   return file;

@@ -24,11 +24,11 @@ std::unique_ptr<Recording> open(const std::filesystem::path& file) {
 TEST(Aedat4Writer, IsReadBackEventForEventAndFrameForFrame) {
   const TemporaryFolder folder;
   constexpr ImageSize kSize{5, 300};
-  constexpr int kFrames = 6, kBetween = 9000;  // more events than one packet has
+  constexpr int kFrameCount = 6, kBetween = 9000;  // more events than one packet has
   std::mt19937 random(3);
   std::vector<StampedEvent> events;
   std::vector<GreyImage> frames;
-  for (int frame = 0; frame < kFrames; ++frame) {
+  for (int frame = 0; frame < kFrameCount; ++frame) {
     for (int i = 0; i < kBetween; ++i) {
       events.push_back({1'600'000'000'000'000 + frame * 50'000 + i * 5,
                         static_cast<std::uint16_t>(random() % 300),
@@ -42,7 +42,7 @@ TEST(Aedat4Writer, IsReadBackEventForEventAndFrameForFrame) {
   const auto frame_us = [](int frame) { return 1'600'000'000'000'000 + (frame + 1) * 50'000; };
   const auto write = [&](const char* name, std::size_t at_once) {
     Aedat4Writer writer(folder / name, kSize);
-    for (int frame = 0; frame < kFrames; ++frame) {
+    for (int frame = 0; frame < kFrameCount; ++frame) {
       const auto between =
           std::span(events).subspan(static_cast<std::size_t>(frame) * kBetween, kBetween);
       for (std::size_t i = 0; i < between.size(); i += at_once) {
@@ -59,8 +59,8 @@ TEST(Aedat4Writer, IsReadBackEventForEventAndFrameForFrame) {
   const auto recording = open(folder / "a.aedat4");
   EXPECT_TRUE(recording->notes().empty());
   EXPECT_EQ(recording->size(), kSize);
-  ASSERT_EQ(recording->frame_count(), kFrames);
-  for (int frame = 0; frame < kFrames; ++frame) {
+  ASSERT_EQ(recording->frame_count(), kFrameCount);
+  for (int frame = 0; frame < kFrameCount; ++frame) {
     EXPECT_DOUBLE_EQ(recording->frame_time_s(frame), static_cast<double>(frame_us(frame)) / 1e6);
     EXPECT_EQ(recording->frame(frame), frames[static_cast<std::size_t>(frame)]);
   }
