@@ -28,7 +28,7 @@
 #include "pipeline/runtime/threads.h"
 #include "pipeline/runtime/trace.h"
 #include "stages/frames/sources/class_numbers.h"
-#include "stages/recordings/event_index.h"
+#include "stages/recordings/order/event_index.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {

@@ -21,8 +21,8 @@
 #include "stages/frames/decoding/still_clip.h"
 #include "stages/frames/sources/open_dataset.h"
 #include "stages/frames/sources/still_clips.h"
-#include "stages/recordings/event_index.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/order/event_index.h"
+#include "stages/recordings/readers/recording.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {

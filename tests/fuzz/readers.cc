@@ -25,9 +25,9 @@
 #include "stages/generator/checkpoints/fold.h"
 #include "stages/generator/safetensors.h"
 #include "stages/generator/weights_file.h"
-#include "stages/recordings/detail/aedat4_recording.h"
-#include "stages/recordings/detail/prophesee_recording.h"
-#include "stages/recordings/detail/table_recording.h"
+#include "stages/recordings/readers/detail/aedat4_recording.h"
+#include "stages/recordings/readers/detail/prophesee_recording.h"
+#include "stages/recordings/readers/detail/table_recording.h"
 #include "tests/testing/zip_file.h"
 
 namespace eventgan::testing {

@@ -16,7 +16,7 @@
 #include "stages/frames/listing/image_folder.h"
 #include "stages/frames/listing/source_folders.h"
 #include "stages/frames/sequences/frames_dataset.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 namespace {

@@ -16,7 +16,7 @@
 #include "stages/frames/events/recording_labels.h"
 #include "stages/frames/listing/source_folders.h"
 #include "stages/frames/own_labels/yolo_text.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 namespace {

@@ -1,9 +1,11 @@
 #include "stages/frames/naming/frame_names.h"
 
-#include <utf8.h>
+#include <utf8proc.h>
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
+#include <memory>
 #include <optional>
 
 #include "stages/frames/listing/image_folder.h"
@@ -16,73 +18,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Letters with an accent, and what they are without it (Unicode's canonical decompositions of the
-/// Latin, Cyrillic and Japanese letters that names have).
-struct Accent {
-  char32_t mark;
-  std::u32string_view without, with;
-};
-constexpr Accent kAccents[] = {
-    {U'\u0300', U"AEIOUaeiouЕИеиÂâĂăÊêÔôƠơƯưYy", U"ÀÈÌÒÙàèìòùЀЍѐѝẦầẰằỀềỒồỜờỪừỲỳ"},
-    {U'\u0301', U"AEIOUYaeiouyCcLlNnRrSsZzГКгкÂâĂăÊêÔôƠơƯư",
-     U"ÁÉÍÓÚÝáéíóúýĆćĹĺŃńŔŕŚśŹźЃЌѓќẤấẮắẾếỐốỚớỨứ"},
-    {U'\u0302', U"AEIOUaeiouCcGgHhJjSsWwYyẠạẸẹỌọ", U"ÂÊÎÔÛâêîôûĈĉĜĝĤĥĴĵŜŝŴŵŶŷẬậỆệỘộ"},
-    {U'\u0303', U"ANOanoIiUuÂâĂăEeÊêÔôƠơƯưYy", U"ÃÑÕãñõĨĩŨũẪẫẴẵẼẽỄễỖỗỠỡỮữỸỹ"},
-    {U'\u0304', U"AaEeIiOoUu", U"ĀāĒēĪīŌōŪū"},
-    {U'\u0306', U"AaEeGgIiOoUuУИиуẠạ", U"ĂăĔĕĞğĬĭŎŏŬŭЎЙйўẶặ"},
-    {U'\u0307', U"CcEeGgIZz", U"ĊċĖėĠġİŻż"},
-    {U'\u0308', U"AEIOUaeiouyYЕІеі", U"ÄËÏÖÜäëïöüÿŸЁЇёї"},
-    {U'\u0309', U"AaÂâĂăEeÊêIiOoÔôƠơUuƯưYy", U"ẢảẨẩẲẳẺẻỂểỈỉỎỏỔổỞởỦủỬửỶỷ"},
-    {U'\u030A', U"AaUu", U"ÅåŮů"},
-    {U'\u030B', U"OoUu", U"ŐőŰű"},
-    {U'\u030C', U"CcDdEeLlNnRrSsTtZz", U"ČčĎďĚěĽľŇňŘřŠšŤťŽž"},
-    {U'\u031B', U"OoUu", U"ƠơƯư"},
-    {U'\u0323', U"AaEeIiOoƠơUuƯưYy", U"ẠạẸẹỊịỌọỢợỤụỰựỴỵ"},
-    {U'\u0327', U"CcGgKkLlNnRrSsTt", U"ÇçĢģĶķĻļŅņŖŗŞşŢţ"},
-    {U'\u0328', U"AaEeIiUu", U"ĄąĘęĮįŲų"},
-    {U'\u3099',
-     U"かきくけこさしすせそたちつてとはひふへほうゝカキクケコサシスセソタチツテトハヒフヘホウワヰヱ"
-     U"ヲヽ",
-     U"がぎぐげござじずぜぞだぢづでどばびぶべぼゔゞガギグゲゴザジズゼゾダヂヅデドバビブベボヴヷヸヹ"
-     U"ヺヾ"},
-    {U'\u309A', U"はひふへほハヒフヘホ", U"ぱぴぷぺぽパピプペポ"},
-};
-
-/// Adds a letter with its accents apart, as macOS writes names (NFD).
-void add_apart(char32_t letter, std::u32string& text) {
-  constexpr char32_t kHangul = 0xAC00, kSyllables = 11172, kVowels = 21, kTails = 28;
-  if (letter >= kHangul && letter < kHangul + kSyllables) {
-    const char32_t place = letter - kHangul;
-    text.push_back(U'\u1100' + place / (kVowels * kTails));
-    text.push_back(U'\u1161' + place % (kVowels * kTails) / kTails);
-    if (place % kTails != 0) text.push_back(U'\u11A7' + place % kTails);
-    return;
-  }
-  if (letter < 0x80) {
-    text += letter;
-    return;
-  }
-  for (const Accent& accent : kAccents) {
-    const std::size_t place = accent.with.find(letter);
-    if (place == std::u32string_view::npos) continue;
-    add_apart(accent.without[place], text);
-    text += accent.mark;
-    return;
-  }
-  text += letter;
-}
-
 /// One text for all the ways to write a name: its extension in small letters, accents apart.
 std::string folded(std::string_view name) {
   const fs::path path(name);
   std::string text = (path.parent_path() / path.stem()).generic_string() + lower_extension(path);
   const bool is_ascii = std::ranges::all_of(text, [](char c) { return (c & 0x80) == 0; });
-  if (is_ascii || !utf8::is_valid(text)) return text;
-  std::u32string apart;
-  for (auto at = text.cbegin(); at != text.cend();) add_apart(utf8::next(at, text.cend()), apart);
-  text.clear();
-  for (const char32_t letter : apart) utf8::append(letter, std::back_inserter(text));
-  return text;
+  if (is_ascii) return text;
+  utf8proc_uint8_t* apart = nullptr;  // as macOS writes names (NFD)
+  const auto size =
+      utf8proc_map(reinterpret_cast<const utf8proc_uint8_t*>(text.data()), std::ssize(text), &apart,
+                   utf8proc_option_t(UTF8PROC_STABLE | UTF8PROC_DECOMPOSE));
+  const std::unique_ptr<utf8proc_uint8_t, decltype(&std::free)> owner(apart, &std::free);
+  if (size < 0) return text;  // not UTF-8
+  return {reinterpret_cast<const char*>(apart), static_cast<std::size_t>(size)};
 }
 
 /// With / for Windows' \, and the letters that %20 and the like stand for.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "manifests/values/job.h"
+#include "manifests/values/rows.h"
 #include "stages/frames/naming/own_labels.h"
 
 namespace eventgan {
@@ -101,9 +102,13 @@ extern const LabelReader kCsvReader;
 extern const LabelReader kMasksReader;
 
 /// Every format's, in the order of kLabelFormats.
-inline constexpr std::array kLabelReaders{&kMotReader, &kCocoReader, &kYoloReader,
-                                          &kVocReader, &kCsvReader,  &kMasksReader};
-static_assert(kLabelReaders.size() == kLabelFormats.size());
+inline constexpr auto kLabelReaders =
+    parts_of<LabelReader>(kLabelFormats, {{LabelFormat::kMot, &kMotReader},
+                                          {LabelFormat::kCoco, &kCocoReader},
+                                          {LabelFormat::kYolo, &kYoloReader},
+                                          {LabelFormat::kVoc, &kVocReader},
+                                          {LabelFormat::kCsv, &kCsvReader},
+                                          {LabelFormat::kMasks, &kMasksReader}});
 
 const LabelReader& label_reader(LabelFormat format);
 

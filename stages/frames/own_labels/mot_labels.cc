@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "manifests/files/csv_records.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/text.h"
 #include "manifests/values/text_lines.h"
 #include "stages/frames/listing/numbered_sequence.h"
@@ -386,7 +387,7 @@ class MotLabels : public ReadLabels {
                        source().root.written(source().frames[frames.begin()->second].name));
     }
     const std::string text = root_.read_or_throw(file);
-    const auto [first, is_new] = of_text_.emplace(std::hash<std::string>()(text), sequence);
+    const auto [first, is_new] = of_text_.emplace(sha256_hex(text), sequence);
     if (!is_new && !text.empty()) copies_.push_back(sequence + " (of " + first->second + ")");
     auto by_number = parse_mot_labels(text, form_of(file, text), path);
     if (from_0) require_all(frames, info, by_number.empty() ? 0 : by_number.rbegin()->first, path);
@@ -418,7 +419,7 @@ class MotLabels : public ReadLabels {
   ClassList classes_;
   Remarks remarks_;
   std::map<std::string, double> rates_;
-  std::map<std::size_t, std::string> of_text_;  ///< the first sequence of a table, by its hash
+  std::map<std::string, std::string> of_text_;  ///< the first sequence of a table, by its SHA-256
   std::vector<std::string> with_names_, of_visdrone_, copies_;
 };
 

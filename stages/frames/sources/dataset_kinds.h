@@ -1,8 +1,7 @@
 #pragma once
 
-#include <array>
-
 #include "manifests/values/datasets.h"
+#include "manifests/values/rows.h"
 #include "stages/frames/dataset/dataset_reader.h"
 #include "stages/frames/events/dhp19_dataset.h"
 #include "stages/frames/events/recording_dataset.h"
@@ -17,10 +16,16 @@
 namespace eventgan {
 
 /// Every kind's, in the order of kDatasets.
-inline constexpr std::array kDatasetReaders{
-    &kKittiObjectReader, &kKittiTrackingReader, &kKittiRawReader, &kMpiiReader,  &kHuman36mReader,
-    &kMpiiListReader,    &kRecordingReader,     &kDhp19Reader,    &kFramesReader};
-static_assert(kDatasetReaders.size() == kDatasets.size());
+inline constexpr auto kDatasetReaders =
+    parts_of<DatasetReader>(kDatasets, {{DatasetKind::kKittiObject, &kKittiObjectReader},
+                                        {DatasetKind::kKittiTracking, &kKittiTrackingReader},
+                                        {DatasetKind::kKittiRaw, &kKittiRawReader},
+                                        {DatasetKind::kMpii, &kMpiiReader},
+                                        {DatasetKind::kHuman36m, &kHuman36mReader},
+                                        {DatasetKind::kMpiiList, &kMpiiListReader},
+                                        {DatasetKind::kRecording, &kRecordingReader},
+                                        {DatasetKind::kDhp19, &kDhp19Reader},
+                                        {DatasetKind::kFrames, &kFramesReader}});
 
 const DatasetReader& dataset_reader(DatasetKind kind);
 

@@ -19,18 +19,18 @@
 
 #include "manifests/values/outlines.h"
 #include "manifests/values/pair_key.h"
+#include "manifests/values/recently_used.h"
 #include "manifests/values/still_motion.h"
 #include "stages/frames/dataset/wrapped_dataset.h"
 #include "stages/frames/decoding/cut_out.h"
 #include "stages/frames/decoding/frame_decoder.h"
-#include "stages/frames/decoding/shared_results.h"
 
 namespace eventgan {
 namespace {
 
 constexpr double kUsualRate_hz = 20;
-constexpr double kLeastSeen = 0.05;      // of a box, or it is left out
-constexpr std::size_t kKeptStills = 64;  // read once for all frames of their clips
+constexpr double kLeastSeen = 0.05;       // of a box, or it is left out
+constexpr std::int64_t kKeptStills = 64;  // read once for all frames of their clips
 constexpr int kKeptVideoFrames = 2;
 
 /// Where a still's points lie in a frame of its clip.
@@ -440,7 +440,7 @@ class StillClips final : public WrappedDataset {
   std::unordered_map<std::string, const LabelledFrame*> stills_;  ///< by their labels' keys
   FrameDecoder decoder_;
   mutable ImageSizes sizes_;
-  mutable SharedResults<SharedStill> shared_{kKeptStills};
+  mutable RecentlyUsed<std::string, SharedStill> shared_{kKeptStills};
 };
 
 }  // namespace

@@ -14,7 +14,7 @@
 #include "manifests/values/faults.h"
 #include "pipeline/simulation/simulate.h"
 #include "stages/frames/events/recording_labels.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 #include "tests/pipeline/simulation/moving_clip.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

@@ -251,11 +251,13 @@ TEST_F(CocoLabels, ImagesMayBeNamedAsToolsWriteThem) {
         "C:\\data\\000001.png", "other%2F000001.png", "000001", "/home/me/000001.png"}) {
     EXPECT_EQ(key_of(name), "000001") << name;
   }
-  // Accents in one letter or apart (NFC, NFD): of Latin, Vietnamese, Korean, Japanese letters.
+  // Accents in one letter or apart (NFC, NFD): of Latin, Vietnamese, Korean, Japanese, Greek
+  // letters.
   for (const auto& [disk, listed] : {std::pair("\u00e9t\u00e9.png", "e\u0301te\u0301.png"),
                                      {"e\u0323\u0302.png", "\u1ec7.png"},
                                      {"\uac70\u1112.png", "\u1100\u1165\u1112.png"},
-                                     {"\u30ac.png", "\u30ab\u3099.png"}}) {
+                                     {"\u30ac.png", "\u30ab\u3099.png"},
+                                     {"\u03ae.png", "\u03b7\u0301.png"}}) {
     testing::write_flat_image(folder_ / "images" / disk, kImage, 7);
     EXPECT_EQ(key_of(listed), std::filesystem::path(disk).stem().string());
   }

@@ -367,6 +367,17 @@ TEST_F(NamedLabels, CopiesOfASequenceAreToldOf) {
   EXPECT_THAT(dataset->notes()[0], ::testing::EndsWith("): M-02-SDP (of M-02-DPM)"));
 }
 
+TEST_F(NamedLabels, TablesOfOneHashAreNoCopies) {
+  const std::string tables[] = {"1,1,1,1,2,2,1,1,Oi37xZjQntugbAdU\n",
+                                "1,1,1,1,2,2,1,1,HJQyXapZTV9qbGum\n"};
+  ASSERT_EQ(std::hash<std::string>()(tables[0]), std::hash<std::string>()(tables[1]));
+  for (const std::size_t i : {0, 1}) {
+    image("m/" + std::to_string(i) + "/img1/000001.png");
+    text("m/" + std::to_string(i) + "/gt/gt.txt", tables[i]);
+  }
+  EXPECT_THAT(open(LabelFormat::kMot, "m", "m")->notes(), ::testing::IsEmpty());
+}
+
 TEST_F(NamedLabels, MotsLengthAloneIsEnough) {
   for (const char* name : {"1", "2"}) image("m/s/img1/00000" + std::string(name) + ".png");
   text("m/s/gt/gt.txt", "1.0,1.0,1,1,5,5,1\n");
