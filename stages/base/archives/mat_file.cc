@@ -17,13 +17,13 @@ namespace {
 
 constexpr std::size_t kHeaderBytes = 128;
 constexpr std::size_t kTagBytes = 8;
-constexpr std::uint32_t kMatrix = 14;      // miMATRIX
-constexpr std::uint32_t kCompressed = 15;  // miCOMPRESSED
+constexpr std::uint32_t kMatrix = 14;             // miMATRIX
+constexpr std::uint32_t kCompressedElement = 15;  // miCOMPRESSED
 constexpr std::size_t kMostInflated = std::size_t{1} << 30;
-constexpr std::size_t kMostDimensions = 8;
+constexpr std::size_t kMostMatDimensions = 8;
 constexpr std::size_t kLongestField = 64;  // MATLAB's own limit is 63, and a zero ends it
 
-[[noreturn]] void refuse(const std::string& expected, const std::string& got) {
+[[noreturn]] void refuse_mat(const std::string& expected, const std::string& got) {
   throw std::invalid_argument("expected " + expected + ", got " + got);
 }
 
@@ -49,10 +49,10 @@ class Elements {
   bool at_end() const { return rest_.empty(); }
 
   Element next(const char* what) {
-    if (rest_.size() < kTagBytes) refuse(std::string("a tag for ") + what, "the array's end");
+    if (rest_.size() < kTagBytes) refuse_mat(std::string("a tag for ") + what, "the array's end");
     const std::uint32_t first = number_at(rest_, 0, little_);
     if (const std::size_t size = first >> 16; size != 0) {  // up to four bytes lie in the tag
-      if (size > 4) refuse("at most 4 bytes in a tag", std::to_string(size));
+      if (size > 4) refuse_mat("at most 4 bytes in a tag", std::to_string(size));
       const Element small{first & 0xffff, rest_.substr(4, size)};
       rest_.remove_prefix(kTagBytes);
       return small;
@@ -60,10 +60,10 @@ class Elements {
     const std::size_t size = number_at(rest_, 4, little_);
     rest_.remove_prefix(kTagBytes);
     if (size > rest_.size()) {
-      refuse(std::to_string(size) + " bytes of " + what, std::to_string(rest_.size()));
+      refuse_mat(std::to_string(size) + " bytes of " + what, std::to_string(rest_.size()));
     }
     const Element element{first, rest_.substr(0, size)};
-    const bool is_padded = first != kMatrix && first != kCompressed;
+    const bool is_padded = first != kMatrix && first != kCompressedElement;
     const std::size_t padding = is_padded ? (8 - size % 8) % 8 : 0;
     rest_.remove_prefix(std::min(size + padding, rest_.size()));
     return element;
@@ -72,7 +72,8 @@ class Elements {
   Element next(const char* what, std::uint32_t type) {
     const Element element = next(what);
     if (element.type != type) {
-      refuse(std::string(what) + " of type " + std::to_string(type), std::to_string(element.type));
+      refuse_mat(std::string(what) + " of type " + std::to_string(type),
+                 std::to_string(element.type));
     }
     return element;
   }
@@ -106,9 +107,9 @@ std::size_t width_of(std::uint32_t stored) {
 
 std::vector<std::size_t> read_dimensions(std::string_view data, bool little) {
   const std::size_t count = data.size() / 4;
-  if (data.size() % 4 != 0 || count < 2 || count > kMostDimensions) {
-    refuse("2 to " + std::to_string(kMostDimensions) + " dimensions of 4 bytes",
-           std::to_string(data.size()) + " bytes");
+  if (data.size() % 4 != 0 || count < 2 || count > kMostMatDimensions) {
+    refuse_mat("2 to " + std::to_string(kMostMatDimensions) + " dimensions of 4 bytes",
+               std::to_string(data.size()) + " bytes");
   }
   std::vector<std::size_t> dims;
   for (std::size_t i = 0; i < count; ++i) dims.push_back(number_at(data, 4 * i, little));
@@ -120,7 +121,7 @@ std::size_t product(const std::vector<std::size_t>& dims) {
   std::size_t size = 1;
   for (const std::size_t dim : dims) {
     if (dim > std::numeric_limits<std::uint32_t>::max() / size)
-      refuse("dimensions", "too large ones");
+      refuse_mat("dimensions", "too large ones");
     size *= dim;
   }
   return size;
@@ -132,7 +133,7 @@ void read_numbers(Elements& elements, MatArray& array) {
     const Element element = elements.next("numbers");
     const std::size_t width = width_of(element.type);
     if (width == 0 || element.data.size() != array.size * width) {
-      refuse(
+      refuse_mat(
           std::to_string(array.size) + " numbers",
           std::to_string(element.data.size()) + " bytes of type " + std::to_string(element.type));
     }
@@ -163,8 +164,8 @@ void read_text(Elements& elements, MatArray& array) {
       break;
   }
   if (!fits) {
-    refuse(std::to_string(array.size) + " characters in UTF-8 or UTF-16",
-           std::to_string(bytes) + " bytes of type " + std::to_string(element.type));
+    refuse_mat(std::to_string(array.size) + " characters in UTF-8 or UTF-16",
+               std::to_string(bytes) + " bytes of type " + std::to_string(element.type));
   }
   array.stored = element.type;
   array.data = element.data;
@@ -172,12 +173,12 @@ void read_text(Elements& elements, MatArray& array) {
 
 void read_field_names(Elements& elements, MatArray& array) {
   const Element length = elements.next("a field name's length", MatArray::kStoredInt32);
-  if (length.data.size() != 4) refuse("a field name's length", "another element");
+  if (length.data.size() != 4) refuse_mat("a field name's length", "another element");
   const std::size_t width = number_at(length.data, 0, array.is_little_endian);
   const std::string_view names = elements.next("field names", MatArray::kStoredInt8).data;
   if (width == 0 || width > kLongestField || names.size() % width != 0) {
-    refuse("field names of at most " + std::to_string(kLongestField) + " bytes",
-           std::to_string(names.size()) + " bytes, " + std::to_string(width) + " for each");
+    refuse_mat("field names of at most " + std::to_string(kLongestField) + " bytes",
+               std::to_string(names.size()) + " bytes, " + std::to_string(width) + " for each");
   }
   for (std::size_t at = 0; at < names.size(); at += width) {
     const std::string_view name = names.substr(at, width);
@@ -185,14 +186,14 @@ void read_field_names(Elements& elements, MatArray& array) {
   }
   if (std::set<std::string>(array.fields.begin(), array.fields.end()).size() !=
       array.fields.size()) {
-    refuse("each field once", "one twice");
+    refuse_mat("each field once", "one twice");
   }
 }
 
 void read_arrays(Elements& elements, std::size_t count, MatArray& array) {
   while (!elements.at_end()) array.arrays.push_back(elements.next("an array", kMatrix).data);
   if (array.arrays.size() != count) {
-    refuse(std::to_string(count) + " arrays", std::to_string(array.arrays.size()));
+    refuse_mat(std::to_string(count) + " arrays", std::to_string(array.arrays.size()));
   }
 }
 
@@ -217,8 +218,8 @@ std::optional<std::string> inflated(std::string_view stream, bool little) {
   }
   inflateEnd(&state);
   if (told > kMostInflated) {
-    refuse("at most " + std::to_string(kMostInflated) + " bytes in a compressed array",
-           std::to_string(told));
+    refuse_mat("at most " + std::to_string(kMostInflated) + " bytes in a compressed array",
+               std::to_string(told));
   }
   if (status != Z_STREAM_END || state.avail_in > 0 || bytes.size() != kTagBytes + told) {
     return std::nullopt;
@@ -233,8 +234,8 @@ MatVariable find_variable(const std::shared_ptr<const std::string>& file, const 
   const bool little = mark == "IM";
   const int version = little || mark == "MI" ? bytes[little ? 125 : 124] : 0;
   if (version != 1) {
-    refuse("a MATLAB version 5 file (saved with -v7 or -v6)",
-           version == 2 ? "version 7.3" : "something else");
+    refuse_mat("a MATLAB version 5 file (saved with -v7 or -v6)",
+               version == 2 ? "version 7.3" : "something else");
   }
   MatVariable found;
   for (std::size_t at = kHeaderBytes; at < bytes.size();) {
@@ -242,21 +243,21 @@ MatVariable find_variable(const std::shared_ptr<const std::string>& file, const 
     const bool has_tag = rest.size() >= kTagBytes;
     const std::size_t size = has_tag ? number_at(rest, 4, little) : 0;
     if (!has_tag || size > rest.size() - kTagBytes) {
-      refuse("a whole file", "one cut off at byte " + std::to_string(bytes.size()));
+      refuse_mat("a whole file", "one cut off at byte " + std::to_string(bytes.size()));
     }
     const std::uint32_t type = number_at(rest, 0, little);
     std::shared_ptr<const std::string> owner = file;
     std::string_view content = rest.substr(kTagBytes, size);
-    if (type == kCompressed) {
+    if (type == kCompressedElement) {
       auto inner = inflated(content, little);
       if (!inner || number_at(*inner, 0, little) != kMatrix) {
-        refuse("a compressed array with a matching checksum",
-               "damaged data at byte " + std::to_string(at));
+        refuse_mat("a compressed array with a matching checksum",
+                   "damaged data at byte " + std::to_string(at));
       }
       owner = std::make_shared<const std::string>(*std::move(inner));
       content = std::string_view(*owner).substr(kTagBytes);
     } else if (type != kMatrix) {
-      refuse("an array", "type " + std::to_string(type) + " at byte " + std::to_string(at));
+      refuse_mat("an array", "type " + std::to_string(type) + " at byte " + std::to_string(at));
     }
     if (!found.bytes) {
       MatArray array = parse_mat_array(content, little);
@@ -276,7 +277,7 @@ MatArray parse_mat_array(std::string_view bytes, bool is_little_endian) {
   if (bytes.empty()) return array;  // how MATLAB writes [] in some places
   Elements elements(bytes, is_little_endian);
   const std::string_view flags = elements.next("array flags", MatArray::kStoredUint32).data;
-  if (flags.size() != 8) refuse("8 bytes of array flags", std::to_string(flags.size()));
+  if (flags.size() != 8) refuse_mat("8 bytes of array flags", std::to_string(flags.size()));
   const std::uint32_t bits = number_at(flags, 0, is_little_endian);
   array.class_code = static_cast<int>(bits & 0xff);
   array.is_complex = (bits & 0x800) != 0;
@@ -299,20 +300,20 @@ MatArray parse_mat_array(std::string_view bytes, bool is_little_endian) {
     read_arrays(elements, array.size, array);
   } else {
     read_field_names(elements, array);
-    if (array.fields.empty() && array.size > 1) refuse("fields in a struct array", "none");
+    if (array.fields.empty() && array.size > 1) refuse_mat("fields in a struct array", "none");
     read_arrays(elements, array.size * array.fields.size(), array);
   }
-  if (!elements.at_end()) refuse("an array's end", "more");
+  if (!elements.at_end()) refuse_mat("an array's end", "more");
   return array;
 }
 
 MatVariable read_mat_variable(const std::filesystem::path& file, const std::string& name) try {
   std::string reason;
   auto bytes = try_read_file(file, reason);
-  if (!bytes) refuse("a MATLAB file", "nothing readable (" + reason + ")");
+  if (!bytes) refuse_mat("a MATLAB file", "nothing readable (" + reason + ")");
   MatVariable variable =
       find_variable(std::make_shared<const std::string>(*std::move(bytes)), name);
-  if (!variable.bytes) refuse("a variable " + name, "none");
+  if (!variable.bytes) refuse_mat("a variable " + name, "none");
   return variable;
 } catch (const std::invalid_argument& error) {
   throw InputError(std::string(error.what()) + ", in " + file.string());
