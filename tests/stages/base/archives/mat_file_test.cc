@@ -107,7 +107,7 @@ TEST(MatFile, RefusesOtherFiles) {
 // Files by hand, from "MAT-File Format" (MathWorks), level 5: little endian, elements of a tag
 // (type, size in bytes) and data padded to eight bytes; up to four bytes lie in the tag itself.
 
-std::string u32(std::uint32_t value) {
+std::string mat_u32(std::uint32_t value) {
   std::string bytes;
   for (int i = 0; i < 4; ++i) bytes += static_cast<char>(value >> 8 * i);
   return bytes;
@@ -117,15 +117,15 @@ std::string u32(std::uint32_t value) {
 std::string element(std::uint32_t type, std::string data, std::int64_t size = -1) {
   const auto told = static_cast<std::uint32_t>(size < 0 ? data.size() : size);
   data.resize((data.size() + 7) / 8 * 8);
-  return u32(type) + u32(told) + data;
+  return mat_u32(type) + mat_u32(told) + data;
 }
 
 /// The content of an array: flags with its class, dimensions, name, and what comes behind.
 std::string array(std::uint32_t kind, const std::vector<std::uint32_t>& dims,
                   const std::string& behind, const std::string& name = "") {
   std::string sides;
-  for (const std::uint32_t dim : dims) sides += u32(dim);
-  return element(6, u32(kind) + u32(0)) + element(5, sides) + element(1, name) + behind;
+  for (const std::uint32_t dim : dims) sides += mat_u32(dim);
+  return element(6, mat_u32(kind) + mat_u32(0)) + element(5, sides) + element(1, name) + behind;
 }
 
 std::string file_of(const std::string& elements) {
@@ -161,20 +161,21 @@ constexpr std::uint32_t kCell = 1, kStruct = 2, kObject = 3, kChar = 4, kSparse 
 TEST_F(MatBytes, SoundArraysAreRead) {
   EXPECT_EQ(outcome_of_array(array(kDouble, {1, 3}, element(2, "\x01\x02\x03"), "v")), "[1,2,3]");
   // Three bytes in the tag itself: size in the upper half of its first word.
-  EXPECT_EQ(
-      outcome_of_array(array(kDouble, {1, 3}, u32(3 << 16 | 2) + std::string("\1\2\3\0", 4), "v")),
-      "[1,2,3]");
+  EXPECT_EQ(outcome_of_array(
+                array(kDouble, {1, 3}, mat_u32(3 << 16 | 2) + std::string("\1\2\3\0", 4), "v")),
+            "[1,2,3]");
   EXPECT_EQ(outcome_of_array(array(kChar, {1, 2}, element(17, std::string("a\0b\0", 4)), "v")),
             "\"ab\"");
   const std::string one = element(14, array(kDouble, {1, 1}, element(2, "\x07")));
   EXPECT_EQ(outcome_of_array(array(kCell, {1, 2}, one + element(14, ""), "v")), "[7,[]]");
-  const std::string names = u32(4 << 16 | 5) + u32(2) + element(1, std::string("a\0b\0", 4));
+  const std::string names =
+      mat_u32(4 << 16 | 5) + mat_u32(2) + element(1, std::string("a\0b\0", 4));
   EXPECT_EQ(outcome_of_array(array(kStruct, {1, 1}, names + one + one, "v")), R"({"a":7,"b":7})");
 }
 
 TEST_F(MatBytes, NoSizeCountOrTypeIsBelieved) {
   const std::string one = element(14, array(kDouble, {1, 1}, element(2, "\x07")));
-  const std::string length = u32(4 << 16 | 5) + u32(2);
+  const std::string length = mat_u32(4 << 16 | 5) + mat_u32(2);
   const std::string names = length + element(1, std::string("a\0b\0", 4));
   const std::uint32_t huge = 0xfffffff8;
   const std::pair<const char*, std::string> table[] = {
@@ -183,7 +184,8 @@ TEST_F(MatBytes, NoSizeCountOrTypeIsBelieved) {
       {"numbers of half a type", array(kDouble, {1, 1}, element(9, "\x01\x02\x03\x04"), "v")},
       {"numbers of no type", array(kDouble, {1, 1}, element(14, "\x01"), "v")},
       {"numbers beyond the array", array(kDouble, {1, 1}, element(2, "\x01", huge), "v")},
-      {"five bytes in a tag", array(kDouble, {1, 5}, u32(5 << 16 | 2) + std::string(4, '\1'), "v")},
+      {"five bytes in a tag",
+       array(kDouble, {1, 5}, mat_u32(5 << 16 | 2) + std::string(4, '\1'), "v")},
       {"dimensions whose product overflows",
        array(kDouble, {0x80000000, 0x80000000, 4}, element(2, "\x01"), "v")},
       {"a huge dimension", array(kDouble, {1, 0x7fffffff}, element(2, "\x01"), "v")},
@@ -195,15 +197,15 @@ TEST_F(MatBytes, NoSizeCountOrTypeIsBelieved) {
       {"fewer cells", array(kCell, {1, 3}, one + one, "v")},
       {"more cells", array(kCell, {1, 1}, one + one, "v")},
       {"a cell that is no array", array(kCell, {1, 1}, element(2, "\x01"), "v")},
-      {"a cell beyond its cell array", array(kCell, {1, 1}, u32(14) + u32(huge), "v")},
+      {"a cell beyond its cell array", array(kCell, {1, 1}, mat_u32(14) + mat_u32(huge), "v")},
       {"fewer fields", array(kStruct, {1, 1}, names + one, "v")},
       {"field names without length",
-       array(kStruct, {1, 1}, u32(4 << 16 | 5) + u32(0) + element(1, "ab"), "v")},
+       array(kStruct, {1, 1}, mat_u32(4 << 16 | 5) + mat_u32(0) + element(1, "ab"), "v")},
       {"a negative field length",
-       array(kStruct, {1, 1}, u32(4 << 16 | 5) + u32(0xffffffff) + element(1, "ab"), "v")},
+       array(kStruct, {1, 1}, mat_u32(4 << 16 | 5) + mat_u32(0xffffffff) + element(1, "ab"), "v")},
       {"long field names",
-       array(kStruct, {1, 1}, u32(4 << 16 | 5) + u32(65) + element(1, std::string(65, 'a')) + one,
-             "v")},
+       array(kStruct, {1, 1},
+             mat_u32(4 << 16 | 5) + mat_u32(65) + element(1, std::string(65, 'a')) + one, "v")},
       {"a field twice",
        array(kStruct, {1, 1}, length + element(1, std::string("a\0a\0", 4)) + one + one, "v")},
       {"many structs without fields",
@@ -211,22 +213,23 @@ TEST_F(MatBytes, NoSizeCountOrTypeIsBelieved) {
       {"an object", array(kObject, {1, 1}, one, "v")},
       {"a sparse matrix", array(kSparse, {1, 1}, one, "v")},
       {"a function", array(kFunction, {1, 1}, one, "v")},
-      {"flags cut short", element(6, u32(kDouble))},
+      {"flags cut short", element(6, mat_u32(kDouble))},
       {"bytes behind the array", array(kDouble, {1, 1}, element(2, "\x01") + one, "v")},
       {"a number its class does not hold",
        array(kInt8, {1, 1}, element(4, std::string("\x00\x01", 2)), "v")},
       {"a fraction in a whole class", array(kInt8, {1, 1}, element(9, std::string(8, '\1')), "v")},
   };
   for (const auto& [what, content] : table) EXPECT_EQ(outcome_of_array(content), "refused") << what;
-  EXPECT_EQ(outcome(u32(14) + u32(huge)), "refused");
+  EXPECT_EQ(outcome(mat_u32(14) + mat_u32(huge)), "refused");
   EXPECT_EQ(outcome(element(2, "abc")), "refused");
 }
 
 TEST_F(MatBytes, ACompressedArrayOfMoreThanAGibibyteIsRefusedAtItsTag) {
   // RFC 1950 and 1951: a header, and one stored block of eight bytes; what follows is never read.
   const std::string stream =
-      std::string("\x78\x01\x01\x08\x00\xf7\xff", 7) + u32(14) + u32(0x40000001);
-  write_file(file_, file_of(u32(15) + u32(static_cast<std::uint32_t>(stream.size())) + stream));
+      std::string("\x78\x01\x01\x08\x00\xf7\xff", 7) + mat_u32(14) + mat_u32(0x40000001);
+  write_file(file_,
+             file_of(mat_u32(15) + mat_u32(static_cast<std::uint32_t>(stream.size())) + stream));
   EXPECT_THAT(
       [&] { read_mat_variable(file_, "v"); },
       ThrowsMessage<InputError>(AllOf(
