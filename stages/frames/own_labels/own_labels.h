@@ -189,7 +189,9 @@ extern const LabelReader kCocoReader;
 /// edge; with kpt_shape [J, 2 or 3] "class xc yc w h" and J times "px py [v]", v as COCO's; a joint
 /// at 0, 0 without v is not annotated. Joints are named by data.yaml's kpt_names, by COCO's names
 /// if there are 17, else "0", "1", ... "class x1 y1 x2 y2 ..." is an
-/// outline (segmentation), and the box is what is around it; it may stand among others.
+/// outline (segmentation), and the box is what is around it; it may stand among others. Where
+/// joints without kpt_shape may be meant (PoseEvidence), opening is an InputError with both
+/// readings; kpt_shape: [0, 0] says that there are none.
 extern const LabelReader kYoloReader;
 
 /// Pascal VOC's XML files (parse_voc_labels): found as YOLO's texts are, with the last folder
