@@ -205,7 +205,8 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
   }
   const auto& places = columns->places;
   const bool has_sides = columns->has_sides;
-  double largest = 0;
+  double largest = 0, smallest = 0;
+  bool any_fraction = false;
   std::size_t boxes = 0;
   std::map<std::string, Outcome<ImageRows>> images;
   while (const std::optional<CsvRecord> record = next()) {
@@ -235,13 +236,19 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
       if (rows.labels().boxes.empty()) continue;
       const Rectangle& box = rows.labels().boxes.back().box.xyxy;
       largest = std::max({largest, box.right, box.bottom});
+      smallest = std::min({smallest, box.left, box.top});
+      for (const double edge : {box.left, box.top, box.right, box.bottom}) {
+        any_fraction = any_fraction || edge != std::floor(edge);
+      }
       ++boxes;
     } catch (const BadLabel& bad) {
       image = bad.in(place);
     }
   }
   constexpr std::size_t kFewest = 3;
-  if (boxes >= kFewest && largest <= 1) {
+  constexpr double kTolerance = 0.01;  // of shares, as Ultralytics has it
+  const bool are_shares = any_fraction && smallest >= -kTolerance && largest <= 1 + kTolerance;
+  if (are_shares || (boxes >= kFewest && largest <= 1)) {
     throw InputError("expected edges in pixels, got shares of the image, 0..1, in " + path);
   }
   std::map<std::string, Outcome<ImageLabels>> labels;

@@ -24,8 +24,8 @@ namespace eventgan {
 /// right < left, bottom < top, a track twice in an image, or a box beside a row without one is a
 /// fault of its image alone: "expected X, got Y, in PATH:3". Throws InputError, naming the line,
 /// where the header is not so or a row does not even tell its image: other bytes than UTF-8, quotes
-/// that do not match, another number of fields, no image; and where no edge is beyond 1, as those
-/// in shares of the image. Thread safe.
+/// that do not match, another number of fields, no image; and where edges are shares of the image: all
+/// are within 0 and 1.01, and one is no whole number. Thread safe.
 std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view text,
                                                              const std::string& path);
 

@@ -143,6 +143,13 @@ TEST(CsvLabels, ARowThatDoesNotTellItsImageIsRefused) {
   refuses("image,class,left,left,top,right,bottom\n", "got \"left\", in labels.csv:1");
   refuses(header + "a.png,car,0.1,0.2,0.3,0.4,\nb.png,car,0,0,1,1,\nc.png,car,0,0,0.5,0.5,\n",
           "expected edges in pixels, got shares of the image, 0..1, in labels.csv");
+  for (const char* rows : {"a.png,car,0,0.25,1,1,\n", "a.png,car,-0.004,0,1.0004,1,\n",
+                           "a.png,car,0,0,1,1,\nb.png,car,0,0,0.5,1,\n"}) {
+    refuses(header + rows,
+            "expected edges in pixels, got shares of the image, 0..1, in labels.csv");
+  }
+  refuses("image,class,x,y,w,h\na.png,car,0.5,0.25,0.5,0.75\n", "got shares of the image");
+  EXPECT_THAT(read_csv("a.png,car,0,0,1,1,\nb.png,car,0,0,1.5,1,\n"), SizeIs(2)) << "pixels";
   refuses(header + "a.png,car,1,2,3,4\n", "expected 7 fields, got 6, in labels.csv:2");
   refuses(header + "a.png,car,1,2,3,4,,\n", "expected 7 fields, got 8, in labels.csv:2");
   refuses(header + ",car,1,2,3,4,\n", "expected an image without control characters, got ''");
