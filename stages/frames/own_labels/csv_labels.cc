@@ -36,8 +36,9 @@ constexpr std::array<CsvColumn, kColumnCount> kColumns = {{
     {"top", {"top", "y1", "ymin", "y", "bboxtop", "bbtop", "boxtop", "bboxy"}},
     {"right", {"right", "x2", "xmax", "bboxright", "boxright"}},
     {"bottom", {"bottom", "y2", "ymax", "bboxbottom", "boxbottom"}},
-    {"width", {"width", "w", "bboxwidth", "bbwidth", "boxwidth", "bboxw"}},
-    {"height", {"height", "h", "bboxheight", "bbheight", "boxheight", "bboxh"}},
+    // The plain words last: beside a pair of the box's own they are the image's.
+    {"width", {"w", "bboxwidth", "bbwidth", "boxwidth", "bboxw", "width"}},
+    {"height", {"h", "bboxheight", "bbheight", "boxheight", "bboxh", "height"}},
     {"track", {"track", "trackid", "objectid", "tracknumber", "instanceid"}},
 }};
 /// Of a detector's results, which are no labels.
@@ -100,6 +101,11 @@ Outcome<CsvColumns> columns_of(const CsvRecord& header) {
   }
   columns.has_sides =
       !columns.has(kRight) && !columns.has(kBottom) && columns.has(kWidth) && columns.has(kHeight);
+  if (columns.has_sides) {  // of which one may be the image's
+    const std::string_view width = header.fields[*columns.places[kWidth]];
+    const std::string_view height = header.fields[*columns.places[kHeight]];
+    if (rank_in(kWidth, width) != rank_in(kHeight, height)) return refuse(std::string(width));
+  }
   for (std::size_t i = 0; i <= kBottom; ++i) {
     if (columns.has(i) || (i >= kRight && columns.has_sides)) continue;
     if (!columns.unused.empty()) return refuse(columns.unused.front());

@@ -67,6 +67,8 @@ TEST(CsvLabels, ColumnsAreCalledAsToolsCallThem) {
         "image,class,x1,y1,x2,y2,track,note\na.png,car,1,2,4,6,,area=3\n",
         "frame;label;left;top;width;height\na.png;car;1;2;3;4\n",
         "image;label;x;y;w;h\na.png;car;1,0;2;3;4,0\n",
+        "filename,width,height,class,x,y,w,h\na.png,64,48,car,1,2,3,4\n",
+        "image,class,x,y,bbox_width,bbox_height,width,height\na.png,car,1,2,3,4,64,48\n",
         "image_name\tclass_name\tx_min\ty_min\tx_max\ty_max\na.png\tcar\t1\t2\t4\t6\n",
         ",\"image\",\"xmin\",\"ymin\",\"xmax\",\"ymax\",\"label\"\n0,\"a.png\",1,2,4,6,\"car\"\n",
         "frame,image,label,x1,y1,x2,y2\n12,a.png,car,1,2,4,6\n"}) {
@@ -139,6 +141,7 @@ TEST(CsvLabels, ARowThatDoesNotTellItsImageIsRefused) {
   refuses("", "expected a header line image,class,left,top,right,bottom, got none, in labels.csv");
   refuses("image,class,left,top,right\n", "expected a column bottom, got none, in labels.csv:1");
   refuses("image,class,left,top,right,bottom,score\n", "got \"score\", in labels.csv:1");
+  refuses("image,class,x,y,w,width,height\n", "got \"w\", in labels.csv:1");
   refuses("a.png,car,1,2,3,4\n", "got \"a.png\", in labels.csv:1");
   refuses("image,class,left,left,top,right,bottom\n", "got \"left\", in labels.csv:1");
   refuses(header + "a.png,car,0.1,0.2,0.3,0.4,\nb.png,car,0,0,1,1,\nc.png,car,0,0,0.5,0.5,\n",
