@@ -50,6 +50,7 @@ class CocoEntry {
   }
 
   const std::string& place() const { return place_; }
+  const nlohmann::json& document() const { return document_; }
   StrictObject object() { return StrictValue(document_, faults_).object(); }
   void check() const {
     if (!faults_.empty()) throw BadLabel(faults_.text("; "));
@@ -148,6 +149,21 @@ bool read_flag(const StrictValue& value) {
   return value.is_boolean() ? value.boolean() : value.integer(0, 1) == 1;
 }
 
+/// The object's number in its sequence: of CocoVID, TAO and PoseTrack, of BDD100K, of CVAT. -1 if
+/// there is none, or another value.
+std::int64_t read_track(const nlohmann::json& annotation) {
+  const auto member = [](const nlohmann::json& object, const char* key) {
+    const auto found = object.is_object() ? object.find(key) : object.end();
+    return object.is_object() && found != object.end() ? *found : nlohmann::json();
+  };
+  for (const nlohmann::json& track :
+       {member(annotation, "track_id"), member(annotation, "instance_id"),
+        member(member(annotation, "attributes"), "track_id")}) {
+    if (track.is_number_integer() && track >= 0) return track;
+  }
+  return Box().track_id;
+}
+
 /// Whether a joint of the annotation is annotated.
 bool read_keypoints(StrictObject& object, std::size_t joints, bool has_names, Person& person) {
   const auto keypoints = find_given(object, "keypoints");
@@ -229,6 +245,7 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
   box.xyxy = !sides && !box.outline.empty() ? bounds(box.outline)
                                             : read_bbox(sides ? *sides : object.at("bbox"));
   if (const auto crowd = find_given(object, "iscrowd")) box.ignore = read_flag(*crowd);
+  box.track_id = read_track(entry.document());
   if (const auto area = find_given(object, "area")) area->number(0, kFarthest_px * kFarthest_px);
   Person person;
   const bool is_person = read_keypoints(object, schema.joint_names.size(), has_names, person);

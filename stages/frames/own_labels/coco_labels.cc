@@ -48,6 +48,7 @@ class CocoLabels : public OwnLabels {
       add_coco_annotation(text, image.id, *size, index_, schema_, written_, annotation);
     }
     annotation.original += "]}";
+    forget_shared_tracks(annotation.boxes);
     return annotation;
   } catch (const std::runtime_error& error) {
     return SampleFault{error.what()};

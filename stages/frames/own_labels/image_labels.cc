@@ -22,6 +22,7 @@ Outcome<Annotation> numbered(ImageLabels labels, const std::vector<std::string>&
     named.box.class_id = static_cast<int>(name - class_names.begin());
     add_box(named.box, image, place, annotation);
   }
+  forget_shared_tracks(annotation.boxes);
   return annotation;
 }
 
@@ -66,6 +67,18 @@ void note_parts_left_out(std::size_t count, std::size_t of_parts, const std::str
   annotation.outlines_mended.push_back(
       fmt::format("expected parts of an outline that have an area, got {} of {} without, in {}",
                   count, of_parts, place));
+}
+
+bool forget_shared_tracks(std::vector<Box>& boxes) {
+  std::map<std::int64_t, int> times;
+  for (const Box& box : boxes) ++times[box.track_id];
+  bool any = false;
+  for (Box& box : boxes) {
+    if (box.track_id < 0 || times[box.track_id] == 1) continue;
+    box.track_id = Box().track_id;
+    any = true;
+  }
+  return any;
 }
 
 bool overlaps(const Rectangle& box, ImageSize image) {

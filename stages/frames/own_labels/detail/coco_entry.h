@@ -24,8 +24,9 @@ LabelSchema coco_schema(const CocoIndex& index, const std::string& path);
 /// Adds an entry of `annotations`, a box and perhaps a person, to those of the image; or counts a
 /// box that is left out. Its `segmentation` is the outline: polygons, of which those without area
 /// are left out, or run lengths of the image's size, plain or compressed; and without `bbox` the
-/// outline's bounds are the box. Not looked at is what no label comes of: num_keypoints, keypoints
-/// of a category without names of them.
+/// outline's bounds are the box. `track_id`, `instance_id` or `attributes.track_id` is the track,
+/// unless another object of the image has it (forget_shared_tracks). Not looked at is what no label
+/// comes of: num_keypoints, keypoints of a category without names of them.
 void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSize image,
                          const CocoIndex& index, const LabelSchema& schema, const std::string& path,
                          Annotation& annotation);

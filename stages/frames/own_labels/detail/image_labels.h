@@ -95,6 +95,10 @@ bool add_box(const Box& box, ImageSize image, const std::string& place, Annotati
 void note_parts_left_out(std::size_t count, std::size_t of_parts, const std::string& place,
                          Annotation& annotation);
 
+/// Takes the track from all boxes of an image whose track another one has, too: it is no object's
+/// number then. True if there are any.
+bool forget_shared_tracks(std::vector<Box>& boxes);
+
 /// Whether some of the box is within the image.
 bool overlaps(const Rectangle& box, ImageSize image);
 

@@ -414,6 +414,25 @@ TEST_F(CocoLabels, ABadEntryIsAFaultOfItsImage) {
   EXPECT_THAT(fault("x"), HasSubstr("expected an image of the file, got none"));
 }
 
+TEST_F(CocoLabels, TracksAreCalledAsToolsCallThem) {
+  for (const auto& [more, track] : {std::pair(R"(, "track_id": 3)", 3),
+                                    {R"(, "instance_id": 4.0)", 4},
+                                    {R"(, "attributes": {"track_id": 0})", 0},
+                                    {R"(, "track_id": null, "instance_id": 5)", 5},
+                                    {R"(, "track_id": -1)", -1},
+                                    {R"(, "track_id": "7", "attributes": [1])", -1},
+                                    {", \"ids\": 2", -1}}) {
+    write(image(7, "000001.png"),
+          box(1, 7, "[1, 2, 3, 4]", more) + "," + box(2, 7, "[1, 2, 5, 6]", R"(, "track_id": 90)"));
+    EXPECT_EQ(annotation("7").boxes.at(0).track_id, track) << more;
+    EXPECT_EQ(annotation("7").boxes.at(1).track_id, 90);
+  }
+  write(image(7, "000001.png"), box(1, 7, "[1, 2, 3, 4]", R"(, "instance_id": 1)") + "," +
+                                    box(2, 7, "[1, 2, 5, 6]", R"(, "instance_id": 1)"));
+  EXPECT_EQ(annotation("7").boxes.at(0).track_id, -1) << "it is no object's number";
+  EXPECT_EQ(annotation("7").boxes.at(1).track_id, -1);
+}
+
 TEST_F(CocoLabels, CrowdsAreToldByANumberOrABoolean) {
   for (const auto& [crowd, ignore] : {std::pair("0", false),
                                       {"1", true},
