@@ -244,7 +244,9 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
   if (!is_told && !box.outline.empty()) sides.reset();
   box.xyxy = !sides && !box.outline.empty() ? bounds(box.outline)
                                             : read_bbox(sides ? *sides : object.at("bbox"));
-  if (const auto crowd = find_given(object, "iscrowd")) box.ignore = read_flag(*crowd);
+  for (const char* const key : {"iscrowd", "ignore"}) {
+    if (const auto flag = find_given(object, key)) box.ignore |= read_flag(*flag);
+  }
   box.track_id = read_track(entry.document());
   if (const auto area = find_given(object, "area")) area->number(0, kFarthest_px * kFarthest_px);
   Person person;

@@ -444,6 +444,9 @@ TEST_F(CocoLabels, CrowdsAreToldByANumberOrABoolean) {
           box(1, 7, "[1, 2, 3, 4]", std::string(", \"iscrowd\": ") + crowd));
     EXPECT_EQ(fault(), "no fault") << crowd;
     EXPECT_EQ(annotation("7").boxes.at(0).ignore, ignore) << crowd;
+    write(image(7, "000001.png"),
+          box(1, 7, "[1, 2, 3, 4]", std::string(R"(, "iscrowd": 0, "ignore": )") + crowd));
+    EXPECT_EQ(annotation("7").boxes.at(0).ignore, ignore) << crowd;
   }
   for (const char* crowd : {"\"true\"", "2", "0.5"}) {
     write(image(7, "000001.png"),
