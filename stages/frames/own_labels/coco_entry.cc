@@ -193,15 +193,45 @@ bool read_keypoints(StrictObject& object, std::size_t joints, bool has_names, Pe
 
 }  // namespace
 
-ImageSize read_coco_image(const std::string& text, std::int64_t id, const std::string& path) {
+CocoImage read_coco_image(const std::string& text, std::int64_t id, const std::string& path) {
   constexpr int kLargest = 1'000'000;
   CocoEntry entry(text, path, "image");
   StrictObject object = entry.object();
-  const ImageSize size{object.at("height").integer(1, kLargest),
-                       object.at("width").integer(1, kLargest)};
+  CocoImage image{
+      {object.at("height").integer(1, kLargest), object.at("width").integer(1, kLargest)}};
   object.at("id").integer(id, id);  // another: the file has changed
+  if (const auto lists_x = find_given(object, "ignore_regions_x")) {
+    const StrictValue lists_y = object.at("ignore_regions_y");
+    const std::vector<StrictValue> all_x = lists_x->elements(), all_y = lists_y.elements();
+    for (std::size_t i = 0; i < std::max(all_x.size(), all_y.size()); ++i) {
+      const auto x = i < all_x.size() ? all_x[i].elements() : std::vector<StrictValue>();
+      const auto y = i < all_y.size() ? all_y[i].elements() : std::vector<StrictValue>();
+      if (x.size() != y.size()) {
+        lists_y.fault("as many numbers as ignore_regions_x has", "others");
+        break;
+      }
+      auto& corners = image.ignored.emplace_back();
+      for (std::size_t k = 0; k < x.size(); ++k) {
+        corners.push_back(
+            {x[k].number(-kFarthest_px, kFarthest_px), y[k].number(-kFarthest_px, kFarthest_px)});
+      }
+    }
+  }
   entry.check();
-  return size;
+  return image;
+}
+
+void add_ignored_regions(const CocoImage& entry, ImageSize image, const CocoIndex& index,
+                         const std::string& place, Annotation& annotation) {
+  const auto with_joints = std::ranges::find_if(
+      index.categories, [](const auto& category) { return !category.keypoints.empty(); });
+  const auto of = with_joints == index.categories.end() ? index.categories.begin() : with_joints;
+  for (const std::vector<Point>& corners : entry.ignored) {
+    Box box{.class_id = static_cast<int>(of - index.categories.begin()), .ignore = true};
+    box.outline = outline_of_parts({corners});
+    box.xyxy = bounds(box.outline);
+    add_box(box, image, place, annotation);
+  }
 }
 
 LabelSchema coco_schema(const CocoIndex& index, const std::string& path) {
@@ -251,11 +281,15 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
   if (const auto area = find_given(object, "area")) area->number(0, kFarthest_px * kFarthest_px);
   Person person;
   const bool is_person = read_keypoints(object, schema.joint_names.size(), has_names, person);
+  const auto head = is_person ? find_given(object, "bbox_head") : std::nullopt;  // PoseTrack's
+  std::optional<Rectangle> head_box;
+  if (head && !(head->is_array() && head->elements().empty())) head_box = read_bbox(*head);
   entry.check();
   if (!add_box(box, image, entry.place(), annotation)) return;
   note_parts_left_out(segmentation.without_area, segmentation.parts, entry.place(), annotation);
   if (is_person) {
     person.box = box.xyxy;
+    person.head_box = head_box;
     annotation.persons.push_back(std::move(person));
   }
 }

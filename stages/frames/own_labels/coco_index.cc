@@ -29,6 +29,7 @@ struct EntryFields {
   std::array<double, 4> box{};
   std::size_t box_sides = 0;
   bool is_crowd = false;
+  bool is_labelled = true;
   std::optional<std::string> file_name, name;
   std::vector<std::string> keypoints;
 };
@@ -55,6 +56,7 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
   bool null() override { return take_value("null"); }
   bool boolean(bool value) override {
     note_crowd(value);
+    if (depth_ == kInEntry && is_image() && key_ == "is_labeled") fields_.is_labelled = value;
     return take_value("true or false");
   }
   bool number_integer(std::int64_t value) override { return take_integer(value); }
@@ -255,7 +257,8 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
         return given >= 1 && given <= kLargest ? static_cast<int>(given) : 0;
       };
       index.images.push_back({*fields_.id, range, *std::move(fields_.file_name),
-                              ImageSize{side(fields_.size[1]), side(fields_.size[0])}});
+                              ImageSize{side(fields_.size[1]), side(fields_.size[0])},
+                              fields_.is_labelled});
     } else {
       need(fields_.name, "name");
       index.categories.push_back(

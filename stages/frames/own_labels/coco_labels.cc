@@ -37,7 +37,8 @@ class CocoLabels : public OwnLabels {
   Outcome<Annotation> annotation(const std::string& label_key) const override try {
     const CocoIndex::Image& image = find(label_key);
     std::string text = read(image.entry);
-    Outcome<ImageSize> size = image_size(label_key, read_coco_image(text, image.id, written_));
+    const CocoImage entry = read_coco_image(text, image.id, written_);
+    Outcome<ImageSize> size = image_size(label_key, entry.size);
     if (is_fault(size)) return size.fault();
     Annotation annotation;
     annotation.original = "{\"image\": " + text + ", \"annotations\": [";
@@ -48,6 +49,9 @@ class CocoLabels : public OwnLabels {
       add_coco_annotation(text, image.id, *size, index_, schema_, written_, annotation);
     }
     annotation.original += "]}";
+    if (!index_.categories.empty()) {
+      add_ignored_regions(entry, *size, index_, label_place(label_key), annotation);
+    }
     forget_shared_tracks(annotation.boxes);
     return annotation;
   } catch (const std::runtime_error& error) {
@@ -65,6 +69,8 @@ class CocoLabels : public OwnLabels {
     for (std::size_t i = 0; i < index_.image_count(); ++i) {
       CocoIndex::Image& image = index_.images[i];
       place_of_id_.emplace(image.id, i);
+      const bool has_none = image.first_annotation == index_.images[i + 1].first_annotation;
+      if (!image.is_labelled && has_none) continue;  // nobody looked for objects
       named.push_back({std::exchange(image.file_name, {}), std::to_string(image.id)});
     }
     give_named(named, written_);

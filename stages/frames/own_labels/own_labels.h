@@ -169,6 +169,9 @@ extern const LabelReader kMotReader;
 /// them, so that a joint lies half a pixel less in Joint::at. Annotation::original is {"image":
 /// ENTRY, "annotations": [ENTRY, ...]}, each entry byte for byte as in the file.
 ///
+/// PoseTrack's images with `is_labeled` false and no annotation have no label; the regions that it
+/// ignores are boxes to ignore, and `bbox_head` is Person::head_box.
+///
 /// The file is read through once, whatever its size, and of each entry its place is kept: about 20
 /// bytes an annotation and 200 an image. An entry is read again, and strictly, when its annotation
 /// is asked for. Throws InputError where the file is no COCO file: broken JSON, an id twice, an

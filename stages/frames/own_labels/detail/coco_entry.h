@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "manifests/values/frames.h"
 #include "manifests/values/labels.h"
@@ -14,8 +15,18 @@ namespace eventgan {
 // 17): $.bbox[2]: expected X, got Y", a line a fault; an id that is another than expected is a
 // fault too, since the file has changed then.
 
-/// What an entry of `images` says of the image's size.
-ImageSize read_coco_image(const std::string& text, std::int64_t id, const std::string& path);
+/// What an entry of `images` says of the image.
+struct CocoImage {
+  ImageSize size;
+  /// PoseTrack's `ignore_regions_x` and `ignore_regions_y`, the corners of polygons.
+  std::vector<std::vector<Point>> ignored = {};
+};
+CocoImage read_coco_image(const std::string& text, std::int64_t id, const std::string& path);
+
+/// Adds an image's ignored regions behind its objects: boxes to ignore, of the category with joints
+/// if there is one, else of the first.
+void add_ignored_regions(const CocoImage& entry, ImageSize image, const CocoIndex& index,
+                         const std::string& place, Annotation& annotation);
 
 /// What classes and joints a file has: the categories in their order, and the joints that one of
 /// them has. Throws InputError if two have different ones.

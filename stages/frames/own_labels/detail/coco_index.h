@@ -23,6 +23,7 @@ struct CocoIndex {
     ByteRange entry;  ///< from '{' to '}'
     std::string file_name;
     ImageSize size;                    ///< 0 where the entry has no sound one
+    bool is_labelled = true;           ///< PoseTrack's `is_labeled`
     std::size_t first_annotation = 0;  ///< in `annotations`; its last is before the next image's
   };
   struct Category {

@@ -197,6 +197,36 @@ TEST_F(CocoLabels, KeypointsAreMeasuredFromTheImagesEdge) {
   expect_refused("expected one list of keypoints, got two, of \"dog\" another, in instances.json");
 }
 
+TEST_F(CocoLabels, PoseTracksUnlabelledFramesAreNoneAndItsRegionsAreIgnored) {
+  const std::string rest = R"(, "width": 40, "height": 30, "is_labeled": )";
+  const std::string regions = R"(, "ignore_regions_x": [[10, 20, 20, 10], [1, 2, 3]],
+                                  "ignore_regions_y": [[5, 5, 9, 9], [4, 4, 4]])";
+  const std::string labelled = R"({"id": 7, "file_name": "000001.png")" + rest + "true";
+  const std::string persons = R"({"id": 1, "name": "hat"},
+                                 {"id": 3, "name": "person", "keypoints": ["nose"]})";
+  const std::string one =
+      box(1, 7, "[1, 2, 30, 20]",
+          R"(, "keypoints": [9, 8, 2], "bbox_head": [3, 4, 5, 6], "track_id": 2)");
+  write(labelled + regions + "}," + R"({"id": 8, "file_name": "000002.png")" + rest + "false}", one,
+        persons);
+  const auto dataset = open();
+  ASSERT_EQ(dataset->labelled_frames().size(), 1u);
+  EXPECT_THAT(dataset->notes(), Contains(HasSubstr("no label for 2 of 3 frames")));
+  const Annotation read = annotation("7");
+  ASSERT_EQ(read.boxes.size(), 2u) << read.original;
+  EXPECT_FALSE(read.boxes[0].ignore);
+  EXPECT_EQ(read.boxes[1].class_id, 1);
+  EXPECT_TRUE(read.boxes[1].ignore);
+  EXPECT_EQ(read.boxes[1].xyxy, (Rectangle{10, 5, 20, 9}));
+  EXPECT_THAT(read.left_out, ElementsAre(HasSubstr("got 0 x 0, in instances.json#images/7")));
+  EXPECT_EQ(read.persons.at(0).head_box, (Rectangle{3, 4, 8, 10}));
+  // What has objects is labelled, whatever is said of it.
+  write(R"({"id": 7, "file_name": "000001.png")" + rest + "false}", one, persons);
+  EXPECT_EQ(open()->labelled_frames().size(), 1u);
+  write(labelled + R"(, "ignore_regions_x": [[1]], "ignore_regions_y": [[1, 2]]})", one, persons);
+  EXPECT_THAT(fault(), HasSubstr("$.ignore_regions_y: expected as many numbers as"));
+}
+
 TEST_F(CocoLabels, ABoxOutsideTheImageOrWithoutAreaIsLeftOut) {
   const auto left_out = [&](const std::string& bbox, const std::string& more = "") {
     write(image(7, "000001.png"), box(17, 7, bbox, more) + "," + box(18, 7, "[1, 2, 3, 4]"));
