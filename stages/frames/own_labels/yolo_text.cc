@@ -1,6 +1,6 @@
 #include "stages/frames/own_labels/detail/yolo_text.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
