@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "manifests/values/text.h"
 #include "stages/frames/own_labels/detail/coco_entry.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
@@ -30,6 +31,7 @@ class CocoLabels : public OwnLabels {
     }
     find_images();
     note_without_label(written_);
+    note_joints();
     warn_of_corners();
     warn_of_crowds();
   }
@@ -74,6 +76,14 @@ class CocoLabels : public OwnLabels {
       named.push_back({std::exchange(image.file_name, {}), std::to_string(image.id)});
     }
     give_named(named, written_);
+  }
+
+  void note_joints() {
+    if (index_.joints_left_out == 0) return;
+    notes_.push_back(fmt::format(
+        "keypoints of {} left out, since their category names none and they differ in number, in "
+        "{}",
+        count_text(static_cast<std::int64_t>(index_.joints_left_out), "annotation"), written_));
   }
 
   /// Some tools write corners where COCO has a width and a height.

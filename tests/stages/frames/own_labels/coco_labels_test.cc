@@ -187,14 +187,42 @@ TEST_F(CocoLabels, KeypointsAreMeasuredFromTheImagesEdge) {
             R"(, "keypoints": [1.0, 2.5, 2.0, 0, 0, 0, 0, 0, 0.0], "num_keypoints": 2)"),
         person);
   EXPECT_EQ(annotation("7").persons.at(0).joints.at(0), (Joint{{0.5, 2}, 1}));
-  // Of a category without names of them they are no person.
-  write(image(7, "000001.png"),
-        box(1, 7, "[1, 2, 30, 20]", R"(, "keypoints": [1, 2, 2], "num_keypoints": 1)"));
-  EXPECT_EQ(annotation("7").boxes.size(), 1u);
-  EXPECT_THAT(annotation("7").persons, IsEmpty());
   write(image(7, "000001.png"), "",
         person + R"(, {"id": 4, "name": "dog", "keypoints": ["nose", "tail"]})");
   expect_refused("expected one list of keypoints, got two, of \"dog\" another, in instances.json");
+}
+
+TEST_F(CocoLabels, JointsWithoutNamesAreNumberedIfAllAreAsMany) {
+  const auto with = [&](const std::string& first, const std::string& second,
+                        const std::string& categories) {
+    write(image(7, "000001.png"),
+          box(1, 7, "[1, 2, 30, 20]", ", \"keypoints\": " + first) + "," +
+              box(2, 7, "[1, 2, 30, 20]", ", \"keypoints\": " + second),
+          categories);
+    return open();
+  };
+  const std::string face = R"({"id": 3, "name": "face", "keypoints": []})";
+  for (const std::string& category : {face, std::string(R"({"id": 3, "name": "face"})")}) {
+    EXPECT_THAT(with("[10, 12, 2, 11.5, 13, 1]", "[]", category)->label_schema().joint_names,
+                ElementsAre("0", "1"));
+    ASSERT_EQ(annotation("7").persons.size(), 1u);
+    EXPECT_THAT(annotation("7").persons[0].joints,
+                ElementsAre(Joint{{9.5, 11.5}, 1}, Joint{{11, 12.5}, 0}));
+  }
+  EXPECT_THAT(with("[0, 0, 0]", "[]", face)->label_schema().joint_names, IsEmpty());
+  const char* note =
+      "keypoints of 2 annotations left out, since their category names none and they differ in "
+      "number, in instances.json";
+  const auto differing = with("[1, 2, 2]", "[1, 2, 2, 3, 4, 2]", face);
+  EXPECT_THAT(differing->notes(), Contains(note));
+  EXPECT_THAT(differing->label_schema().joint_names, IsEmpty());
+  EXPECT_EQ(annotation("7").boxes.size(), 2u);
+  EXPECT_THAT(annotation("7").persons, IsEmpty());
+  // Beside a category that names one joint.
+  const auto beside = with("[1, 2, 2, 3, 4, 2]", "[1, 2, 2, 3, 4, 2]",
+                           face + R"(, {"id": 4, "name": "dog", "keypoints": ["nose"]})");
+  EXPECT_THAT(beside->notes(), Contains(note));
+  EXPECT_THAT(beside->label_schema().joint_names, ElementsAre("nose"));
 }
 
 TEST_F(CocoLabels, PoseTracksUnlabelledFramesAreNoneAndItsRegionsAreIgnored) {
