@@ -1,6 +1,8 @@
 #include "stages/frames/own_labels/detail/coco_entry.h"
 
 #include <algorithm>
+#include <array>
+#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -164,31 +166,104 @@ std::int64_t read_track(const nlohmann::json& annotation) {
   return Box().track_id;
 }
 
-/// Whether a joint of the annotation is annotated.
-bool read_keypoints(StrictObject& object, std::size_t joints, bool has_names, Person& person) {
+/// COCO-WholeBody's joints beside the 17 of the body, in the order of its 133.
+struct BodyPart {
+  const char *key, *valid;
+  std::size_t joints;
+};
+constexpr std::array<BodyPart, 4> kBodyParts{{{"foot_kpts", "foot_valid", 6},
+                                              {"face_kpts", "face_valid", 68},
+                                              {"lefthand_kpts", "lefthand_valid", 21},
+                                              {"righthand_kpts", "righthand_valid", 21}}};
+constexpr std::size_t kPartJoints = 116;
+
+/// Of the face's 68 landmarks (iBUG's, as in 300-W) the one on its other side; itself in the
+/// middle.
+int mirrored_landmark(int i) {
+  struct Row {
+    int last, sum;
+  };
+  constexpr std::array<Row, 12> kRows{{{16, 16},
+                                       {26, 43},
+                                       {30, 0},
+                                       {35, 66},
+                                       {39, 81},
+                                       {41, 87},
+                                       {45, 81},
+                                       {47, 87},
+                                       {54, 102},
+                                       {59, 114},
+                                       {64, 124},
+                                       {67, 132}}};
+  const auto row = std::ranges::find_if(kRows, [&](const Row& of) { return i <= of.last; });
+  return row->sum == 0 ? i : row->sum - i;
+}
+
+/// Names that tell the sides: a landmark of the left has the number of the right one.
+std::vector<std::string> part_joint_names() {
+  std::vector<std::string> names{"left_big_toe",  "left_small_toe",  "left_heel",
+                                 "right_big_toe", "right_small_toe", "right_heel"};
+  for (int i = 0; i < 68; ++i) {
+    const int other = mirrored_landmark(i);
+    names.push_back((i < other ? "right_" : (i > other ? "left_" : "")) + std::string("face_") +
+                    std::to_string(std::min(i, other)));
+  }
+  for (const char* hand : {"left_hand_", "right_hand_"}) {
+    for (int i = 0; i < 21; ++i) names.push_back(hand + std::to_string(i));
+  }
+  return names;
+}
+
+Joint joint_at(const StrictValue& x, const StrictValue& y, int visible) {
+  constexpr double kHalf = 0.5;  // edges to pixels' centres
+  return {{x.number(-kFarthest_px, kFarthest_px) - kHalf,
+           y.number(-kFarthest_px, kFarthest_px) - kHalf},
+          visible};
+}
+
+void read_part(StrictObject& object, const BodyPart& part, Person& person) {
+  const auto list = find_given(object, part.key);
+  const auto valid = find_given(object, part.valid);
+  const std::vector<StrictValue> numbers =
+      list && !(valid && !read_flag(*valid)) ? list->elements() : std::vector<StrictValue>();
+  if (!numbers.empty() && numbers.size() != 3 * part.joints) {
+    list->fault("x, y, v of each of " + std::to_string(part.joints) + " joints");
+    return;
+  }
+  for (std::size_t i = 0; i < part.joints; ++i) {
+    Joint& joint = person.joints.emplace_back(Joint{kMissingPoint, 0});
+    if (numbers.empty()) continue;
+    const double seen = numbers[3 * i + 2].number(0, 2);  // a detector's is a share
+    if (seen == 0) continue;
+    joint = joint_at(numbers[3 * i], numbers[3 * i + 1], seen == 2 ? 1 : (seen == 1 ? 0 : -1));
+  }
+}
+
+/// Whether a joint of the annotation is annotated. `joints`: of the body, of which there may be no
+/// names.
+bool read_keypoints(StrictObject& object, std::size_t joints, bool has_names, bool has_parts,
+                    Person& person) {
   const auto keypoints = find_given(object, "keypoints");
-  if (!keypoints) return false;
-  const std::vector<StrictValue> numbers = keypoints->elements();
-  if (numbers.empty()) return false;  // of classes without joints
-  if (numbers.size() != 3 * joints) {
+  const std::vector<StrictValue> numbers =
+      keypoints ? keypoints->elements() : std::vector<StrictValue>();
+  if (numbers.empty() && !has_parts) return false;  // of classes without joints
+  if (!numbers.empty() && numbers.size() != 3 * joints) {
     if (!has_names) return false;
     keypoints->fault("x, y, v of each of " + std::to_string(joints) + " joints");
     return false;
   }
-  constexpr double kHalf = 0.5;  // edges to pixels' centres
-  bool any = false;
   for (std::size_t i = 0; i < joints; ++i) {
-    Joint joint{kMissingPoint, 0};
-    const Point at{numbers[3 * i].number(-kFarthest_px, kFarthest_px) - kHalf,
-                   numbers[3 * i + 1].number(-kFarthest_px, kFarthest_px) - kHalf};
+    Joint& joint = person.joints.emplace_back(Joint{kMissingPoint, 0});
+    if (numbers.empty()) continue;
     const int visible = numbers[3 * i + 2].integer(0, 2);
-    if (visible > 0) {
-      joint = {at, visible == 2 ? 1 : 0};
-      any = true;
-    }
-    person.joints.push_back(joint);
+    const Joint annotated = joint_at(numbers[3 * i], numbers[3 * i + 1], visible == 2 ? 1 : 0);
+    if (visible > 0) joint = annotated;
   }
-  return any;  // num_keypoints counts otherwise in some datasets
+  for (const BodyPart& part : kBodyParts) {
+    if (has_parts) read_part(object, part, person);
+  }
+  const auto is_annotated = [](const Joint& joint) { return joint.at != kMissingPoint; };
+  return std::ranges::any_of(person.joints, is_annotated);  // num_keypoints counts otherwise
 }
 
 }  // namespace
@@ -244,6 +319,9 @@ LabelSchema coco_schema(const CocoIndex& index, const std::string& path) {
     throw InputError("expected one list of keypoints, got two, of \"" + category.name +
                      "\" another, in " + path);
   }
+  if (index.has_body_parts && !schema.joint_names.empty()) {
+    std::ranges::move(part_joint_names(), std::back_inserter(schema.joint_names));
+  }
   return schema;
 }
 
@@ -280,7 +358,10 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
   box.track_id = read_track(entry.document());
   if (const auto area = find_given(object, "area")) area->number(0, kFarthest_px * kFarthest_px);
   Person person;
-  const bool is_person = read_keypoints(object, schema.joint_names.size(), has_names, person);
+  const std::size_t joints = schema.joint_names.size();
+  const bool has_parts = index.has_body_parts && joints > kPartJoints;
+  const bool is_person =
+      read_keypoints(object, joints - (has_parts ? kPartJoints : 0), has_names, has_parts, person);
   const auto head = is_person ? find_given(object, "bbox_head") : std::nullopt;  // PoseTrack's
   std::optional<Rectangle> head_box;
   if (head && !(head->is_array() && head->elements().empty())) head_box = read_bbox(*head);

@@ -171,6 +171,7 @@ extern const LabelReader kMotReader;
 ///
 /// PoseTrack's images with `is_labeled` false and no annotation have no label; the regions that it
 /// ignores are boxes to ignore, and `bbox_head` is Person::head_box.
+/// COCO-WholeBody's feet, face and hands are joints behind those that the category names.
 ///
 /// The file is read through once, whatever its size, and of each entry its place is kept: about 20
 /// bytes an annotation and 200 an image. An entry is read again, and strictly, when its annotation

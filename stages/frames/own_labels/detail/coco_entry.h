@@ -29,7 +29,9 @@ void add_ignored_regions(const CocoImage& entry, ImageSize image, const CocoInde
                          const std::string& place, Annotation& annotation);
 
 /// What classes and joints a file has: the categories in their order, and the joints that one of
-/// them has. Throws InputError if two have different ones.
+/// them has, with COCO-WholeBody's behind them (left_big_toe, ..., right_face_0 and left_face_0,
+/// its mirror image, ..., left_hand_0, ..., right_hand_20). Throws InputError if two have different
+/// ones.
 LabelSchema coco_schema(const CocoIndex& index, const std::string& path);
 
 /// Adds an entry of `annotations`, a box and perhaps a person, to those of the image; or counts a

@@ -225,6 +225,51 @@ TEST_F(CocoLabels, JointsWithoutNamesAreNumberedIfAllAreAsMany) {
   EXPECT_THAT(beside->label_schema().joint_names, ElementsAre("nose"));
 }
 
+TEST_F(CocoLabels, WholeBodysFeetFaceAndHandsAreJoints) {
+  const auto list = [](int joints, const std::string& first) {
+    std::string text = first;
+    for (int i = 1; i < joints; ++i) text += ", 0, 0, 0";
+    return "[" + text + "]";
+  };
+  const std::string parts = R"(, "foot_kpts": )" + list(6, "1, 2, 2") + R"(, "face_kpts": )" +
+                            list(68, "3, 4, 0.5") + R"(, "lefthand_kpts": )" + list(21, "5, 6, 1") +
+                            R"(, "righthand_kpts": )" + list(21, "7, 8, 2") +
+                            R"(, "righthand_valid": false)";
+  const std::string person = R"({"id": 3, "name": "person", "keypoints": ["nose", "eye"]})";
+  write(image(7, "000001.png"),
+        box(1, 7, "[1, 2, 30, 20]", R"(, "keypoints": [10, 12, 2, 0, 0, 0])" + parts) + "," +
+            box(2, 7, "[1, 2, 30, 20]", R"(, "keypoints": [10, 12, 2, 0, 0, 0])"),
+        person);
+  const std::vector<std::string> names = open()->label_schema().joint_names;
+  ASSERT_EQ(names.size(), 2u + 116u);
+  EXPECT_EQ(names[2], "left_big_toe");
+  // MMPose swaps face-0 and face-16, face-36 and face-45, face-41 and face-46; 8 is the chin.
+  for (const auto& [i, name] : {std::pair(0, "right_face_0"),
+                                {16, "left_face_0"},
+                                {8, "face_8"},
+                                {36, "right_face_36"},
+                                {45, "left_face_36"},
+                                {46, "left_face_41"},
+                                {30, "face_30"},
+                                {67, "left_face_65"}}) {
+    EXPECT_EQ(names[static_cast<std::size_t>(8 + i)], name);
+  }
+  EXPECT_EQ(names[8 + 68], "left_hand_0");
+  EXPECT_EQ(names.back(), "right_hand_20");
+  const Annotation read = annotation("7");
+  ASSERT_EQ(read.persons.size(), 2u) << read.original;
+  const std::vector<Joint>& joints = read.persons[0].joints;
+  ASSERT_EQ(joints.size(), names.size());
+  EXPECT_EQ(joints[0], (Joint{{9.5, 11.5}, 1}));
+  EXPECT_EQ(joints[2], (Joint{{0.5, 1.5}, 1}));
+  EXPECT_EQ(joints[8], (Joint{{2.5, 3.5}, -1})) << "a share of certainty";
+  EXPECT_EQ(joints[8 + 68], (Joint{{4.5, 5.5}, 0}));
+  EXPECT_EQ(joints[8 + 68 + 21], (Joint{kMissingPoint, 0})) << "it is not valid";
+  EXPECT_EQ(read.persons[1].joints.size(), names.size());
+  write(image(7, "000001.png"), box(1, 7, "[1, 2, 30, 20]", R"(, "face_kpts": [1, 2, 2])"), person);
+  EXPECT_THAT(fault(), HasSubstr("$.face_kpts: expected x, y, v of each of 68 joints"));
+}
+
 TEST_F(CocoLabels, PoseTracksUnlabelledFramesAreNoneAndItsRegionsAreIgnored) {
   const std::string rest = R"(, "width": 40, "height": 30, "is_labeled": )";
   const std::string regions = R"(, "ignore_regions_x": [[10, 20, 20, 10], [1, 2, 3]],
