@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <set>
 #include <utility>
@@ -13,6 +14,7 @@
 
 #include "manifests/documents/json_text.h"
 #include "manifests/files/csv_records.h"
+#include "manifests/values/text.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/own_labels/detail/find_labels.h"
@@ -163,7 +165,8 @@ NamedBox box_of(const Row& row, bool has_sides, char separator) {
 class ImageRows {
  public:
   /// Beside the rows before it. Throws BadLabel.
-  void add(const Row& row, bool has_sides, char separator) {
+  void add(const Row& row, bool has_sides, char separator, const CsvRecord& record,
+           const std::string& place) {
     const auto is_empty = [](std::string_view field) { return field.empty(); };
     const bool is_alone = std::all_of(row.begin() + kClass, row.begin() + kWidth, is_empty) &&
                           row[kTrack].empty() &&
@@ -174,6 +177,11 @@ class ImageRows {
     is_without_boxes_ = is_alone;
     if (is_alone) return;
     NamedBox box = box_of(row, has_sides, separator);
+    if (!lines_.insert(std::hash<std::string_view>()(trimmed(record.bytes))).second) {
+      box.again_at = place;
+      labels_.boxes.push_back(std::move(box));
+      return;
+    }
     const std::int64_t track = box.box.track_id;
     if (track >= 0 && !tracks_.insert(track).second) {
       throw BadLabel("each track once in an image", std::to_string(track) + " twice");
@@ -187,6 +195,7 @@ class ImageRows {
   ImageLabels labels_;
   bool is_without_boxes_ = false;
   std::set<std::int64_t> tracks_;
+  std::set<std::size_t> lines_;  // hashes, since there may be millions
 };
 
 }  // namespace
@@ -238,7 +247,7 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
         throw BadLabel("expected text, got a NUL in it");
       }
       rows.labels().original.append(record->bytes);
-      rows.add(row, has_sides, separator);
+      rows.add(row, has_sides, separator, *record, place);
       if (rows.labels().boxes.empty()) continue;
       const Rectangle& box = rows.labels().boxes.back().box.xyxy;
       largest = std::max({largest, box.right, box.bottom});

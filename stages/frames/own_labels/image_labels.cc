@@ -20,7 +20,11 @@ Outcome<Annotation> numbered(ImageLabels labels, const std::vector<std::string>&
                          escape_controls(named.class_name) + "\", in " + place};
     }
     named.box.class_id = static_cast<int>(name - class_names.begin());
-    add_box(named.box, image, place, annotation);
+    if (named.again_at.empty()) {
+      add_box(named.box, image, place, annotation);
+    } else {
+      leave_out_again(named.again_at, annotation);
+    }
   }
   forget_shared_tracks(annotation.boxes);
   return annotation;
@@ -51,13 +55,25 @@ Outcome<Annotation> ReadLabels::annotation(const std::string& label_key) const {
   return numbered(labels, schema_.class_names, *size, label_place(label_key));
 }
 
+namespace {
+
+void leave_out(const std::string& reason, Annotation& annotation) {
+  annotation.left_out_at.push_back(annotation.boxes.size() + annotation.left_out.size());
+  annotation.left_out.push_back(reason);
+}
+
+}  // namespace
+
+void leave_out_again(const std::string& place, Annotation& annotation) {
+  leave_out("expected each line once, got it again, in " + place, annotation);
+}
+
 bool add_box(const Box& box, ImageSize image, const std::string& place, Annotation& annotation) {
   if (overlaps(box.xyxy, image)) {
     annotation.boxes.push_back(box);
     return true;
   }
-  annotation.left_out_at.push_back(annotation.boxes.size() + annotation.left_out.size());
-  annotation.left_out.push_back(outside_text(box.xyxy, image) + ", in " + place);
+  leave_out(outside_text(box.xyxy, image) + ", in " + place, annotation);
   return false;
 }
 

@@ -390,10 +390,15 @@ std::string PoseEvidence::doubt() const {
 Outcome<Annotation> parse_yolo_text(std::string text, const YoloSchema& schema, ImageSize image,
                                     const std::string& path) {
   Annotation annotation;
+  std::set<std::string_view> known;
   for (const TextLine& line : split_lines(text)) {
     const auto columns = split_columns(line.bytes);
     if (columns.empty()) continue;
     const std::string place = place_in_file(path, line.number);
+    if (!known.insert(trimmed(line.bytes)).second) {
+      leave_out_again(place, annotation);
+      continue;
+    }
     try {
       YoloLine(columns, schema, image).read(place, annotation);
     } catch (const BadLabel& bad) {

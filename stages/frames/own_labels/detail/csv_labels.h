@@ -20,6 +20,8 @@ namespace eventgan {
 /// for one object throughout its sequence, or empty. A row with an image alone (`a.png,,,,,`) is an
 /// image without boxes, and then the image's only row.
 ///
+/// A row that is there already is left out when the boxes are numbered.
+///
 /// Result: by image, as the table writes it, its rows (byte for byte, in the file's order), and its
 /// boxes. A class that is empty or has control characters, an edge that is no number within 1e6,
 /// right < left, bottom < top, a track twice in an image, or a box beside a row without one is a

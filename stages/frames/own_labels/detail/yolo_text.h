@@ -66,9 +66,10 @@ class PoseEvidence {
 /// An image's text (kYoloReader): its boxes, and with joints its persons, in pixels of an image of
 /// that size; `original` is the text. An outline among boxes (class and at least three points, of a
 /// dataset without joints) has the box around it; parts that a bridge joins, there and back, are
-/// parts. A fault names `path` and the line: another number
-/// of columns, a class beyond the names, a share beyond 0..1 by more than 0.01; by less a box
-/// reaches beyond the image, and a joint is moved to its edge.
+/// parts. A line that is there already is left out, and counted in Annotation::left_out. A fault
+/// names `path` and the line: another number of columns, a class beyond the names, a share beyond
+/// 0..1 by more than 0.01; by less a box reaches beyond the image, and a joint is moved to its
+/// edge.
 Outcome<Annotation> parse_yolo_text(std::string text, const YoloSchema& schema, ImageSize image,
                                     const std::string& path);
 

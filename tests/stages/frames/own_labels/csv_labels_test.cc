@@ -51,6 +51,21 @@ TEST(CsvLabels, HaveARowABox) {
   EXPECT_EQ(empty.original, "sub/empty.png,,,,,,\r\n");
 }
 
+TEST(CsvLabels, ARowThatIsThereAlreadyIsLeftOut) {
+  const auto images = read_csv(
+      "a.png,car,1,2,3,4,5\na.png,bus,1,2,3,4,\r\na.png,car,1,2,3,4,5\nb.png,bus,1,2,3,4,\n"
+      "a.png,bus,1,2,3,4,\n");
+  ASSERT_FALSE(is_fault(images.at("a.png"))) << images.at("a.png").fault().reason;
+  const auto read = numbered(*images.at("a.png"), {"bus", "car"}, {30, 40}, "labels.csv#a.png");
+  ASSERT_THAT(read->boxes, SizeIs(2));
+  EXPECT_EQ(read->boxes[0].track_id, 5);
+  EXPECT_THAT(read->left_out,
+              ::testing::ElementsAre("expected each line once, got it again, in labels.csv:4",
+                                     "expected each line once, got it again, in labels.csv:6"));
+  EXPECT_THAT(read->left_out_at, ::testing::ElementsAre(2u, 3u));
+  EXPECT_THAT(images.at("b.png")->boxes, SizeIs(1));
+}
+
 TEST(CsvLabels, ColumnsComeInAnyOrderAndTrackMayBeAbsent) {
   const auto images = parse_csv_labels(
       "\xEF\xBB\xBF"

@@ -81,6 +81,15 @@ TEST(YoloText, ABadBoxDoesNotLoseTheOthers) {
   EXPECT_THAT(annotation.left_out[1], ::testing::EndsWith(", in a.txt:3"));
 }
 
+TEST(YoloText, ALineThatIsThereAlreadyIsLeftOut) {
+  const Annotation annotation =
+      read_yolo("0 0.5 0.5 0.25 0.2\n1 0.5 0.5 0.25 0.2\n\n0 0.5 0.5 0.25 0.2 \r\n0 .5 .5 .2 .2");
+  EXPECT_EQ(annotation.boxes.size(), 3u);
+  EXPECT_THAT(annotation.left_out,
+              ElementsAre("expected each line once, got it again, in a.txt:4"));
+  EXPECT_THAT(annotation.left_out_at, ElementsAre(2u));
+}
+
 TEST(YoloText, WhatProgramsPutAroundNumbersIsPassedOver) {
   const std::string text =
       "\xEF\xBB\xBF"
