@@ -333,7 +333,7 @@ std::optional<std::filesystem::path> find_csv(const FoundFrames& frames,
       }
       if (count_among(frames, images) == 0) continue;
       if (is_fault(columns)) {
-        remarks.push_back("a table with other columns left out: " + file.string());
+        remarks.push_back("a table left out, " + columns.fault().reason + ": " + file.string());
       } else if (found) {
         remarks.push_back("another table of labels left out: " + file.string());
       } else {

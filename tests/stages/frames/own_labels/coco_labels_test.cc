@@ -567,6 +567,30 @@ TEST_F(CocoLabels, AnotherSizeOfTheImageIsAFault) {
   EXPECT_THAT(fault(), HasSubstr("instances.json (image 7): $.height: expected"));
 }
 
+TEST_F(CocoLabels, WhatIsNoImageOfThatSizeOrFormatIsNamed) {
+  using namespace std::string_literals;
+  const auto file = folder_ / "images/turned.jpg";
+  testing::write_flat_image(file, kImage, 7);
+  const std::string exif = "MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"s;
+  std::string jpeg = testing::read_file(file);
+  jpeg.insert(2, "\xff\xe1\0\x22"s + "Exif\0\0"s + exif);
+  testing::write_file(file, jpeg);
+  write(image(7, "turned.jpg"), "");
+  EXPECT_EQ(fault(),
+            "expected an image of 40x30, as instances.json#images/7 says, got 30x40, turned "
+            "upright as its EXIF orientation says, in images/turned.jpg");
+  testing::write_file(folder_ / "images/a.heic", "x");
+  testing::write_file(folder_ / "images/b.avif", "x");
+  write(image(1, "000001.png") + "," + image(7, "a.heic") + "," + image(8, "b.jpg"), "");
+  const auto dataset = open();
+  for (const auto& [i, name] : {std::pair(1u, "a.heic"), {2u, "b.avif"}}) {
+    EXPECT_EQ(dataset->labelled_frames().at(i).fault,
+              "expected a frame, got a file of another format, which ImageMagick converts "
+              "(mogrify -format png), in images/" +
+                  std::string(name));
+  }
+}
+
 TEST_F(CocoLabels, AFileThatIsNoneIsRefused) {
   const auto refused = [&](const std::string& text, const std::string& why) {
     testing::write_file(folder_ / "instances.json", text);
