@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,11 @@ class YoloExporter : public Exporter {
       names_.push_back(name);
     }
     if (keep_ignored_) names_.push_back("ignored");
+    for (const ExportShard& shard : input.shards()) {
+      const ExportSource& source = input.source_of(shard);
+      if (source.has_boxes()) splits_[""].insert(source.split);
+      if (has_poses(source)) splits_[pose_folder(input, source)].insert(source.split);
+    }
     for (const ExportSource& source : input.sources()) {
       if (!has_poses(source)) continue;
       pose_text_ +=
@@ -88,6 +94,21 @@ class YoloExporter : public Exporter {
       if (has_poses(source)) of_folder[pose_folder(work.input, source)].push_back(shard);
     }
     for (const auto& [folder, of_it] : of_folder) write_lists(work, folder, of_it);
+  }
+
+  /// Ultralytics' trainer stops where one is missing.
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes;
+    for (const auto& [folder, splits] : splits_) {
+      if (!splits.contains("train")) {
+        notes.push_back(folder + "data.yaml has no split train, which Ultralytics needs");
+      } else if (!splits.contains("val")) {
+        notes.push_back(folder +
+                        "data.yaml has val: train.txt, since there is no split val: scores are of "
+                        "what is trained on");
+      }
+    }
+    return notes;
   }
 
   void account(const OutgoingSample& sample, LeftOut& left_out) const override {
@@ -194,6 +215,7 @@ class YoloExporter : public Exporter {
   double full_scale_;
   std::string pose_text_;  ///< which joints are in which of the folders of persons
   std::vector<std::string> names_;
+  std::map<std::string, std::set<std::string>> splits_;  ///< by the folder of a data.yaml
 };
 
 }  // namespace

@@ -88,6 +88,8 @@ class Formats(Export):
         self.assertEqual(data["nc"], 8)
         self.assertEqual(data["channels"], 18)
         self.assertNotIn("DontCare", data["names"])
+        self.assertNotIn("path", data)  # Ultralytics begins at the file's folder then
+        self.assertEqual(self.described()["notes"], [])
         for split in ("train", "val"):
             lines = (self.out / data[split]).read_text().split()
             self.assertEqual(lines, [f"./images/{split}/{name_of(key)}.png" for key in of(split, "kitti_object")])
@@ -157,8 +159,13 @@ class Formats(Export):
                                     or dataset == "human36m")
         self.assertEqual(self.described()["left_out"].get("joints outside the volume (as not annotated)", 0), outside)
         alone = self.out.parent / "alone"
-        self.export("yolo", "--split", "val", out=alone)
+        out, _ = self.export("yolo", "--split", "val", out=alone)
         self.assertFalse((alone / "pose").exists())
+        self.assertIn("note: data.yaml has no split train, which Ultralytics needs", out)
+        out, _ = self.export("yolo", "--split", "train", "--overwrite", out=alone)
+        for folder in ("", "pose/", "pose-2/"):
+            self.assertIn(f"note: {folder}data.yaml has val: train.txt, since there is no split val", out)
+            self.assertEqual(yaml.safe_load((alone / folder / "data.yaml").read_text())["val"], "train.txt")
 
     def test_yolo_classes_and_ignored(self):
         classes = demo.folder / "classes.json"
