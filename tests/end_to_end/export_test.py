@@ -316,7 +316,8 @@ class Formats(Export):
                          (self.out / "person_keypoints_train.json").read_bytes())
 
     def test_mpii(self):
-        self.export("mpii")
+        out, _ = self.export("mpii")
+        self.assertIn("for MMPose --to coco", out)
         self.assertEqual(sorted(path.name for path in (self.out / "annot").iterdir()),
                          ["gt_train-human36m.mat", "gt_train-mpii.mat", "train-human36m.json", "train-mpii.json"])
         for dataset, joints in (("mpii", 16), ("human36m", 17)):
