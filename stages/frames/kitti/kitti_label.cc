@@ -94,6 +94,8 @@ struct DifficultyLimits {
 /// Easy, moderate, hard: cpp/evaluate_object.cpp of the development kit.
 constexpr DifficultyLimits kDifficulties[] = {{40, 0, 0.15f}, {25, 1, 0.3f}, {25, 2, 0.5f}};
 
+}  // namespace
+
 int kitti_difficulty(const Box& box) {
   if (box.occlusion < 0 || box.truncation < 0) return -1;
   const double height = box.xyxy.bottom - box.xyxy.top;
@@ -106,8 +108,6 @@ int kitti_difficulty(const Box& box) {
   }
   return -1;
 }
-
-}  // namespace
 
 Outcome<Box> parse_kitti_object(std::span<const std::string_view> columns, KittiColumns kind,
                                 const std::string& where) {

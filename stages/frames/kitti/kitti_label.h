@@ -25,15 +25,17 @@ enum class KittiColumns {
   kTracking  ///< frame and track id come first; truncated is a level 0, 1 or 2
 };
 
+/// The difficulty of KITTI object: that of its development kit. With h = bottom - top, easy: h ≥ 40
+/// px, fully visible, truncated ≤ 0.15; moderate: h ≥ 25, at most partly occluded, ≤ 0.30; hard: h
+/// ≥ 25, at most largely occluded, ≤ 0.50. None where either is unknown.
+int kitti_difficulty(const Box& box);
+
 /// One object of a label file: type, truncated, occluded (0..3), alpha, left, top, right, bottom,
 /// h, w, l, x, y, z, rotation_y, and perhaps a score, which is not kept. Truncated and occluded are
 /// -1 where they are unknown. Numbers are taken as they are, except that the unknown 3-D box of
 /// tracking's DontCare (location, rotation_y and size, in this order) becomes Box's own.
 ///
-/// The difficulty is that of the object development kit: with h = bottom - top, easy: h ≥ 40 px,
-/// fully visible, truncated ≤ 0.15; moderate: h ≥ 25, at most partly occluded, ≤ 0.30; hard: h ≥
-/// 25, at most largely occluded, ≤ 0.50. None for DontCare and where either is unknown; none in
-/// tracking.
+/// The difficulty is that of kitti_difficulty; none for DontCare, and none in tracking.
 ///
 /// DontCare becomes `ignore`, and so does tracking's level 2, an object to be ignored. A fault
 /// reads "expected 15 columns, got 7, in WHERE".

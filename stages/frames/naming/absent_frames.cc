@@ -6,9 +6,24 @@
 #include <utility>
 
 namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The image of a format that is not read, as the labels name it or instead; empty if none is
+/// there.
+std::string unread_image(const SourceRoot& root, const std::string& name) {
+  if (has_file(root.on_disk(name))) return name;
+  for (const char* extension : {".heic", ".HEIC", ".heif", ".avif", ".jxl", ".jp2", ".gif"}) {
+    const std::string other = fs::path(name).replace_extension(extension).generic_string();
+    if (has_file(root.on_disk(other))) return other;
+  }
+  return {};
+}
+
+}  // namespace
 
 void add_absent_frames(const OwnLabels& labels, std::vector<LabelledFrame>& frames) {
-  namespace fs = std::filesystem;
   if (frames.empty() && labels.absent().empty()) {
     throw InputError("expected labels of the frames in " + labels.source().root.written("") +
                      ", got of none of the " + std::to_string(labels.source().frames.size()));
@@ -36,6 +51,14 @@ void add_absent_frames(const OwnLabels& labels, std::vector<LabelledFrame>& fram
     frame.frame.index = kAbsentFrame;
     frame.label_key = absent.key;
     frame.fault = absent.fault;
+    const SourceRoot& root = labels.source().root;
+    const std::string other = frame.fault.empty() ? unread_image(root, absent.name) : "";
+    if (!other.empty()) {
+      frame.fault =
+          "expected a frame, got a file of another format, which ImageMagick converts "
+          "(mogrify -format png), in " +
+          root.written(other);
+    }
     frames.push_back(std::move(frame));
   }
 }

@@ -147,8 +147,12 @@ Outcome<ImageSize> OwnLabels::image_size(const std::string& label_key,
       frame.size ? Outcome<ImageSize>(*frame.size) : image_sizes_->of(file, kUpright);
   if (is_fault(size)) size = probe_image_size(file, kUpright);  // it may have been mended since
   if (is_fault(size) || !claimed || *size == *claimed) return size;
+  const Outcome<ImageSize> stored =
+      frame.size ? size : probe_image_size(file, ImageOrientation::kStored);
+  const bool is_turned = !is_fault(stored) && *stored == *claimed;
   return SampleFault{"expected an image of " + to_string(*claimed) + ", as " +
-                     label_place(label_key) + " says, got " + to_string(*size) + ", in " +
+                     label_place(label_key) + " says, got " + to_string(*size) +
+                     (is_turned ? ", turned upright as its EXIF orientation says" : "") + ", in " +
                      source_.root.written(frame.name)};
 }
 

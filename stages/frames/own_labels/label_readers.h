@@ -48,11 +48,15 @@ extern const LabelReader kMotReader;
 /// of these (FrameNames), which a note tells. Of a video's frame it is "STEM/NUMBER", perhaps with
 /// an extension, counted from 0. The label_key is the image's id, its place is "FILE#images/ID".
 ///
-/// Classes are numbered by ascending category id. `iscrowd` becomes Box::ignore. An annotation with
+/// Classes are numbered by ascending category id. `iscrowd` and `ignore` become Box::ignore. An annotation with
 /// keypoints is a Box, and a Person with it if a joint is annotated; `bbox`, `segmentation` (the
 /// outline) and `keypoints` are all measured from the image's left and upper edge, as exports have
 /// them, so that a joint lies half a pixel less in Joint::at. Annotation::original is {"image":
 /// ENTRY, "annotations": [ENTRY, ...]}, each entry byte for byte as in the file.
+///
+/// PoseTrack's images with `is_labeled` false and no annotation have no label; the regions that it
+/// ignores are boxes to ignore, and `bbox_head` is Person::head_box.
+/// COCO-WholeBody's feet, face and hands are joints behind those that the category names.
 ///
 /// The file is read through once, whatever its size, and of each entry its place is kept: about 20
 /// bytes an annotation and 200 an image. An entry is read again, and strictly, when its annotation
@@ -74,7 +78,9 @@ extern const LabelReader kCocoReader;
 /// edge; with kpt_shape [J, 2 or 3] "class xc yc w h" and J times "px py [v]", v as COCO's; a joint
 /// at 0, 0 without v is not annotated. Joints are named by data.yaml's kpt_names, by COCO's names
 /// if there are 17, else "0", "1", ... "class x1 y1 x2 y2 ..." is an
-/// outline (segmentation), and the box is what is around it; it may stand among others.
+/// outline (segmentation), and the box is what is around it; it may stand among others. Where
+/// joints without kpt_shape may be meant (PoseEvidence), opening is an InputError with both
+/// readings; kpt_shape: [0, 0] says that there are none.
 extern const LabelReader kYoloReader;
 
 /// Pascal VOC's XML files (parse_voc_labels): found as YOLO's texts are, with the last folder

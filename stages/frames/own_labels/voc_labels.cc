@@ -100,6 +100,14 @@ void read_object(const pugi::xml_node& object, int edges_from, ImageLabels& labe
   read.box.truncation = static_cast<float>(flag(object, "truncated", labels));
   const double occluded = flag(object, "occluded", labels);
   read.box.occlusion = occluded == 0 || occluded == 1 ? static_cast<int>(occluded) : -1;
+  if (const pugi::xml_node track = at_most_one(object, "trackid")) {  // of ImageNet VID
+    const auto number = parse_whole(text_of(track));
+    if (number && *number >= 0) {
+      read.box.track_id = *number;
+    } else {
+      labels.remarks.push_back("<trackid> that is no whole number from 0 left out");
+    }
+  }
   labels.boxes.push_back(std::move(read));
 }
 

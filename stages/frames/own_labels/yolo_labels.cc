@@ -52,6 +52,7 @@ class YoloLabels : public FilePerImage {
   YoloLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
       : FilePerImage(spec, base, std::move(labelled), kYoloFiles) {
     read_classes();
+    if (!classes_.has_shape) refuse_doubt();
     for (std::size_t i = 0; i < schema_.class_names.size(); ++i) {
       meanings_["class " + std::to_string(i)] = schema_.class_names[i];
     }
@@ -100,6 +101,21 @@ class YoloLabels : public FilePerImage {
     notes_.push_back("classes are named by their numbers, 0.." + std::to_string(highest) +
                      ", since no data.yaml or classes.txt with names is in " + root().written("") +
                      " or the folder above it");
+  }
+
+  /// Joints read as corners would be wrong, and nobody would find out.
+  void refuse_doubt() const {
+    PoseEvidence evidence;
+    for (const FrameLabel& label : labels()) {
+      if (label.key.empty()) continue;
+      const Outcome<std::string> text = root().read(label.key);
+      if (!is_fault(text)) evidence.add(*text);
+      if (evidence.is_enough()) break;
+    }
+    const std::string doubt = evidence.doubt();
+    if (doubt.empty()) return;
+    throw InputError("expected " + doubt + ", got no kpt_shape in a data.yaml, in " +
+                     root().written("") + " and the folder above it");
   }
 
   YoloSchema classes_;

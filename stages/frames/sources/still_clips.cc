@@ -24,6 +24,7 @@
 #include "stages/frames/dataset/wrapped_dataset.h"
 #include "stages/frames/decoding/cut_out.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/kitti/kitti_label.h"
 
 namespace eventgan {
 namespace {
@@ -120,6 +121,20 @@ float truncated(float before, double outside) {
   return static_cast<float>(1 - inside * (1 - outside));
 }
 
+/// KITTI tracking has levels: 1 is cut, however far.
+float truncated_level(float before, double outside) {
+  return outside > 0 ? std::max(before, 1.0f) : before;
+}
+
+/// The still's, raised where others cover the object; so what is not known stays so where none
+/// does.
+int occluded(int before, double hidden) {
+  constexpr double kHardly = 0.05, kHalf = 0.5;
+  constexpr int kUnknown = 3;
+  if (hidden <= kHardly) return before;
+  return std::max(before == kUnknown ? 0 : before, hidden <= kHalf ? 1 : 2);
+}
+
 void forget_space(Box& box) {
   const Box unknown;
   box.alpha = unknown.alpha;
@@ -138,8 +153,9 @@ struct Still {
 /// The labels of one frame.
 class FrameLabels {
  public:
-  FrameLabels(const Still& still, const Frame& frame)
-      : still_(still.annotation),
+  FrameLabels(const Still& still, const Frame& frame, DatasetKind dataset)
+      : dataset_(dataset),
+        still_(still.annotation),
         boxes_(still.boxes),
         carriers_(still.carriers),
         image_{0, 0, double(still.size.width), double(still.size.height)},
@@ -161,6 +177,9 @@ class FrameLabels {
     }
     for (const Person& person : still_.persons) add_person(person, moved);
     for (auto& box : boxes) {
+      if (box && dataset_ == DatasetKind::kKittiObject && !box->ignore) {
+        box->difficulty = kitti_difficulty(*box);
+      }
       if (box) moved.boxes.push_back(std::move(*box));
     }
     return moved;
@@ -196,11 +215,8 @@ class FrameLabels {
       box.outline = visible;
       box.xyxy = bounds(visible);
     }
-    box.truncation = truncated(box.truncation, 1 - inside / pixels);
-    const double hidden = 1 - seen / inside;
-    constexpr double kHardly = 0.05, kHalf = 0.5;
-    box.occlusion = std::max(box.occlusion == 3 ? 0 : box.occlusion,
-                             hidden <= kHardly ? 0 : (hidden <= kHalf ? 1 : 2));
+    truncate(box, 1 - inside / pixels);
+    box.occlusion = occluded(box.occlusion, 1 - seen / inside);
     if (box.track_id < 0) box.track_id = static_cast<std::int64_t>(k);
     forget_space(box);
     return box;
@@ -223,6 +239,11 @@ class FrameLabels {
                frame_.area());
   }
 
+  void truncate(Box& box, double outside) const {
+    const bool has_levels = dataset_ == DatasetKind::kKittiTracking;
+    box.truncation = (has_levels ? truncated_level : truncated)(box.truncation, outside);
+  }
+
   std::optional<Box> part_of_image(std::size_t k) const {
     Box box = still_.boxes[k];
     const Rectangle whole = frame_.box(frame_.image_map(), box.xyxy);
@@ -232,7 +253,7 @@ class FrameLabels {
     if (box.track_id < 0) box.track_id = static_cast<std::int64_t>(k);
     box.outline = frame_.outline(frame_.image_map(), std::move(box.outline));
     box.xyxy = seen;
-    if (!box.ignore) box.truncation = truncated(box.truncation, 1 - share);
+    if (!box.ignore) truncate(box, 1 - share);
     forget_space(box);
     return box;
   }
@@ -280,6 +301,7 @@ class FrameLabels {
     return person.box && still_.boxes[k].xyxy.bottom > person.box->bottom;
   }
 
+  DatasetKind dataset_;
   const Annotation& still_;
   const std::vector<Box>& boxes_;  ///< with the outlines of what was cut out: Still::boxes
   const std::vector<std::size_t>& carriers_;
@@ -328,7 +350,7 @@ class StillClips final : public WrappedDataset {
     if (is_fault(*still)) return still->fault();
     const StillPose pose = poses(*scene.still, **still, scene.frame).back();
     const Frame frame((*still)->size, pose);
-    Annotation labels = FrameLabels(**still, frame).labels();
+    Annotation labels = FrameLabels(**still, frame, spec_.dataset).labels();
     if (scene.frame != first_frame()) {  // what the still's labels lost is told once
       labels.left_out.clear();
       labels.left_out_at.clear();

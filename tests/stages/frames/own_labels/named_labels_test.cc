@@ -162,6 +162,18 @@ TEST_F(NamedLabels, WhatVocHasBesideItsFormatIsANote) {
                           "20), in x/3.xml"));
 }
 
+TEST_F(NamedLabels, VocMayHaveTracks) {
+  for (const char* name : {"1", "2"}) image("i/" + std::string(name) + ".png");
+  text("x/1.xml", cat("5", "5", "9", "<trackid>0</trackid>"));
+  text("x/2.xml", cat("5", "5", "9", "<trackid>a</trackid>"));
+  const auto dataset = open(LabelFormat::kVoc, "i", "x");
+  EXPECT_EQ(read(*dataset, "1.xml").boxes.at(0).track_id, 0);
+  EXPECT_EQ(read(*dataset, "2.xml").boxes.at(0).track_id, -1);
+  EXPECT_THAT(dataset->notes(),
+              ::testing::Contains(
+                  "<trackid> that is no whole number from 0 left out: 1 time, first in x/2.xml"));
+}
+
 TEST_F(NamedLabels, NamesThatNoPlanCanHaveAreLeftOut) {
   image("i/a.png");
   image(

@@ -272,6 +272,16 @@ TEST_F(VideoDatasetTest, FramesThatComeUnevenlyHaveTheirOwnTimes) {
   EXPECT_DOUBLE_EQ(open()->labelled_frames()[4].frame.time_s, 0.4);
 }
 
+TEST_F(VideoDatasetTest, FramesThatComeUnevenlyAreNotCutShortIfTheyLastAsLong) {
+  std::vector<int> times_ms;
+  for (int i = 0; i < 24; ++i) times_ms.push_back(100 * (i + 3 * (i / 4)));  // up to 3.8 s
+  spec_.root = "v/uneven.mkv";
+  testing::write_timed_video(folder_ / spec_.root, times_ms, 4);
+  EXPECT_THAT(open()->notes(), IsEmpty());
+  testing::write_timed_video(folder_ / spec_.root, times_ms, 8);
+  EXPECT_THAT(open()->notes(), ElementsAre(HasSubstr("the file may be cut short")));
+}
+
 TEST_F(VideoDatasetTest, NotesTimesThatDoNotAscend) {
   testing::write_timed_video(folder_ / "v/stuck.mkv", {0, 100, 100, 200});
   spec_.root = "v/stuck.mkv";

@@ -203,11 +203,52 @@ TEST_F(StillClipsTest, WhatIsCoveredIsToldAndJointsBehindItAreHidden) {
   ASSERT_EQ(annotation.boxes.size(), 2u);
   EXPECT_EQ(annotation.boxes[0].occlusion, 2);  // 5 of 30 rows are seen
   EXPECT_EQ(annotation.boxes[0].xyxy, (Rectangle{40, 25, 70, 30}));
-  EXPECT_EQ(annotation.boxes[1].occlusion, 0);
+  EXPECT_EQ(annotation.boxes[1].occlusion, -1) << "as in the still, where it is not annotated";
   EXPECT_EQ(annotation.boxes[1].xyxy, (Rectangle{40, 30, 70, 60}));
   EXPECT_EQ(annotation.persons[0].joints[0].visible, 1);
   EXPECT_EQ(annotation.persons[0].joints[1].visible, 0);
   EXPECT_EQ(annotation.persons[1].joints[1].visible, 1);
+}
+
+TEST_F(StillClipsTest, KittisDifficultyOcclusionAndTruncationAreThoseOfTheFrame) {
+  pairs().stills = StillsSpec{{0, 0}, 0, 0};
+  pairs().stills->objects = ObjectMotionSpec{{0, 0}, 0, 0, 0};
+  // Of 30 px height: a far one half covered, one that another covers nowhere, one that the frame
+  // cuts at x = 20, and one that is not alone in knowing nothing of its occlusion.
+  still_.boxes = {still_object({60, 40, 90, 70}), still_object({60, 57, 90, 87}),
+                  still_object({10, 40, 30, 70}), still_object({110, 40, 130, 70})};
+  const int occlusions[] = {3, 1, 0, 3};
+  for (std::size_t k = 0; k < 4; ++k) {
+    Box& box = still_.boxes[k];
+    box.occlusion = occlusions[k];
+    box.truncation = 0;
+    box.difficulty = 0;
+  }
+  const auto boxes = [&](DatasetKind dataset) {
+    manifest_.sources[0].dataset = dataset;
+    const Dataset& clips = open();
+    return clips.annotation(clips.labelled_frames()[3].label_key)->boxes;
+  };
+  const std::vector<Box> object = boxes(DatasetKind::kKittiObject);
+  ASSERT_EQ(object.size(), 4u);
+  const struct {
+    int occlusion, difficulty;
+    float truncation;
+  } expected[] = {
+      {1, -1, 0},   // 17 of 30 rows are left: too low
+      {1, 1, 0},    // moderate
+      {0, 2, 0.5},  // hard
+      {3, -1, 0},   // unknown
+  };
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(object[k].occlusion, expected[k].occlusion) << k;
+    EXPECT_EQ(object[k].difficulty, expected[k].difficulty) << k;
+    EXPECT_EQ(object[k].truncation, expected[k].truncation) << k;
+  }
+  const std::vector<Box> tracking = boxes(DatasetKind::kKittiTracking);
+  EXPECT_EQ(tracking.at(2).truncation, 1) << "a level";
+  EXPECT_EQ(tracking.at(3).truncation, 0);
+  EXPECT_EQ(tracking.at(1).difficulty, 0) << "not KITTI object's: as it is";
 }
 
 /// The pixels brighter than `level`, as a rectangle.
@@ -257,7 +298,7 @@ TEST_F(CutOutClips, ABoxAloneMovesWithTheObjectInIt) {
       const Box& box = annotation.boxes[0];
       EXPECT_TRUE(box.outline.empty()) << "the label has none";
       EXPECT_EQ(box.track_id, 0);
-      EXPECT_EQ(box.occlusion, 0);
+      EXPECT_EQ(box.occlusion, -1);
       const GreyImage shown = frames(dataset, labelled)[1];
       const Rectangle bright = brighter(shown, 140);
       const auto near = [&](double edge, double of_object, double end) {
@@ -340,7 +381,7 @@ TEST_F(StillClipsTest, ARiderIsAsVisibleOnHisHorseAsInTheStill) {
   for (const LabelledFrame& labelled : dataset.labelled_frames()) {
     const Annotation annotation = *dataset.annotation(labelled.label_key);
     ASSERT_EQ(annotation.boxes.size(), 2u) << labelled.sample_id;
-    EXPECT_EQ(annotation.boxes[0].occlusion, 0);
+    EXPECT_EQ(annotation.boxes[0].occlusion, -1);
     EXPECT_EQ(annotation.persons.at(0).joints[0].visible, 1);
   }
 }
