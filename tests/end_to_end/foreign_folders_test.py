@@ -205,8 +205,8 @@ class ForeignFolders(program.InFolder):
                          {mine.relative_to(self.scratch): b"mine", taken.relative_to(self.scratch): b"a file"})
 
     def test_no_command_replaces_a_persons_file(self):
-        """Each command that writes, where a person's files have the names of what it writes: refused, and no byte and no
-        time has changed."""
+        """Each command that writes, where a person's files have the names of what it writes: it is refused, and neither
+        a byte nor a time has changed."""
         job, taken = self.folder / "job" / "manifest.json", self.folder / "taken"
         weights = program.SOURCE / "manifests" / "weights" / "eventgan-8.safetensors"
         results = ["dataset.json", "dataset.h5", "run.json", "plan.json", "amendments.json", "report.html",
