@@ -36,7 +36,7 @@ struct ConvertArguments {
 
 int judge(const ConversionReport& report, const ErrorSpec& errors) {
   if (report.too_many_faults) {
-    tell_error(fmt::format("expected {}, got {} of {}", limits_text(errors),
+    tell_error(fmt::format("expected {}, got {} of {}", limits_text(errors, report.plan_pairs),
                            report.quarantined_in_plan(), report.plan_pairs));
     return kTooManyFaults;
   }

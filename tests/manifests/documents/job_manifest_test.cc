@@ -68,7 +68,7 @@ TEST(JobManifest, HasTheDefaultsOfItsHeader) {
   EXPECT_EQ(manifest.generator.precision, Precision::kFloat32);
   EXPECT_EQ(manifest.volume.bins, 9);
   EXPECT_EQ(manifest.volume.normalize, Normalization::kNone);
-  EXPECT_EQ(manifest.output.samples_per_shard, 64);
+  EXPECT_EQ(manifest.output.samples_per_shard, std::nullopt);
   EXPECT_EQ(manifest.output.dtype, StoredType::kFloat16);
   EXPECT_EQ(manifest.output.deflate_level, 1);
   EXPECT_EQ(manifest.errors.policy, ErrorPolicy::kQuarantine);
