@@ -204,6 +204,9 @@ void list_source(Fields& fields, SourceSpec& spec) {
       "a folder of index masks, PATH.png of the image PATH.jpg below root: number k of a "
       "mask is the outline of the k-th box of the image's labels "
       "(manifests/guides/own_data.md).");
+  fields.find("classes", spec.classes, lists(texts(), 1),
+              "Takes only the boxes of these classes, which are numbered in this order. Boxes of "
+              "others are left out and counted.");
   list_recording(some, spec.recording);
   list_selection(fields, spec.selection);
   some.find("window_s", spec.window.duration_s, numbers(1e-6, 1e3),

@@ -153,6 +153,7 @@ struct SourceSpec {
   std::optional<double> frames_per_second;   ///< frames: for gap_s where the files do not tell
   std::optional<LabelSpec> labels;           ///< frames
   std::optional<std::string> outlines = {};  ///< of frames: folder of index masks
+  std::vector<std::string> classes = {};     ///< takes only boxes of these; empty: of all
   SelectionSpec selection;
   PairSpec pairs;
   RecordingOptions recording;  ///< recording

@@ -27,7 +27,7 @@ namespace {
 struct ConvertArguments {
   JobOptions job;
   std::optional<std::string> shards;
-  std::optional<std::string> sensor;
+  GivenWishes wishes;
   std::optional<std::int64_t> limit;
   bool no_finalize = false;
   double grace_s = ConversionOptions().grace_s;
@@ -52,8 +52,7 @@ std::string trial_text(const ConvertArguments& arguments, const ConversionReport
   return fmt::format("trial run: {} of the job. For all pairs{}:  eventgan convert {}{}{}\n",
                      count_text(report.plan_pairs, "pair"),
                      job.output ? ", into another folder" : "", job.manifest,
-                     arguments.sensor ? " --sensor " + *arguments.sensor : "",
-                     job.output ? " --output DIR" : "");
+                     arguments.wishes.text(), job.output ? " --output DIR" : "");
 }
 
 /// Completes the dataset as `eventgan finalize` does; false, and says why, if a shard is gone
@@ -113,7 +112,7 @@ fs::path trial_folder(fs::path output, std::int64_t limit) {
 int run(const ConvertArguments& arguments) {
   const JobOptions& job = arguments.job;
   const StopSignal signal(shard_stopping_line(arguments.grace_s));
-  const GivenJob given = read_given_job(job.manifest, job.output, arguments.sensor);
+  const GivenJob given = read_given_job(job.manifest, job.output, arguments.wishes);
   ConversionOptions options;
   options.part = choose_part(arguments.shards, [](const char* name) { return std::getenv(name); });
   options.grace_s = arguments.grace_s;
@@ -161,7 +160,7 @@ void add_convert_command(CLI::App& app, int& exit_code) {
       ->option_text("N");
   command->add_flag("--no-finalize", arguments->no_finalize,
                     "Leave dataset.json and dataset.h5 to `eventgan finalize`; so does a part");
-  command->add_option(kSensorOption, arguments->sensor, kSensorText)->option_text("WIDTHxHEIGHT");
+  add_wishes_options(*command, arguments->wishes);
   add_grace_option(*command, arguments->grace_s);
   add_profile_option(*command, arguments->profile);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });

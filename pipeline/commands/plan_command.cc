@@ -30,7 +30,7 @@ struct PlanArguments {
   bool json = false;
   bool freeze = false;
   std::optional<std::string> output;
-  std::optional<std::string> sensor;
+  GivenWishes wishes;
   ProgressStyle progress = ProgressStyle::kAuto;
 };
 
@@ -63,7 +63,7 @@ int freeze(const PlanArguments& arguments, const GivenJob& given, Plan plan) {
 }
 
 int run(const PlanArguments& arguments) {
-  const GivenJob given = read_given_job(arguments.manifest, arguments.output, arguments.sensor);
+  const GivenJob given = read_given_job(arguments.manifest, arguments.output, arguments.wishes);
   const JobManifest& manifest = given.manifest;
   const LoadedGenerator loaded = load_generator(manifest);
   EventIndexes indexes(given.output / kEventIndexFile);
@@ -93,7 +93,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
                          "and time. Writes nothing, except with --freeze.");
   const auto arguments = std::make_shared<PlanArguments>();
   command->add_option(kGivenJob, arguments->manifest, kGivenJobText)->required();
-  command->add_option(kSensorOption, arguments->sensor, kSensorText)->option_text("WIDTHxHEIGHT");
+  add_wishes_options(*command, arguments->wishes);
   add_threads_option(*command, arguments->threads);
   add_json_option(*command, arguments->json);
   auto* freeze_flag =

@@ -18,6 +18,7 @@
 #include "manifests/values/text.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/planning/spread.h"
+#include "stages/frames/class_numbers.h"
 #include "stages/frames/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
 
@@ -324,7 +325,10 @@ SourceDraft::SourceDraft(const FoundSource& source)
 }
 
 void look_at_source(const SourceSpec& spec, const fs::path& folder, SourceDraft& draft) {
-  const auto dataset = open_source(spec, folder, draft);
+  std::vector<std::unique_ptr<Dataset>> datasets;
+  datasets.push_back(open_source(spec, folder, draft));
+  number_classes({spec}, datasets);
+  const auto& dataset = datasets.front();
   const Survey counted = survey(*dataset, spec);
   if (has_events(spec.dataset)) {
     draft.has_frames = all_have_frames(*dataset);
