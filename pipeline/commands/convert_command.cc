@@ -78,6 +78,9 @@ int convert_and_report(const ConvertArguments& arguments, const GivenJob& given,
   // Here, and not in every command that loads them: `plan` writes nothing, and `retry` goes on. Not
   // before the plan, which may be another program's to make (HandOver).
   options.on_planned = [&] {
+    if (!job.output) {
+      tell("output folder: " + options.output->string() + " (--output DIR names another)");
+    }
     for (const std::string& line : given.findings) tell(line);
     keep_manifest(given);
     if (!loaded.choice.empty()) tell(loaded.choice);
@@ -147,6 +150,10 @@ void add_convert_command(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<ConvertArguments>();
   add_job_options(*command, arguments->job, kGivenJob, kGivenJobText,
                   "Discard the results of earlier runs of the same job");
+  command->get_option("--output")
+      ->description(
+          "Output folder; default: the manifest's, of a folder or video out/NAME-events "
+          "in the current folder");
   command
       ->add_option("--shards", arguments->shards,
                    "This worker's part of the plan: I/N (0 <= I < N) or all; default: as set in "

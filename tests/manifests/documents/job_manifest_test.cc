@@ -255,6 +255,12 @@ TEST(JobManifest, SaysWhatIsWrongWithTextThatIsNoObject) {
             "m.json:1:1: expected UTF-8 without a byte order mark, got a byte order mark");
 }
 
+TEST(JobManifest, ReportsAMisspeltKeyOnce) {
+  EXPECT_EQ(faults_of(testing::edited(kSoundManifest,
+                                      {{"/output", ""}, {"/ouput", R"({"directory": "o"})"}})),
+            "m.json: $.ouput: expected the key \"output\" or none, got an unknown key");
+}
+
 TEST(JobManifest, ReportsADoubleKeyBesideOtherFaults) {
   std::string text = kSoundManifest;
   text.insert(text.rfind('}'), R"(, "seed": -1, "seed": 2, "sed": 1)");
