@@ -142,6 +142,7 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
           "{}: expected a folder, video or recording, got a manifest, whose keys count, in {}",
           text.substr(1), given.string()));
     }
+    if (const std::string fault = fault_of_file(given); !fault.empty()) throw UsageError(fault);
     job.manifest = read_job_manifest(given);
     job.output =
         output.value_or(resolve(job.manifest, job.manifest.output.directory).lexically_normal());
@@ -163,8 +164,8 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
   const bool has_plan = fs::exists(fs::symlink_status(job.output / "plan.json"));
   if (fs::exists(fs::symlink_status(file))) {
     job.manifest = read_kept(file, found, given);
-    const auto& kept = job.manifest.sources.front().recording.sensor;
     require_kept(wishes.draft, job.manifest, file);
+    const auto& kept = job.manifest.sources.front().recording.sensor;
     if (found.sensor && kept != found.sensor) {
       throw UsageError(fmt::format("--sensor: expected {}, as when the job began, got {}, in {}",
                                    kept ? to_string(*kept) : "none", to_string(*found.sensor),
