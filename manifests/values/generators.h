@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "manifests/values/rows.h"
+
 namespace eventgan {
 
 /// What makes the volumes: the EventGAN network, a model to compare it with, or a camera.
@@ -58,6 +60,7 @@ inline constexpr std::array kGenerators{
                  .value = GeneratorKind::kEvents,
                  .title = "events of a camera",
                  .needs_frames = false}};
+static_assert(are_in_order(kGenerators));
 
 /// The kind's row. Throws std::invalid_argument for a number that is no kind, which only a bad cast
 /// can make.

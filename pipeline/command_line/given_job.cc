@@ -16,7 +16,7 @@
 #include "manifests/values/faults.h"
 #include "pipeline/command_line/standard_streams.h"
 #include "pipeline/command_line/usage.h"
-#include "stages/frames/find_source.h"
+#include "stages/frames/sources/find_source.h"
 
 namespace eventgan {
 namespace {

@@ -19,7 +19,7 @@
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/threads.h"
-#include "stages/recordings/event_index.h"
+#include "stages/recordings/order/event_index.h"
 
 namespace eventgan {
 namespace {

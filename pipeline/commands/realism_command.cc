@@ -20,7 +20,7 @@
 #include "pipeline/commands/commands.h"
 #include "pipeline/realism/realism.h"
 #include "pipeline/runtime/errors.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 namespace {

@@ -325,9 +325,11 @@ void require_own_results(const fs::path& folder) {
 }
 
 void require_own_shard(const fs::path& folder, const std::string& shard) {
-  const fs::path record = folder / commit_record_name(shard);
-  require_replaceable(record, OwnFile::kCommitRecord);
-  if (!fs::exists(record)) require_replaceable(folder / shard, OwnFile::kShard);
+  const fs::path record = folder / commit_record_name(shard), file = folder / shard;
+  if (fs::exists(record) && is_replaceable(record, OwnFile::kCommitRecord)) return;
+  require_replaceable(file, OwnFile::kShard);
+  // A record that is torn tells nothing of itself: beside a shard of the program it is its own.
+  if (!fs::exists(file)) require_replaceable(record, OwnFile::kCommitRecord);
 }
 
 void discard_output(const fs::path& folder, const Fingerprint& fingerprint,

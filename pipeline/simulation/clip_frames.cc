@@ -6,9 +6,8 @@
 #include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "stages/frames/decoding/prepared_frame.h"
-#include "stages/frames/sequences/frames_dataset.h"
-#include "stages/frames/sequences/image_folder.h"
-#include "stages/frames/sequences/video_clip.h"
+#include "stages/frames/decoding/video_clip.h"
+#include "stages/frames/listing/image_folder.h"
 
 namespace eventgan {
 

@@ -26,7 +26,7 @@
 #include "pipeline/simulation/still_scenes.h"
 #include "stages/events/simulation/sensor.h"
 #include "stages/events/simulation/simulate_pair.h"
-#include "stages/recordings/evt3_writer.h"
+#include "stages/recordings/writers/evt3_writer.h"
 
 namespace eventgan {
 namespace {

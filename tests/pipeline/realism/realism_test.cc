@@ -10,7 +10,7 @@
 
 #include "manifests/values/faults.h"
 #include "pipeline/realism/realism_report.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
