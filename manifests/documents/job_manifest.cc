@@ -206,7 +206,7 @@ void list_source(Fields& fields, SourceSpec& spec) {
       "(manifests/guides/own_data.md).");
   fields.find("classes", spec.classes, lists(texts(), 1),
               "Takes only the boxes of these classes, which are numbered in this order. Boxes of "
-              "others are left out and counted.");
+              "others are left out and counted; KITTI's DontCare stays.");
   list_recording(some, spec.recording);
   list_selection(fields, spec.selection);
   some.find("window_s", spec.window.duration_s, numbers(1e-6, 1e3),

@@ -77,6 +77,9 @@ ClassNames taken_of(const Dataset& dataset, const SourceSpec& source) {
     }
     if (std::ranges::find(taken, name) == taken.end()) taken.push_back(name);
   }
+  for (const std::string& name : all) {  // regions to ignore, of whatever class
+    if (name == "DontCare" && std::ranges::find(taken, name) == taken.end()) taken.push_back(name);
+  }
   return taken;
 }
 

@@ -110,7 +110,7 @@ def test_a_trial_of_some_classes(demo, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shards = eventgan.convert(demo / "kitti" / "training", limit=3, classes=["Car"], progress=False)
     assert len(shards) == 3 and shards.paths[0].parent.name == "kitti-events-trial-3"
-    assert shards.known_classes() == ["Car"]
+    assert shards.known_classes() == ["Car", "DontCare"]
     with pytest.raises(eventgan.ProgramError, match="expected classes of the source .*, got Cra"):
         eventgan.convert(demo / "kitti" / "training", tmp_path / "new", classes=["Cra"], progress=False)
 
