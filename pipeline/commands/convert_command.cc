@@ -78,7 +78,7 @@ int convert_and_report(const ConvertArguments& arguments, const GivenJob& given,
   // Here, and not in every command that loads them: `plan` writes nothing, and `retry` goes on. Not
   // before the plan, which may be another program's to make (HandOver).
   options.on_planned = [&] {
-    if (!job.output) {
+    if (!job.output && !given.findings.empty()) {  // of a folder: a manifest says where itself
       tell("output folder: " + options.output->string() + " (--output DIR names another)");
     }
     for (const std::string& line : given.findings) tell(line);
