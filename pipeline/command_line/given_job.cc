@@ -201,6 +201,13 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
   return job;
 }
 
+fs::path job_folder(const GivenJob& job, const std::optional<fs::path>& output,
+                    std::optional<std::int64_t> limit) {
+  fs::path folder = job.output;  // which is `output`, if there is one
+  if (limit && !output) folder += fmt::format("-trial-{}", *limit);
+  return folder;
+}
+
 void keep_manifest(const GivenJob& job) {
   if (!job.unwritten) return;
   const fs::path& file = *job.unwritten;

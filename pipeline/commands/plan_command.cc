@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -31,6 +32,7 @@ struct PlanArguments {
   bool freeze = false;
   std::optional<std::string> output;
   GivenWishes wishes;
+  std::optional<std::int64_t> limit;
   ProgressStyle progress = ProgressStyle::kAuto;
 };
 
@@ -49,8 +51,8 @@ void print_frozen(const std::filesystem::path& folder, const FrozenPlan& frozen,
             << count_text(std::ssize(frozen.plan.shards), "shard") << std::endl;
 }
 
-int freeze(const PlanArguments& arguments, const GivenJob& given, Plan plan) {
-  const std::filesystem::path& folder = given.output;
+int freeze(const PlanArguments& arguments, const GivenJob& given,
+           const std::filesystem::path& folder, Plan plan) {
   require_own_results(folder);
   std::filesystem::create_directories(folder);
   remove_stale_temporaries(folder);
@@ -66,13 +68,15 @@ int run(const PlanArguments& arguments) {
   const GivenJob given = read_given_job(arguments.manifest, arguments.output, arguments.wishes);
   const JobManifest& manifest = given.manifest;
   const LoadedGenerator loaded = load_generator(manifest);
-  EventIndexes indexes(given.output / kEventIndexFile);
-  PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description(),
-                             {.show_phase = show_phases(arguments.progress)});
+  const std::filesystem::path folder = job_folder(given, arguments.output, arguments.limit);
+  EventIndexes indexes(folder / kEventIndexFile);
+  PlannedJob job =
+      make_plan(manifest, loaded.weights_hash, loaded.generator->description(),
+                {.show_phase = show_phases(arguments.progress), .limit = arguments.limit});
   for (const std::string& line : given.findings) tell(line);
   for (const std::string& warning : job.warnings) tell_warning(warning);
   if (arguments.freeze) {
-    const int exit_code = freeze(arguments, given, std::move(job.plan));
+    const int exit_code = freeze(arguments, given, folder, std::move(job.plan));
     indexes.save();
     return exit_code;
   }
@@ -94,6 +98,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<PlanArguments>();
   command->add_option(kGivenJob, arguments->manifest, kGivenJobText)->required();
   add_wishes_options(*command, arguments->wishes);
+  add_limit_option(*command, arguments->limit);
   add_threads_option(*command, arguments->threads);
   add_json_option(*command, arguments->json);
   auto* freeze_flag =

@@ -209,6 +209,12 @@ TEST(ReadFrozenPlan, SaysWhenThereIsNoneOrADamagedOne) {
   EXPECT_THAT([&] { read_frozen_plan(folder.path()); }, says_why);
   EXPECT_THAT([&] { read_frozen_outline(folder.path()); }, says_why);
   fs::remove(folder / "plan.json");
+  fs::create_symlink("/proc/self/mem", folder / "plan.json");  // whose first byte cannot be read
+  const auto fails = ThrowsMessage<std::runtime_error>(
+      AllOf(HasSubstr("'Input/output error', in"), HasSubstr("plan.json"), Not(HasSubstr("--"))));
+  EXPECT_THAT([&] { read_frozen_plan(folder.path()); }, fails);
+  EXPECT_THAT([&] { read_frozen_outline(folder.path()); }, fails);
+  fs::remove(folder / "plan.json");
   write_file(folder / "plan.json", "{");
   EXPECT_THROW(read_frozen_plan(folder.path()), std::runtime_error);
   EXPECT_THROW(read_frozen_outline(folder.path()), std::runtime_error);
