@@ -260,7 +260,7 @@ std::vector<EventRow> compare(const std::vector<IntervalFrames>& kept, const Gen
   }
   std::vector<EventRow> rows{{"camera", camera / pixels}};
   const auto difference = [&](double threshold) {
-    return event_sum(made_events(difference_scene(), kept,
+    return event_sum(made_events(simulated_scene(GeneratorKind::kDifference), kept,
                                  realism_sensor({threshold}, kFrameLogEpsilon), kSeed, threads));
   };
   const auto through_network = [&](const ContrastThreshold& threshold) {
