@@ -132,9 +132,12 @@ constexpr std::string_view kGiveFolder =
 
 std::optional<FileKind> kind_of_text(std::string_view text) {
   const auto has = [&](const char* what) { return text.find(what) != text.npos; };
+  text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
   const std::string_view line = trimmed(text.substr(0, text.find('\n')));
   if (line.starts_with("<")) return FileKind{"XML, as Pascal VOC's and CVAT's labels", kGiveFolder};
-  if (text.starts_with("{") || text.starts_with("[")) {
+  if (line.starts_with("//") || line.starts_with("/*"))
+    return std::nullopt;  // a manifest's comment
+  if (line.starts_with("{") || line.starts_with("[")) {
     const bool is_coco = has("\"images\"") && (has("\"annotations\"") || has("\"file_name\""));
     if (is_coco && !has("eventgan-")) return FileKind{"labels as COCO's", kGiveFolder};
     return std::nullopt;

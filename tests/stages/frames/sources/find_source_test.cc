@@ -198,7 +198,8 @@ TEST_F(FindSource, SaysWhatAFileIsAndWhatToDoWithIt) {
   }
   write("manifest.json", R"({"format": "eventgan-manifest", "sources": [{"annotations": "a"}]})");
   write("notes.txt", "notes");
-  for (const char* name : {"manifest.json", "notes.txt", "nothing"}) {
+  write("commented.json", "\n// of images, annotations\n{}");
+  for (const char* name : {"manifest.json", "commented.json", "notes.txt", "nothing"}) {
     EXPECT_EQ(fault_of_file(at(name)), "") << name;
   }
 }
