@@ -155,7 +155,7 @@ class WithoutManifest(program.InFolder):
         save_photographs(self.folder / "photos", 44, ("car",))
         (self.folder / "photos/43.png").write_bytes(b"broken")
         told, err = convert(self.folder / "photos", self.folder / "out")  # one of 44 may fail
-        self.assertIn("43 of 44 pairs written, 1 quarantined, in 2 of 2 shards", told)
+        self.assertIn("43 of 44 pairs written, 1 quarantined, in 3 of 3 shards", told)
         (self.folder / "photos/42.png").write_bytes(b"broken")
         _, err = convert(self.folder / "photos", self.folder / "new", expect=65)
         self.assertIn("expected at most 1 quarantined pair (errors in the manifest), got 2 of 44", err)

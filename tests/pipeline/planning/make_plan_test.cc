@@ -145,7 +145,7 @@ TEST(SamplesPerShard, AreWhatTheManifestSaysOrWhatOneCoreMakesInTwentySeconds) {
        std::vector<Case>{{GeneratorKind::kNetwork, "shipped:8", kitti, false, 64},  // 34 ms a pair
                          {GeneratorKind::kNetwork, "my.safetensors", kitti, false, 36},  // 0.55 s
                          {GeneratorKind::kNetwork, "untrained:32", {720, 1280}, false, 8},  // 2.3 s
-                         {GeneratorKind::kEsim, "shipped", {192, 320}, true, 39},  // 0.5 s and 6 ms
+                         {GeneratorKind::kEsim, "shipped", {192, 320}, true, 19},  // 1 s and 6 ms
                          {GeneratorKind::kDifference, "shipped", {}, false, 64}}) {
     JobManifest manifest;
     manifest.generator.kind = one.kind;
