@@ -3,9 +3,9 @@
 #   submit.sh MANIFEST [OUTPUT] [--workers N] [--dry-run] [OPTION OF sbatch...] [-- OPTION OF eventgan convert...]
 # With --workers there are N tasks, each for every N-th shard: for plans of many small shards. Options of sbatch go to
 # all jobs (--partition=cpu --cpus-per-task=16 --time=4:00:00); logs to MANIFEST-logs, without the .json. Options of
-# convert are --limit and --sensor, which the plan takes too, --grace, --progress and --threads. --dry-run prints the
-# calls of sbatch and makes none. EVENTGAN is the program, if it is not on the PATH. Run again, it goes on: tasks whose
-# shards are done take seconds.
+# convert are --camera, --classes, --limit and --sensor, which the plan takes too, --grace, --progress and --threads.
+# --dry-run prints the calls of sbatch and makes none. EVENTGAN is the program, if it is not on the PATH. Run again, it
+# goes on: tasks whose shards are done take seconds.
 set -euo pipefail
 usage() { sed -n '2,8s/^# \{0,1\}//p' "$0"; }
 refuse() { echo "$1" >&2; exit 64; }
@@ -38,9 +38,9 @@ task_options=()
 while (($#)); do
   [[ $1 == *=* ]] && option=("$1") || option=("${@:1:2}")
   case ${1%%=*} in
-    --limit | --sensor) plan_options+=("${option[@]}") ;;
+    --camera | --classes | --limit | --sensor) plan_options+=("${option[@]}") ;;
     --grace | --progress | --threads) task_options+=("${option[@]}") ;;
-    *) refuse "expected --limit, --sensor, --grace, --progress or --threads after --, got $1" ;;
+    *) refuse "expected --camera, --classes, --limit, --sensor, --grace, --progress or --threads after --, got $1" ;;
   esac
   [[ $1 == *=* ]] || (($# > 1)) || refuse "$1: expected a value, got none"
   shift ${#option[@]}

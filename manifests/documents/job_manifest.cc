@@ -204,6 +204,9 @@ void list_source(Fields& fields, SourceSpec& spec) {
       "a folder of index masks, PATH.png of the image PATH.jpg below root: number k of a "
       "mask is the outline of the k-th box of the image's labels "
       "(manifests/guides/own_data.md).");
+  fields.find("classes", spec.classes, lists(texts(), 1),
+              "Takes only the boxes of these classes, which are numbered in this order. Boxes of "
+              "others are left out and counted; KITTI's DontCare stays.");
   list_recording(some, spec.recording);
   list_selection(fields, spec.selection);
   some.find("window_s", spec.window.duration_s, numbers(1e-6, 1e3),
@@ -339,8 +342,10 @@ void list_volume(Fields& fields, VolumeSpec& spec) {
 
 void list_output(Fields& fields, OutputSpec& spec) {
   fields.at("directory", spec.directory, paths(), "Folder of the shards; made if it is absent.");
-  fields.find("samples_per_shard", spec.samples_per_shard, integers(1, 65536),
-              "Samples in a shard; the last of a source holds the rest.");
+  fields.find(
+      "samples_per_shard", spec.samples_per_shard, integers(1, 65536),
+      "Samples in a shard; the last of a source holds the rest. Default: what one core makes "
+      "in about 20 s, 8 to 64.");
   fields.find("dtype", spec.dtype, words(kStoredTypeWords),
               "Type of the stored values. uint8: 255 steps up to the sample's largest value.");
   fields.find("deflate_level", spec.deflate_level, integers(0, 9),
@@ -354,8 +359,10 @@ void list_errors(Fields& fields, ErrorSpec& spec) {
               "goes on.");
   fields.find("max_count", spec.max_count, integers(0, 1'000'000'000),
               "More quarantined samples than this end the run.");
-  fields.find("max_fraction", spec.max_fraction, numbers(0, 1),
-              "A larger share of quarantined samples than this ends the run.");
+  fields.find(
+      "max_fraction", spec.max_fraction, numbers(0, 1),
+      "A larger share of quarantined samples than this ends the run. Of fewer than 100 samples "
+      "one may be quarantined, unless this or max_count is 0.");
 }
 
 /// Events are the only volumes that a dataset of events can give, and no other dataset has them.

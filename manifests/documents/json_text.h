@@ -35,6 +35,10 @@ class FaultList {
   /// "DOCUMENT: $.json.path: expected X, got Y"
   void add(std::string_view json_path, std::string_view expected, std::string_view got);
 
+  /// Drops the fault of a required member that is missing, since a key that was meant to be it has
+  /// one.
+  void drop_missing(std::string_view json_path);
+
   /// "DOCUMENT:LINE:COLUMN: expected X, got Y" at a byte of the document's text, for what has no
   /// JSON path. Lines and columns count from 1, columns in characters.
   void add_at(std::string_view text, std::size_t byte, std::string_view expected,

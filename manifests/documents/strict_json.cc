@@ -235,6 +235,9 @@ void StrictObject::finish() const {
       continue;
     }
     const std::string_view meant = near_word(key, known_);
+    if (!meant.empty() && !node_->contains(std::string(meant))) {
+      faults_->drop_missing(json_path(path_, meant));
+    }
     const std::string expected = meant.empty()
                                      ? fmt::format("one of the keys {}", fmt::join(known_, ", "))
                                      : fmt::format("the key \"{}\" or none", meant);

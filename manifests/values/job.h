@@ -153,6 +153,7 @@ struct SourceSpec {
   std::optional<double> frames_per_second;   ///< frames: for gap_s where the files do not tell
   std::optional<LabelSpec> labels;           ///< frames
   std::optional<std::string> outlines = {};  ///< of frames: folder of index masks
+  std::vector<std::string> classes = {};     ///< takes only boxes of these; empty: of all
   SelectionSpec selection;
   PairSpec pairs;
   RecordingOptions recording;  ///< recording
@@ -232,7 +233,8 @@ enum class StoredType { kFloat32, kFloat16, kUint8 };
 
 struct OutputSpec {
   std::string directory;
-  int samples_per_shard = 64;  ///< 1..65536
+  /// 1..65536; none: 8 to 64, by what a sample costs (samples_per_shard in make_plan.h)
+  std::optional<int> samples_per_shard;
   StoredType dtype = StoredType::kFloat16;
   int deflate_level = 1;  ///< 0..9
 };
@@ -276,10 +278,14 @@ std::string_view to_string(Normalization normalization);
 std::string_view to_string(StoredType type);
 std::string_view to_string(ErrorPolicy policy);
 
+/// How many of a plan's samples may be quarantined: max_count, or max_fraction of them, whichever
+/// is less. Of 2 to 99 samples one may be, unless max_count or max_fraction is 0.
+std::int64_t most_quarantined(const ErrorSpec& errors, std::int64_t planned);
+
 /// True if so many of a plan's samples are quarantined that its error policy calls the run failed.
 bool beyond_limits(const ErrorSpec& errors, std::int64_t quarantined, std::int64_t planned);
 
 /// What the policy allows, for "expected ..., got ...".
-std::string limits_text(const ErrorSpec& errors);
+std::string limits_text(const ErrorSpec& errors, std::int64_t planned);
 
 }  // namespace eventgan

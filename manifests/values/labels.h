@@ -122,6 +122,7 @@ struct Annotation {
   std::vector<std::string> left_out = {};
   /// Where each of these stands among all boxes that the annotation has, counted from 0.
   std::vector<std::size_t> left_out_at = {};
+  std::size_t of_other_classes = 0;  ///< boxes left out, since the source takes other classes
   /// What outlines in `boxes` are without: "expected X, got Y, in PATH:LINE" each.
   std::vector<std::string> outlines_mended = {};
   bool operator==(const Annotation&) const = default;

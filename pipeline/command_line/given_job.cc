@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
+#include <map>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -13,7 +15,7 @@
 #include "manifests/files/atomic_file.h"
 #include "manifests/values/faults.h"
 #include "pipeline/command_line/standard_streams.h"
-#include "pipeline/planning/draft_manifest.h"
+#include "pipeline/command_line/usage.h"
 #include "stages/frames/sources/find_source.h"
 
 namespace eventgan {
@@ -44,6 +46,27 @@ JobManifest read_kept(const fs::path& file, const FoundSource& found, const fs::
   return manifest;
 }
 
+/// What an earlier run has kept, an option of this run does not change.
+void require_kept(const DraftWishes& wishes, const JobManifest& manifest, const fs::path& file) {
+  const auto refuse = [&](const char* option) {
+    throw UsageError(fmt::format(
+        "{}: expected what was given when the job began, got another, in {} (--output names "
+        "another folder)",
+        option, file.string()));
+  };
+  const auto has_rests = [&](const SourceSpec& source) {
+    const auto& stills = source.pairs.stills;
+    return stills && stills->objects && stills->rests == rests_of(*wishes.camera);
+  };
+  if (wishes.camera && std::ranges::none_of(manifest.sources, has_rests)) refuse("--camera");
+  const auto has_classes = [&](const SourceSpec& source) {
+    return source.classes == wishes.classes;
+  };
+  if (!wishes.classes.empty() && !std::ranges::all_of(manifest.sources, has_classes)) {
+    refuse("--classes");
+  }
+}
+
 /// A labelled set that becomes samples without a box is worse than none.
 void require_labels_read(const std::vector<FoundSource>& sources) {
   for (const FoundSource& source : sources) {
@@ -72,17 +95,54 @@ ImageSize parse_sensor(const std::string& text) {
       fmt::format("--sensor: expected WIDTHxHEIGHT of 1 to {} pixels, got {}", kMostSide, text));
 }
 
+const std::map<std::string, CameraMotion> kCameras{{"rests", CameraMotion::kRests},
+                                                   {"moves", CameraMotion::kMoves},
+                                                   {"both", CameraMotion::kBoth}};
+
 }  // namespace
 
+std::string GivenWishes::text() const {
+  std::string text;
+  for (const auto& [word, camera] : kCameras) {
+    if (draft.camera == camera) text += " --camera " + word;
+  }
+  if (!draft.classes.empty()) text += fmt::format(" --classes {}", fmt::join(draft.classes, ","));
+  if (sensor) text += " --sensor " + *sensor;
+  return text;
+}
+
+void add_draft_options(CLI::App& command, DraftWishes& wishes) {
+  take_one_of(command.add_option("--camera", wishes.camera,
+                                 "Of photographs with boxes: the camera whose events are wanted "
+                                 "rests, moves, or does both; default: rests"),
+              kCameras);
+  command
+      .add_option("--classes", wishes.classes,
+                  "Take only the boxes of these classes; others are left out and counted")
+      ->delimiter(',')
+      ->option_text("A,B,...");
+}
+
+void add_wishes_options(CLI::App& command, GivenWishes& wishes) {
+  add_draft_options(command, wishes.draft);
+  command
+      .add_option(
+          "--sensor", wishes.sensor,
+          "The size of the sensor in pixels, such as 1280x720, of a recording that is given "
+          "without a manifest and whose file does not tell it")
+      ->option_text("WIDTHxHEIGHT");
+}
+
 GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& output,
-                        const std::optional<std::string>& sensor) {
+                        const GivenWishes& wishes) {
   GivenJob job;
   if (!may_be_source(given)) {
-    if (sensor) {
-      throw UsageError(
-          "--sensor: expected a recording, got a manifest, whose \"sensor\" counts, in " +
-          given.string());
+    if (const std::string text = wishes.text(); !text.empty()) {
+      throw UsageError(fmt::format(
+          "{}: expected a folder, video or recording, got a manifest, whose keys count, in {}",
+          text.substr(1), given.string()));
     }
+    if (const std::string fault = fault_of_file(given); !fault.empty()) throw UsageError(fault);
     job.manifest = read_job_manifest(given);
     job.output =
         output.value_or(resolve(job.manifest, job.manifest.output.directory).lexically_normal());
@@ -91,8 +151,8 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
   }
   std::vector<FoundSource> sources = find_sources(given);
   FoundSource& found = sources.front();
-  if (sensor) {
-    found.sensor = parse_sensor(*sensor);
+  if (wishes.sensor) {
+    found.sensor = parse_sensor(*wishes.sensor);
     if (found.dataset != DatasetKind::kRecording) {
       throw UsageError(fmt::format("--sensor: expected a recording, got {}, in {}",
                                    to_string(found.dataset), found.root.string()));
@@ -104,6 +164,7 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
   const bool has_plan = fs::exists(fs::symlink_status(job.output / "plan.json"));
   if (fs::exists(fs::symlink_status(file))) {
     job.manifest = read_kept(file, found, given);
+    require_kept(wishes.draft, job.manifest, file);
     const auto& kept = job.manifest.sources.front().recording.sensor;
     if (found.sensor && kept != found.sensor) {
       throw UsageError(fmt::format("--sensor: expected {}, as when the job began, got {}, in {}",
@@ -125,7 +186,7 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
   }
   require_labels_read(sources);
   const fs::path folder = fs::absolute(file).parent_path();
-  ManifestDraft draft = draft_manifest(sources, {folder, /*is_relative=*/false, "."});
+  ManifestDraft draft = draft_manifest(sources, {folder, /*is_relative=*/false, "."}, wishes.draft);
   if (!draft.has_samples) {
     throw InputError(fmt::format(
         "expected {}, got none, in {} ({}; {}eventgan init writes a manifest to complete)",

@@ -7,6 +7,11 @@
 #include <vector>
 
 #include "manifests/values/job.h"
+#include "pipeline/planning/draft_manifest.h"
+
+namespace CLI {
+class App;
+}
 
 namespace eventgan {
 
@@ -18,11 +23,20 @@ inline constexpr char kGivenJobText[] =
     "kept "
     "as manifest.json in the output folder";
 
-/// The option that goes with it, of one that is a recording.
-inline constexpr char kSensorOption[] = "--sensor";
-inline constexpr char kSensorText[] =
-    "The size of the sensor in pixels, such as 1280x720, of a recording that is given without a "
-    "manifest and whose file does not tell it";
+/// What is said of a job that is given without a manifest.
+struct GivenWishes {
+  DraftWishes draft = {};
+  std::optional<std::string> sensor = {};  ///< WIDTHxHEIGHT, of a recording
+
+  /// The options again, each with a space before it.
+  std::string text() const;
+};
+
+/// --camera, --classes
+void add_draft_options(CLI::App& command, DraftWishes& wishes);
+
+/// These and --sensor.
+void add_wishes_options(CLI::App& command, GivenWishes& wishes);
 
 /// A job as a command line gives it.
 struct GivenJob {
@@ -39,16 +53,16 @@ struct GivenJob {
 /// draft_manifest writes for it, with absolute paths, or that an earlier run has kept as
 /// manifest.json in the output folder: it stays as it is, whatever becomes of the source. `output`:
 /// --output; without it a folder's job goes to out/NAME, which starts at the program's own folder
-/// as that of a manifest in it would. `sensor`: --sensor, WIDTHxHEIGHT. Writes nothing.
+/// as that of a manifest in it would. Writes nothing.
 ///
 /// Throws UsageError or InputError as read_job_manifest, find_source and draft_manifest do;
 /// InputError if nothing found makes a pair, or labels lie there that are not read
 /// (FoundSource::unread); UsageError if the output folder has the manifest of
-/// another source or sensor, or a job that was given by a manifest elsewhere; for a sensor of what
-/// is no recording.
+/// another source or of other wishes, or a job that was given by a manifest elsewhere; for wishes
+/// that do not fit what was given.
 GivenJob read_given_job(const std::filesystem::path& given,
                         const std::optional<std::filesystem::path>& output,
-                        const std::optional<std::string>& sensor = std::nullopt);
+                        const GivenWishes& wishes = {});
 
 /// Where the job is made: `output` (--output), or else its own folder, or for a trial of `limit`
 /// pairs OUT-trial-20 beside that.

@@ -1,10 +1,12 @@
 #include "pipeline/command_line/usage.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <numeric>
 #include <sstream>
+#include <system_error>
 #include <utility>
 
 #include "manifests/documents/document_schemas.h"
@@ -153,13 +155,37 @@ class WrappedHelp : public CLI::Formatter {
 
 void wrap_help(CLI::App& app) { app.formatter(std::make_shared<WrappedHelp>()); }
 
+namespace {
+
+/// Where the scripts for clusters are, of this program as it is installed or built.
+std::string cluster_page() {
+  namespace fs = std::filesystem;
+  std::error_code unknown;
+  const fs::path folder = fs::read_symlink("/proc/self/exe", unknown).parent_path();
+  for (const char* const from_program : {"../share/eventgan/docker", "../../docker"}) {
+    const fs::path docker = (folder / from_program).lexically_normal();
+    if (!fs::exists(docker / "slurm/submit.sh", unknown)) continue;
+    return "Slurm: freezes the plan, then an array with a task for each shard, then finalize:\n  " +
+           (docker / "slurm/submit.sh").string() + " MANIFEST OUTPUT --partition=NAME\n" +
+           "Kubernetes: edit, then kubectl apply -f each:\n  " + (docker / "kubernetes").string() +
+           "\nAnywhere else a worker takes a part: eventgan convert MANIFEST --shards 0/4; then " +
+           "eventgan finalize OUTPUT\nAll about it: " + (docker / "running.md").string() + "\n";
+  }
+  throw InputError("expected the scripts for clusters beside the program, got none, in " +
+                   (folder.parent_path() / "share/eventgan/docker").string());
+}
+
+}  // namespace
+
 void add_help_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "help",
       "Show the help of the program or of a command\n`help keys` lists every key of the "
-      "manifests, with its values and its default.");
+      "manifests, with its values and its default, `help cluster` says where the scripts for Slurm "
+      "and Kubernetes are.");
   const auto name = std::make_shared<std::string>();
-  command->add_option("COMMAND", *name, "The command, or keys; default: list all commands");
+  command->add_option("COMMAND", *name,
+                      "The command, keys, or cluster; default: list all commands");
   command->callback([&app, name, &exit_code] {
     const auto known =
         app.get_subcommands([&](const CLI::App* one) { return one->get_name() == *name; });
@@ -168,6 +194,8 @@ void add_help_command(CLI::App& app, int& exit_code) {
       std::cout << app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal);
     } else if (*name == "keys") {
       std::cout << keys_page();
+    } else if (*name == "cluster") {
+      std::cout << cluster_page();
     } else if (!known.empty()) {
       std::cout << known.front()->help(app.get_name());
     } else {

@@ -26,7 +26,7 @@ namespace {
 struct ConvertArguments {
   JobOptions job;
   std::optional<std::string> shards;
-  std::optional<std::string> sensor;
+  GivenWishes wishes;
   std::optional<std::int64_t> limit;
   bool no_finalize = false;
   double grace_s = ConversionOptions().grace_s;
@@ -35,7 +35,7 @@ struct ConvertArguments {
 
 int judge(const ConversionReport& report, const ErrorSpec& errors) {
   if (report.too_many_faults) {
-    tell_error(fmt::format("expected {}, got {} of {}", limits_text(errors),
+    tell_error(fmt::format("expected {}, got {} of {}", limits_text(errors, report.plan_pairs),
                            report.quarantined_in_plan(), report.plan_pairs));
     return kTooManyFaults;
   }
@@ -51,8 +51,7 @@ std::string trial_text(const ConvertArguments& arguments, const ConversionReport
   return fmt::format("trial run: {} of the job. For all pairs{}:  eventgan convert {}{}{}\n",
                      count_text(report.plan_pairs, "pair"),
                      job.output ? ", into another folder" : "", job.manifest,
-                     arguments.sensor ? " --sensor " + *arguments.sensor : "",
-                     job.output ? " --output DIR" : "");
+                     arguments.wishes.text(), job.output ? " --output DIR" : "");
 }
 
 /// Completes the dataset as `eventgan finalize` does; false, and says why, if a shard is gone
@@ -78,6 +77,9 @@ int convert_and_report(const ConvertArguments& arguments, const GivenJob& given,
   // Here, and not in every command that loads them: `plan` writes nothing, and `retry` goes on. Not
   // before the plan, which may be another program's to make (HandOver).
   options.on_planned = [&] {
+    if (!job.output && !given.findings.empty()) {  // of a folder: a manifest says where itself
+      tell("output folder: " + options.output->string() + " (--output DIR names another)");
+    }
     for (const std::string& line : given.findings) tell(line);
     keep_manifest(given);
     if (!loaded.choice.empty()) tell(loaded.choice);
@@ -107,7 +109,7 @@ int convert_and_report(const ConvertArguments& arguments, const GivenJob& given,
 int run(const ConvertArguments& arguments) {
   const JobOptions& job = arguments.job;
   const StopSignal signal(shard_stopping_line(arguments.grace_s));
-  const GivenJob given = read_given_job(job.manifest, job.output, arguments.sensor);
+  const GivenJob given = read_given_job(job.manifest, job.output, arguments.wishes);
   ConversionOptions options;
   options.part = choose_part(arguments.shards, [](const char* name) { return std::getenv(name); });
   options.grace_s = arguments.grace_s;
@@ -141,6 +143,10 @@ void add_convert_command(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<ConvertArguments>();
   add_job_options(*command, arguments->job, kGivenJob, kGivenJobText,
                   "Discard the results of earlier runs of the same job");
+  command->get_option("--output")
+      ->description(
+          "Output folder; default: the manifest's, of a folder or video out/NAME-events "
+          "in the current folder");
   command
       ->add_option("--shards", arguments->shards,
                    "This worker's part of the plan: I/N (0 <= I < N) or all; default: as set in "
@@ -149,7 +155,7 @@ void add_convert_command(CLI::App& app, int& exit_code) {
   add_limit_option(*command, arguments->limit);
   command->add_flag("--no-finalize", arguments->no_finalize,
                     "Leave dataset.json and dataset.h5 to `eventgan finalize`; so does a part");
-  command->add_option(kSensorOption, arguments->sensor, kSensorText)->option_text("WIDTHxHEIGHT");
+  add_wishes_options(*command, arguments->wishes);
   add_grace_option(*command, arguments->grace_s);
   add_profile_option(*command, arguments->profile);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });

@@ -86,8 +86,11 @@ int run_fit(const FitArguments& arguments) {
                      origin_text(fit, std::filesystem::path(arguments.weights).filename()),
                  network.weights_hash);
   const std::string document = to_document(sensor);
+  const std::string verdict = verdict_text(
+      fit, arguments.out.empty() ? arguments.name + ".json" : arguments.out, arguments.weights);
   std::cout << to_text(fit);
   if (!arguments.out.empty() && !sensor.threshold && !sensor.network && !sensor.noise) {
+    std::cout << verdict << std::flush;
     throw InputError("--out: expected recordings that tell a threshold or the noise, got none: " +
                      arguments.out + " is not written");
   }
@@ -97,7 +100,7 @@ int run_fit(const FitArguments& arguments) {
     write_file_atomically(arguments.out, document);
     std::cout << "sensor: " << arguments.out << '\n';
   }
-  std::cout << std::flush;
+  std::cout << verdict << std::flush;
   return kComplete;
 }
 

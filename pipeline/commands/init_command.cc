@@ -15,6 +15,7 @@
 #include "manifests/files/atomic_file.h"
 #include "manifests/values/datasets.h"
 #include "manifests/values/faults.h"
+#include "pipeline/command_line/given_job.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/planning/draft_manifest.h"
 #include "pipeline/runtime/errors.h"
@@ -29,6 +30,7 @@ struct InitArguments {
   std::vector<std::string> where;  ///< PATH..., or DATASET PATH...
   std::string out = "manifest.json";
   bool has_out = false;  ///< --out was given
+  DraftWishes wishes;
 };
 
 std::vector<FoundSource> find_all(const std::vector<std::string>& where) {
@@ -63,11 +65,13 @@ int run(const InitArguments& arguments) {
   if (!out.has_filename()) throw UsageError("--out: expected a file, got " + out.string());
   if (fs::exists(fs::symlink_status(out))) refuse_to_overwrite(arguments);
   const std::vector<FoundSource> found = find_all(arguments.where);
-  const ManifestDraft draft = draft_manifest(
-      found, {fs::absolute(out).lexically_normal().parent_path(),
-              std::ranges::none_of(arguments.where,
-                                   [](const fs::path& path) { return path.is_absolute(); }),
-              "out/" + draft_name(found)});
+  const ManifestDraft draft =
+      draft_manifest(found,
+                     {fs::absolute(out).lexically_normal().parent_path(),
+                      std::ranges::none_of(arguments.where,
+                                           [](const fs::path& path) { return path.is_absolute(); }),
+                      "out/" + draft_name(found)},
+                     arguments.wishes);
   const bool is_new = create_file_atomically(out, [&](const TextSink& sink) { sink(draft.text); });
   if (!is_new) refuse_to_overwrite(arguments);
 
@@ -97,6 +101,7 @@ void add_init_command(CLI::App& app, int& exit_code) {
   auto* out = command->add_option("--out", arguments->out,
                                   "The manifest to write, a new file; default: manifest.json");
   out->option_text("FILE");
+  add_draft_options(*command, arguments->wishes);
   command->callback([arguments, out, &exit_code] {
     arguments->has_out = out->count() > 0;
     exit_code = run(*arguments);

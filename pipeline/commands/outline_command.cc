@@ -37,7 +37,7 @@ int run(const OutlineArguments& arguments) {
   const bool as_json = arguments.progress == ProgressStyle::kJson;
   std::cout << (as_json ? to_json(report) : to_text(report)) << std::flush;
   if (beyond_limits(manifest.errors, std::ssize(report.faults), report.images)) {
-    tell_error(fmt::format("expected {}, got {} of {}", limits_text(manifest.errors),
+    tell_error(fmt::format("expected {}, got {} of {}", limits_text(manifest.errors, report.images),
                            report.faults.size(), report.images));
     return kTooManyFaults;
   }

@@ -31,7 +31,7 @@ struct PlanArguments {
   bool json = false;
   bool freeze = false;
   std::optional<std::string> output;
-  std::optional<std::string> sensor;
+  GivenWishes wishes;
   std::optional<std::int64_t> limit;
   ProgressStyle progress = ProgressStyle::kAuto;
 };
@@ -65,7 +65,7 @@ int freeze(const PlanArguments& arguments, const GivenJob& given,
 }
 
 int run(const PlanArguments& arguments) {
-  const GivenJob given = read_given_job(arguments.manifest, arguments.output, arguments.sensor);
+  const GivenJob given = read_given_job(arguments.manifest, arguments.output, arguments.wishes);
   const JobManifest& manifest = given.manifest;
   const LoadedGenerator loaded = load_generator(manifest);
   const std::filesystem::path folder = job_folder(given, arguments.output, arguments.limit);
@@ -97,7 +97,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
                          "and time. Writes nothing, except with --freeze.");
   const auto arguments = std::make_shared<PlanArguments>();
   command->add_option(kGivenJob, arguments->manifest, kGivenJobText)->required();
-  command->add_option(kSensorOption, arguments->sensor, kSensorText)->option_text("WIDTHxHEIGHT");
+  add_wishes_options(*command, arguments->wishes);
   add_limit_option(*command, arguments->limit);
   add_threads_option(*command, arguments->threads);
   add_json_option(*command, arguments->json);

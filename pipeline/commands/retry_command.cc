@@ -36,8 +36,8 @@ int finish(const RetryArguments& arguments, const RetryReport& report, const Err
   std::cout << (arguments.as_json() ? to_json(report) : to_text(report)) << std::flush;
   if (report.stopped) return kStopped;
   if (report.too_many_faults) {
-    tell_error(fmt::format("expected {}, got {} of {}", limits_text(errors), report.quarantined,
-                           report.planned));
+    tell_error(fmt::format("expected {}, got {} of {}", limits_text(errors, report.planned),
+                           report.quarantined, report.planned));
     return kTooManyFaults;
   }
   return report.damaged_shards.empty() ? kComplete : kFailed;

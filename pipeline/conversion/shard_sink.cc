@@ -100,6 +100,7 @@ void LabelLosses::add(const Annotation& annotation) {
   };
   count(annotation.left_out, boxes_);
   count(annotation.outlines_mended, outlines_);
+  of_other_classes_ += annotation.of_other_classes;
 }
 
 std::vector<std::string> LabelLosses::notes() const {
@@ -111,6 +112,10 @@ std::vector<std::string> LabelLosses::notes() const {
                     joined(reasons.listed, "; ", std::identity()) + more);
   };
   tell(boxes_, "box", " of labels left out: ");
+  if (of_other_classes_ > 0) {
+    notes.push_back(count_text(static_cast<std::int64_t>(of_other_classes_), "box",
+                               " of other classes left out (\"classes\")"));
+  }
   tell(outlines_, "outline",
        outlines_.count == 1 ? " of labels taken without some of its parts: "
                             : " of labels taken without some of their parts: ");

@@ -16,12 +16,12 @@
 
 namespace eventgan {
 
-/// Counts what labels lost (Annotation::left_out, outlines_mended), for people.
+/// Counts what labels lost (Annotation::left_out, of_other_classes, outlines_mended), for people.
 class LabelLosses {
  public:
   void add(const Annotation& annotation);
-  /// One on boxes and one on outlines that tells how many, and of the first of them why; none of
-  /// none.
+  /// One on boxes and one on outlines that tells how many, and of the first of them why, and one on
+  /// boxes of other classes; none of none.
   std::vector<std::string> notes() const;
 
  private:
@@ -30,6 +30,7 @@ class LabelLosses {
     std::vector<std::string> listed;
   };
   Reasons boxes_, outlines_;
+  std::size_t of_other_classes_ = 0;
 };
 
 /// For people.

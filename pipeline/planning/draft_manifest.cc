@@ -57,7 +57,13 @@ std::string name_after(fs::path path) {
 /// Writes manifests.
 class Draft {
  public:
-  Draft(const DraftPlace& place, std::string name) : place_(place), name_(std::move(name)) {}
+  Draft(const DraftPlace& place, std::string name, const DraftWishes& wishes)
+      : place_(place), name_(std::move(name)), wishes_(wishes) {}
+
+  /// Photographs of one's own whose objects move on their own.
+  static bool is_in_layers(const SourceDraft& source) {
+    return source.is_stills && source.found.labels;
+  }
 
   std::string text(const std::vector<SourceDraft>& sources) const {
     const bool is_events = has_events(sources.front().found.dataset);
@@ -82,13 +88,15 @@ class Draft {
   }
 
  private:
-  /// Photographs of one's own whose objects move on their own.
-  static bool is_in_layers(const SourceDraft& source) {
-    return source.is_stills && source.found.labels;
-  }
-
-  static std::string generator_text(const std::vector<SourceDraft>& sources) {
+  std::string generator_text(const std::vector<SourceDraft>& sources) const {
     const bool has_int8 = onednn_support(Precision::kInt8).able;
+    if (moves()) {
+      return fmt::format(
+          R"(  // Before a moving camera detectors of persons learn most from the wide weights (manifests/guides/choose.md).
+  "generator": {{ "weights": "shipped:16", "precision": "{}" }},
+)",
+          has_int8 ? "int8" : "auto");
+    }
     if (std::ranges::all_of(sources, is_in_layers)) {
       return fmt::format(
           R"(  // The motion of photographs is drawn, so a simulator can follow it: detectors of persons learn more
@@ -149,6 +157,11 @@ class Draft {
       keys += fmt::format("      \"sensor\": {{ \"width\": {}, \"height\": {} }},\n",
                           found.sensor->width, found.sensor->height);
     }
+    if (!wishes_.classes.empty()) {
+      std::vector<std::string> classes;
+      for (const std::string& name : wishes_.classes) classes.push_back(quoted(name));
+      keys += fmt::format("      \"classes\": [{}],\n", fmt::join(classes, ", "));
+    }
     if (found.columns != EventFields()) {
       keys += fmt::format("      \"columns\": {{ \"t\": {} }},\n", quoted(found.columns.t));
     }
@@ -163,7 +176,11 @@ class Draft {
         fmt::join(source.gaps, ", "), to_string(source.habits.side));
   }
 
-  static std::string stills_text(const SourceDraft& source) {
+  bool moves() const {
+    return wishes_.camera.value_or(CameraMotion::kRests) != CameraMotion::kRests;
+  }
+
+  std::string stills_text(const SourceDraft& source) const {
     const StillsSpec spec;
     const ObjectMotionSpec object;
     const std::string image = fmt::format(
@@ -193,9 +210,9 @@ class Draft {
       }}
 )",
         drives ? ", and none rests, since the camera drives."
-               : ", and half of them rest; for a camera that moves set \"rests\" to 0.",
-        image, drives ? "0" : "0.5", object.translation_px[0], object.translation_px[1],
-        object.rotation_deg, object.scale);
+               : "; \"rests\" is the share before a camera at rest, 0 for a camera that moves.",
+        image, drives ? 0 : rests_of(wishes_.camera.value_or(CameraMotion::kRests)),
+        object.translation_px[0], object.translation_px[1], object.rotation_deg, object.scale);
   }
 
   static std::string window_text(const SourceDraft& source) {
@@ -266,6 +283,7 @@ class Draft {
 
   DraftPlace place_;
   std::string name_;
+  DraftWishes wishes_;
 };
 
 void require_one_job(const std::vector<FoundSource>& sources) {
@@ -303,9 +321,22 @@ std::string draft_name(const std::vector<FoundSource>& sources) {
   return name.empty() ? std::string(to_string(sources.front().dataset)) + "-events" : name;
 }
 
-ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const DraftPlace& place) {
+double rests_of(CameraMotion camera) {
+  switch (camera) {
+    case CameraMotion::kRests:
+      return 0.5;
+    case CameraMotion::kMoves:
+      return 0;
+    case CameraMotion::kBoth:
+      return 0.25;
+  }
+  return 0;
+}
+
+ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const DraftPlace& place,
+                             const DraftWishes& wishes) {
   require_one_job(sources);
-  const Draft draft(place, draft_name(sources));
+  const Draft draft(place, draft_name(sources), wishes);
   std::vector<SourceDraft> drafts;
   ManifestDraft made;
   made.has_samples = true;
@@ -331,6 +362,11 @@ ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const Draf
     std::ranges::copy(source.findings, std::back_inserter(made.findings));
     std::ranges::move(source.notes, std::back_inserter(made.notes));
     drafts.push_back(std::move(source));
+  }
+  if (wishes.camera && std::ranges::none_of(drafts, Draft::is_in_layers)) {
+    const FoundSource& first = drafts.front().found;
+    throw UsageError(fmt::format("--camera: expected photographs with labels, got {}, in {}",
+                                 first.title, first.root.string()));
   }
   made.text = draft.text(drafts);
   parse_job_manifest(made.text, place.folder, "the manifest for " + sources.front().root.string());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,19 @@ struct ManifestDraft {
   std::vector<std::string> notes;  ///< Dataset::notes()
   bool has_samples = false;        ///< each source has labelled frames that make pairs, or windows
 };
+
+/// Whether the camera moves before which photographs of labelled objects are to be seen
+/// (manifests/guides/choose.md).
+enum class CameraMotion { kRests, kMoves, kBoth };
+
+/// What somebody wants of a manifest beyond what is found.
+struct DraftWishes {
+  std::optional<CameraMotion> camera = {};
+  std::vector<std::string> classes = {};  ///< SourceSpec::classes of each source; empty: all
+};
+
+/// StillsSpec::rests of photographs of labelled objects before such a camera.
+double rests_of(CameraMotion camera);
 
 /// Where a manifest will lie, and what it says of places.
 struct DraftPlace {
@@ -41,6 +55,7 @@ std::string draft_name(const std::vector<FoundSource>& sources);
 /// Throws as open_dataset does, and UsageError for a path that is not UTF-8, which no manifest can
 /// name, for a source that is given twice, and for recordings of events beside frames, which make
 /// no job together.
-ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const DraftPlace& place);
+ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const DraftPlace& place,
+                             const DraftWishes& wishes = {});
 
 }  // namespace eventgan

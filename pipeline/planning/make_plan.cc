@@ -18,6 +18,7 @@
 #include "manifests/values/placement.h"
 #include "manifests/values/still_motion.h"
 #include "manifests/values/text.h"
+#include "manifests/values/weights.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/trace.h"
 #include "stages/frames/dataset/dataset.h"
@@ -180,8 +181,30 @@ void renew_sample(const Dataset& dataset, const LabelledFrame& frame, const Sour
   if (sample.fault.empty()) sample.fault = frame.fault;
 }
 
-ShardLayout::ShardLayout(std::string name, int samples_per_shard)
-    : name_(std::move(name)), samples_per_shard_(static_cast<std::size_t>(samples_per_shard)) {}
+int samples_per_shard(const JobManifest& manifest, const SourceSpec& source, ImageSize size) {
+  if (manifest.output.samples_per_shard) return *manifest.output.samples_per_shard;
+  constexpr double kShard_s = 20;
+  // Of one core; they err towards smaller shards. EventGAN in float32 (manifests/guides/speed.md),
+  // simulators and cameras' events, and the cutting out of a photograph's objects.
+  constexpr double kPerPixelAndWidth2_s = 2.4e-9, kPerPixel_s = 1e-7, kCutOut_s = 1;
+  constexpr int kPublishedWidth = 32, kShippedWidth = 16;
+  const GeneratorSpec& generator = manifest.generator;
+  double per_pixel_s = kPerPixel_s;
+  if (generator.kind == GeneratorKind::kNetwork) {
+    const auto name = parse_weights_name(generator.weights);
+    const bool is_file = !name || name->origin == WeightsOrigin::kFile;
+    const double width =
+        is_file ? kPublishedWidth : std::max(name->width.value_or(kShippedWidth), 8);
+    per_pixel_s = kPerPixelAndWidth2_s * width * width;
+  }
+  const auto& stills = source.pairs.stills;
+  const double sample_s = per_pixel_s * static_cast<double>(size.pixel_count()) +
+                          (stills && stills->objects ? kCutOut_s : 0);
+  return static_cast<int>(std::clamp(kShard_s / std::max(sample_s, 1e-9), 8.0, 64.0));
+}
+
+ShardLayout::ShardLayout(std::string name, SamplesPerShard samples_per_shard)
+    : name_(std::move(name)), samples_per_shard_(std::move(samples_per_shard)) {}
 
 void ShardLayout::begin_source(int source, const std::string& split) {
   end_source();
@@ -212,12 +235,14 @@ std::vector<PlannedShard> ShardLayout::finish() {
 
 ShardLayout::Group& ShardLayout::group(ImageSize size) {
   const auto [entry, is_new] = group_index_.try_emplace({size.height, size.width}, groups_.size());
-  if (is_new) groups_.push_back({size, {}, {}});
+  if (is_new) {
+    groups_.push_back({size, static_cast<std::size_t>(samples_per_shard_(source_, size))});
+  }
   return groups_[entry->second];
 }
 
 void ShardLayout::append(Group& group, PlannedSample sample) {
-  if (group.samples++ % samples_per_shard_ == 0) {
+  if (group.samples++ % group.samples_per_shard == 0) {
     group.shards.push_back({"", source_, group.size, {}});
   }
   group.shards.back().samples.push_back(std::move(sample));
@@ -229,8 +254,9 @@ void ShardLayout::append_unknown(PlannedSample sample) {
     const bool are_absent = frame.index < 0 && others.index < 0;
     return frame.path == others.path || (are_absent && sample.sequence == other.sequence);
   };
+  const auto most = static_cast<std::size_t>(samples_per_shard_(source_, {}));
   const auto takes = [&](const PlannedShard& shard) {
-    return shard.samples.size() < samples_per_shard_ && is_alike(shard.samples.back());
+    return shard.samples.size() < most && is_alike(shard.samples.back());
   };
   if (unknown_.empty() || !takes(unknown_.back())) {
     unknown_.push_back({"", source_, {}, {}, /*size_unknown=*/true});
@@ -464,7 +490,11 @@ void tell_unreadable(const JobManifest& manifest, const SourceSpec& source, cons
                      std::vector<std::string>& warnings) {
   const auto [reasons, of] = dataset.unreadable();
   if (reasons.empty()) return;
-  if (beyond_limits(manifest.errors, std::ssize(reasons), of)) {
+  // By the share alone: a recording is many samples.
+  const ErrorSpec& errors = manifest.errors;
+  const auto count = std::ssize(reasons);
+  if (errors.policy == ErrorPolicy::kFail || count > errors.max_count ||
+      double(count) > errors.max_fraction * double(of)) {
     throw InputError(fmt::format(
         "expected recordings that can be read, as \"errors\" in the manifest allows, got {} of {} "
         "that cannot, in {}:\n{}",
@@ -502,7 +532,9 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
   job.plan.name = manifest.name;
   job.plan.manifest_text = manifest.text;
   SizeProbe probe(manifest);
-  ShardLayout layout(manifest.name, manifest.output.samples_per_shard);
+  ShardLayout layout(manifest.name, [&](int source, ImageSize size) {
+    return samples_per_shard(manifest, manifest.sources[static_cast<std::size_t>(source)], size);
+  });
   std::vector<std::string> annotation_files;
   std::map<std::string, std::string> meanings;  // of the labels, as fields of the fingerprint
   open_datasets(manifest, options, job.datasets);

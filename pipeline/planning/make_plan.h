@@ -53,10 +53,16 @@ PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame
 void renew_sample(const Dataset& dataset, const LabelledFrame& frame, const SourceSpec& source,
                   PlannedSample& sample);
 
-/// Lays samples into shards of at most `samples_per_shard`, as they come: a sample is never copied,
-/// since a job has millions. A shard holds one source and one size, samples keep their order, sizes
-/// come in the order of their first sample. Shards are numbered within their split, over all
-/// sources.
+/// How many samples of a source, whose volumes have this size, a shard holds: what the manifest
+/// says; else what one core makes in about 20 s, so that a run that is stopped keeps its work: 8
+/// to 64. A table of costs decides, and no clock: the same manifest gives the same plan on every
+/// machine.
+int samples_per_shard(const JobManifest& manifest, const SourceSpec& source, ImageSize size);
+
+/// Lays samples into shards of at most `samples_per_shard(source, size)`, as they come: a sample is
+/// never copied, since a job has millions. A shard holds one source and one size, samples keep
+/// their order, sizes come in the order of their first sample. Shards are numbered within their
+/// split, over all sources.
 ///
 /// A sample of unknown size will be quarantined; once its image is mended it may have any size,
 /// and the number of shards cannot change then. So it gets a shard of its own, after the others of
@@ -67,7 +73,9 @@ void renew_sample(const Dataset& dataset, const LabelledFrame& frame, const Sour
 /// (the first of several; where none is known: 1x1).
 class ShardLayout {
  public:
-  ShardLayout(std::string name, int samples_per_shard);
+  /// Of samples of unknown size, too: {0, 0}.
+  using SamplesPerShard = std::function<int(int source, ImageSize size)>;
+  ShardLayout(std::string name, SamplesPerShard samples_per_shard);
 
   /// Samples are of this source until the next one begins.
   void begin_source(int source, const std::string& split);
@@ -82,7 +90,8 @@ class ShardLayout {
   /// The source's samples of one size.
   struct Group {
     ImageSize size;
-    std::vector<PlannedShard> shards;
+    std::size_t samples_per_shard = 0;
+    std::vector<PlannedShard> shards = {};
     std::size_t samples = 0;
   };
 
@@ -93,7 +102,7 @@ class ShardLayout {
   void end_source();
 
   std::string name_;
-  std::size_t samples_per_shard_;
+  SamplesPerShard samples_per_shard_;
   int source_ = 0;
   std::string split_;
   std::vector<Group> groups_;                               // in the order of their first sample

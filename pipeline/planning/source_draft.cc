@@ -20,6 +20,7 @@
 #include "pipeline/planning/spread.h"
 #include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/sources/class_numbers.h"
 #include "stages/frames/sources/dataset_kinds.h"
 #include "stages/frames/sources/open_dataset.h"
 
@@ -326,7 +327,10 @@ SourceDraft::SourceDraft(const FoundSource& source)
 }
 
 void look_at_source(const SourceSpec& spec, const fs::path& folder, SourceDraft& draft) {
-  const auto dataset = open_source(spec, folder, draft);
+  std::vector<std::unique_ptr<Dataset>> datasets;
+  datasets.push_back(open_source(spec, folder, draft));
+  number_classes({spec}, datasets);
+  const auto& dataset = datasets.front();
   const Survey counted = survey(*dataset, spec);
   if (has_events(spec.dataset)) {
     draft.has_frames = all_have_frames(*dataset);

@@ -230,6 +230,32 @@ std::string several_recordings(std::span<const RealismReport> reports) {
   return text;
 }
 
+/// The methods from the nearest to the camera on, and what follows from it.
+std::string verdict_text(std::span<const RealismReport> reports) {
+  const RealismReport mean = mean_report(reports);
+  std::vector<const MethodSummary*> ranked;
+  for (const MethodSummary& method : mean.methods) {
+    if (!std::isnan(method.mean.f1_time)) ranked.push_back(&method);
+  }
+  if (ranked.size() < 2) return {};
+  std::ranges::stable_sort(ranked, std::greater(),
+                           [](const MethodSummary* method) { return method->mean.f1_time; });
+  const bool has_esim = std::ranges::find(ranked, "esim", &MethodSummary::name) != ranked.end();
+  const auto best = std::ranges::find_if(
+      ranked, [](const MethodSummary* method) { return method->name != "esim"; });
+  return fmt::format(
+      "By F1 summed over time: {}. For your own videos and sequences take \"{}\" as "
+      "generator.kind.{}\n",
+      joined(ranked, ", ",
+             [](const MethodSummary* method) {
+               return fmt::format("{} {:.3f}", method->name, method->mean.f1_time);
+             }),
+      (*best)->name,
+      has_esim ? " esim is for photographs: it follows the motion that convert draws for them, and "
+                 "does not know the motion between two frames, hence its F1 here."
+               : "");
+}
+
 }  // namespace
 
 std::string to_text(std::span<const RealismReport> reports) {
@@ -240,7 +266,8 @@ std::string to_text(std::span<const RealismReport> reports) {
   return text +
          "↑ higher is better, ↓ lower is better, ≈ closer to the real one is better; * best. Means "
          "over the pairs of normalised volumes; ± half the width of the 95 % confidence interval "
-         "(bootstrap over the pairs).\n";
+         "(bootstrap over the pairs).\n" +
+         verdict_text(reports);
 }
 
 namespace {

@@ -260,15 +260,14 @@ std::vector<EventRow> compare(const std::vector<IntervalFrames>& kept, const Gen
   }
   std::vector<EventRow> rows{{"camera", camera / pixels}};
   const auto difference = [&](double threshold) {
-    return event_sum(made_events(running_difference_scene(), kept,
+    return event_sum(made_events(simulated_scene(GeneratorKind::kDifference), kept,
                                  realism_sensor({threshold}, kFrameLogEpsilon), kSeed, threads));
   };
   const auto through_network = [&](const ContrastThreshold& threshold) {
     return event_sum(made_events(*network, kept, threshold, threads));
   };
-  if (fit.difference) {
-    rows.push_back(
-        {"difference, fitted", (difference(fit.difference->threshold.mean) + noise) / pixels});
+  if (fit.difference_anew) {
+    rows.push_back({"difference, fitted", (difference(*fit.difference_anew) + noise) / pixels});
   }
   rows.push_back({"difference, default", difference(SensorSpec().positive_threshold) / pixels});
   if (!network) return rows;
@@ -362,6 +361,17 @@ std::array<double, 2> three_digits(const std::array<double, 2>& range) {
 
 }  // namespace
 
+std::optional<bool> SensorFit::is_better(const std::string& method) const {
+  const auto off = [&](const char* which) -> std::optional<double> {
+    const auto row = std::ranges::find(rows, method + which, &EventRow::name);
+    if (row == rows.end() || !(row->events_per_pixel > 0)) return std::nullopt;
+    return std::abs(std::log(row->events_per_pixel / rows.front().events_per_pixel));
+  };
+  const auto fitted = off(", fitted"), usual = off(", default");
+  if (!fitted || !usual || !std::isfinite(*fitted)) return std::nullopt;
+  return *fitted < *usual;
+}
+
 CameraSensor SensorFit::sensor(const std::string& name, const std::string& origin,
                                const std::string& weights) const {
   const auto told = [](const FittedThreshold& fitted) {
@@ -369,8 +379,11 @@ CameraSensor SensorFit::sensor(const std::string& name, const std::string& origi
     return ThresholdSpec{{mean, mean}, three_digits(fitted.threshold.ratio)};
   };
   CameraSensor sensor{.name = name, .threshold = {}, .network = {}, .noise = {}, .origin = origin};
-  if (difference) sensor.threshold = told(*difference);
-  if (network) sensor.network = NetworkThreshold{weights, told(*network)};
+  if (difference_anew && is_better("difference") != false) {
+    sensor.threshold = told({{*difference_anew}, {}, {}});
+  }
+  if (network && is_better("network") != false)
+    sensor.network = NetworkThreshold{weights, told(*network)};
   if (noise) {
     sensor.noise = NoiseSpec{three_digits(noise->noise.shot_hz), three_digits(noise->noise.leak_hz),
                              three_digits(noise->noise.hot_pixels)};

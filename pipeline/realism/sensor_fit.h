@@ -47,10 +47,16 @@ struct SensorFit {
   std::optional<FittedThreshold> difference;  ///< of the model `difference`; none: cannot be told
   std::optional<double> difference_anew;      ///< the same of pairs that each begin at level 0
   std::optional<FittedThreshold> network;     ///< through the network that was given
-  std::vector<EventRow> rows;                 ///< the camera's first; empty without kept pairs
-  std::vector<std::string> warnings;          ///< what could not be told, and why
+  /// Of the kept pairs, each beginning anew as with convert; the camera's first; empty without any.
+  std::vector<EventRow> rows;
+  std::vector<std::string> warnings;  ///< what could not be told, and why
 
-  /// What goes into a document, rounded to three digits. `weights`: the network's SHA-256.
+  /// Whether "difference" or "network" makes as many events as the camera more nearly with the
+  /// fitted threshold than by default, of the kept pairs; none: they do not tell.
+  std::optional<bool> is_better(const std::string& method) const;
+
+  /// What goes into a document, rounded to three digits: of thresholds those for convert
+  /// (difference_anew) that are not worse than the defaults. `weights`: the network's SHA-256.
   CameraSensor sensor(const std::string& name, const std::string& origin,
                       const std::string& weights = {}) const;
 };
@@ -76,6 +82,11 @@ SensorFit fit_sensor(std::span<const FitPart> parts, const Generator* network,
 
 /// The fit for people: what was found, how sure it is, and the kept pairs as a table.
 std::string to_text(const SensorFit& fit);
+
+/// Of each threshold that was fitted, whether convert is to take it, a line each, with the
+/// manifest's `generator`. `document` and `weights`: as the manifest names them.
+std::string verdict_text(const SensorFit& fit, const std::string& document,
+                         const std::string& weights);
 
 /// How its numbers were found, a sentence for a document's origin. `weights` are the network's.
 std::string origin_text(const SensorFit& fit, const std::string& weights);

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "manifests/values/sensor_input.h"
@@ -71,6 +72,38 @@ std::string to_text(const SensorFit& fit) {
   return text;
 }
 
+std::string verdict_text(const SensorFit& fit, const std::string& document,
+                         const std::string& weights) {
+  std::string text;
+  const auto judge = [&](const std::string& method, const std::string& key) {
+    const std::optional<bool> is_better = fit.is_better(method);
+    if (!is_better) {
+      text += fmt::format(
+          "{}: no verdict on the threshold: too few pairs are kept aside (a quarter of four or "
+          "more)\n",
+          method);
+      return;
+    }
+    const auto share = [&](const char* which) {
+      const auto row = std::ranges::find(fit.rows, method + which, &EventRow::name);
+      return row->events_per_pixel / fit.rows.front().events_per_pixel;
+    };
+    const std::string shares =
+        fmt::format("{:.2f} times the camera's events on the pairs kept aside, by default {:.2f}",
+                    share(", fitted"), share(", default"));
+    text += *is_better ? fmt::format(
+                             "{}: the fitted threshold is better than the default ({}). "
+                             "Put this line into the manifest:\n"
+                             "  \"generator\": {{ {}, \"sensor\": \"{}\" }}\n",
+                             method, shares, key, document)
+                       : fmt::format("{}: keep the default: the fitted threshold is worse ({})\n",
+                                     method, shares);
+  };
+  if (fit.network) judge("network", fmt::format("\"weights\": \"{}\"", weights));
+  if (fit.difference_anew) judge("difference", "\"kind\": \"difference\"");
+  return text;
+}
+
 std::string origin_text(const SensorFit& fit, const std::string& weights) {
   std::string text = fmt::format("{} of frames of mean grey level {:.3g} ({:.3g}..{:.3g})",
                                  count_text(fit.fitted_pairs, "pair"), fit.grey_level,
@@ -78,8 +111,9 @@ std::string origin_text(const SensorFit& fit, const std::string& weights) {
   if (fit.network) {
     text += fmt::format("; threshold {} through {}", threshold_text(*fit.network), weights);
   }
-  if (fit.difference) {
-    text += fmt::format("; threshold {} of difference", threshold_text(*fit.difference));
+  if (fit.difference_anew) {
+    text += fmt::format("; threshold {:.3g} of difference, of pairs that begin anew",
+                        *fit.difference_anew);
   }
   if (fit.noise) {
     text += fmt::format("; noise of {:.3g} pixel seconds", fit.noise->pixel_seconds);

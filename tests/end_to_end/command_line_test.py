@@ -54,6 +54,13 @@ class CommandLine(program.InFolder):
         self.assertEqual(run("help", "verify"), run("verify", "--help"))
         self.assertEqual(run("help"), run("--help"))
 
+    def test_help_cluster_says_where_the_scripts_are(self):
+        page, _ = run("help", "cluster")
+        paths = re.findall(r"(?:^  |: )(/\S+)", page, re.MULTILINE)
+        self.assertEqual([pathlib.Path(path).name for path in paths], ["submit.sh", "kubernetes", "running.md"])
+        for path in paths:
+            self.assertTrue(pathlib.Path(path).exists(), path)
+
     def test_help_keys_lists_the_keys_of_all_documents(self):
         page, _ = run("help", "keys")
         for line in ["## eventgan job manifest, version 1", "| `sources[].root` | path | required | ",

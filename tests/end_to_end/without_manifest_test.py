@@ -1,14 +1,17 @@
 """`convert` and `plan` of a folder or a video: the manifest that `init` would write,
 kept in the output folder from then on."""
 
+import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
 import tempfile
 
 import cv2
+import h5py
 import numpy as np
 
 import failing_files
@@ -32,6 +35,16 @@ def setUpModule():
 
 def tearDownModule():
     shutil.rmtree(clip)
+
+
+def save_photographs(folder, count, classes):
+    """Images of two sizes, each with a box of each class."""
+    folder.mkdir()
+    rows = ["image,class,left,top,right,bottom"]
+    for k in range(count):
+        cv2.imwrite(str(folder / f"{k}.png"), texture(48 + k % 2, 64, seed=k))
+        rows += [f"{k}.png,{name},8,8,24,30" for name in classes]
+    (folder / "boxes.csv").write_text("\n".join(rows) + "\n")
 
 
 def convert(given, out, *more, expect=0):
@@ -102,15 +115,50 @@ class WithoutManifest(program.InFolder):
 
     def test_without_output_it_is_as_init_and_convert_here(self):
         self.in_folder()
-        told, _ = run("convert", clip / "walk", "--limit", 2, *QUIET)
+        told, err = run("convert", clip / "walk", "--limit", 2, *QUIET)
         self.assertEqual(sorted(os.listdir("out")), ["walk-events", "walk-events-trial-2"])
         self.assertEqual(os.listdir("out/walk-events"), ["manifest.json"])
         self.assertIn(f"For all pairs:  eventgan convert {clip / 'walk'}\n", told)
+        self.assertTrue(err.startswith("output folder: out/walk-events-trial-2 (--output DIR names another)\n"), err)
+        self.assertIn("of a folder or video out/NAME-events", " ".join(run("convert", "--help")[0].split()))
         for manifest in [clip / "walk", "out/walk-events/manifest.json"]:
             self.assertIn("(1 done before)", run("convert", manifest, "--limit", 2, *QUIET)[0])
         run("convert", clip / "walk", *QUIET)
         self.assertEqual(shards("out/walk-events"), shards(whole))
         self.assertIn("3 of 3", run("status", "out/walk-events")[0])
+
+    def test_photographs_for_a_camera_and_classes(self):
+        """--camera and --classes write what init writes; others are left out and counted."""
+        save_photographs(self.folder / "photos", 3, ("car", "dog", "cat"))
+        wanted = ("--camera", "moves", "--classes", "dog,car")
+        self.in_folder()
+        run("init", "photos", *wanted)
+        told, err = convert("photos", "out", *wanted)
+        self.assertIn("6 boxes", told)
+        self.assertIn("3 boxes of other classes left out", told)
+        ours, its = (json.loads(re.sub("(?m) *// .*$", "", pathlib.Path(path).read_text()))
+                     for path in ("manifest.json", "out/manifest.json"))
+        self.assertEqual(ours["sources"][0]["pairs"], its["sources"][0]["pairs"])
+        self.assertEqual(its["sources"][0]["pairs"]["motion"]["rests"], 0)
+        self.assertEqual(its["generator"]["weights"], "shipped:16")
+        with h5py.File(pathlib.Path("out", shards("out")[0])) as shard:
+            self.assertEqual([*shard["labels/boxes/class_id"].attrs["class_names"]], ["dog", "car"])
+        _, err = convert("photos", "out", "--camera", "both", expect=64)
+        self.assertIn("--camera: expected what was given when the job began", err)
+        _, err = convert("manifest.json", "new", *wanted, expect=64)
+        self.assertIn("--camera moves --classes dog,car: expected a folder, video or recording, got a manifest", err)
+        _, err = convert("photos", "new", "--classes", "dgo", expect=66)
+        self.assertIn("expected classes of the source (car, cat, dog), got dgo", err)
+
+    def test_a_run_that_is_stopped_keeps_whole_shards(self):
+        """Shards of objects that are cut out hold 20 s of work of one core, not 64."""
+        save_photographs(self.folder / "photos", 44, ("car",))
+        (self.folder / "photos/43.png").write_bytes(b"broken")
+        told, err = convert(self.folder / "photos", self.folder / "out")  # one of 44 may fail
+        self.assertIn("43 of 44 pairs written, 1 quarantined, in 3 of 3 shards", told)
+        (self.folder / "photos/42.png").write_bytes(b"broken")
+        _, err = convert(self.folder / "photos", self.folder / "new", expect=65)
+        self.assertIn("expected at most 1 quarantined pair (errors in the manifest), got 2 of 44", err)
 
     def test_plan_writes_nothing_unless_it_freezes(self):
         self.in_folder()

@@ -12,6 +12,8 @@ import numpy as np
 import torch
 from torch import nn
 
+from .words import listed
+
 Item = dict[str, Any]
 
 
@@ -274,4 +276,5 @@ def _areas(boxes: np.ndarray) -> np.ndarray:
 
 def numbered(classes: Sequence[str] | Mapping[str, int]) -> dict[str, int]:
     """The number of each class, by default its position."""
-    return dict(classes) if isinstance(classes, Mapping) else {name: i for i, name in enumerate(classes)}
+    return dict(classes) if isinstance(classes, Mapping) else {
+        name: i for i, name in enumerate(listed(classes, "classes"))}

@@ -36,6 +36,7 @@ from .detection_scores import (DONT_CARE, KITTI_CLASSES, KITTI_LEVELS, Detection
 from .pose_scores import Persons, pose_scores, read_persons
 from .open_shards import PathLike, open_shard
 from .shards import Shards
+from .words import did_you_mean, listed
 
 IMAGES = 12  # samples to draw
 PAPER_COLUMNS = {"precision": "precision", "recall_easy": "easy recall", "recall_hard": "hard recall",
@@ -218,9 +219,10 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
         No sample has boxes, or an entry of the predictions is not valid.
     """
     shards, numbers = samples.shards, {name: i for i, name in enumerate(samples.classes)}
-    unknown = [name for name in classes or () if name not in numbers]
+    unknown = [name for name in listed(classes or (), "classes") if name not in numbers]
     if unknown:
-        raise ValueError(f"expected classes of {', '.join(numbers)}, got {', '.join(unknown)}")
+        raise ValueError(f"expected classes of {', '.join(numbers)}, got {', '.join(unknown)}"
+                         f"{did_you_mean(unknown, numbers)}")
     entries = read_predictions(predictions, ("image_id", "category_id", "bbox", "score"))
     boxes, scores = numbers_of(entries, "bbox", (4,), predictions), numbers_of(entries, "score", (), predictions)
     wrong = np.flatnonzero((boxes[:, 2:] < 0).any(1))

@@ -11,7 +11,7 @@ import os
 import re
 import threading
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Union
 
 import numpy as np
@@ -23,6 +23,8 @@ except ImportError as error:
     raise ImportError(f"expected the library libeventgan, got none ({error}): install the Debian packages "
                       "libeventgan1 and python3-eventgan, or run `pip install -v ./manifests/python` in a checkout, "
                       "which builds it or says what is missing") from error
+
+from .words import did_you_mean, sides
 
 PathLike = Union[str, os.PathLike]
 _PLACES = {  # of settings in a manifest
@@ -104,13 +106,12 @@ class Generator:
         known = [key for keys in _PLACES.values() for key in keys]
         unknown = [key for key in given if key not in known]
         if unknown:
-            raise ValueError(f"expected settings of {', '.join(known)}, got {', '.join(unknown)}")
+            raise ValueError(f"expected settings of {', '.join(known)}, got {', '.join(unknown)}"
+                             f"{did_you_mean(unknown, known)}")
         manifest: dict[str, Any] = {
             place: {key: given[key] for key in keys if given.get(key) is not None} for place, keys in _PLACES.items()}
         if size is not None:
-            if not isinstance(size, Sequence) or len(size) != 2:
-                raise ValueError(f"expected a size of height and width, got {size!r}")
-            manifest["image"].update(zip(("height", "width"), size))
+            manifest["image"].update(zip(("height", "width"), sides(size)))
         manifest["seed"] = seed
         self._set_up(_json(manifest))
         for text in self._told["warnings"]:
@@ -375,6 +376,9 @@ def _whole(value: Any, name: str, least: int = 1, most: int = 2**31 - 1) -> int:
 
 
 def _array(image: npt.ArrayLike, name: str) -> np.ndarray:
+    if isinstance(image, (str, bytes, os.PathLike)):
+        raise ValueError(f"expected an image array, got a path for {name}: read it first, as "
+                         f"np.asarray(PIL.Image.open({os.fspath(image)!r})) does")
     try:
         return np.asarray(image)
     except (TypeError, ValueError, RuntimeError) as error:

@@ -18,11 +18,12 @@ import signal
 import subprocess
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Literal
 
 from .open_shards import PathLike
 from .shards import Shards
+from .words import listed, path_of
 
 Event = dict[str, Any]
 
@@ -69,11 +70,13 @@ def init(*paths: PathLike, out: PathLike = "manifest.json") -> pathlib.Path:
     FileNotFoundError
         There is no program.
     """
-    _output("init", "--out", out, "--", *paths)
+    _output("init", "--out", path_of(out, "a new file"), "--",
+            *(path_of(path, "a folder, video or recording") for path in paths))
     return pathlib.Path(out)
 
 
-def convert(manifest: PathLike | Mapping[str, Any], output: PathLike | None = None, *, threads: int | None = None,
+def convert(manifest: PathLike | Mapping[str, Any], output: PathLike | None = None, *, limit: int | None = None,
+            classes: Sequence[str] | None = None, threads: int | None = None,
             progress: Literal[False] | Callable[[Event], object] | None = None) -> Shards:
     """Makes the shards of a manifest and completes the dataset, as `eventgan convert` does.
 
@@ -88,6 +91,10 @@ def convert(manifest: PathLike | Mapping[str, Any], output: PathLike | None = No
         whose relative paths start at the current folder (there the program reads it from a temporary file).
     output : str or path, optional
         Output folder. None: the manifest's.
+    limit : int, optional
+        A trial run of so many pairs, the first of each source, into OUTPUT-trial-LIMIT unless `output` is given.
+    classes : sequence of str, optional
+        Of a folder, video or recording: takes only the boxes of these; others are left out and counted.
     threads : int, optional
         How many threads the program uses. None: all cores.
     progress : None, False or callable
@@ -108,7 +115,9 @@ def convert(manifest: PathLike | Mapping[str, Any], output: PathLike | None = No
     FileNotFoundError
         There is no program.
     """
-    given = [] if output is None else ["--output", output]
+    given = [] if output is None else ["--output", path_of(output, "a folder")]
+    given += [] if limit is None else ["--limit", str(limit)]
+    given += [] if classes is None else ["--classes", ",".join(listed(classes, "classes"))]
     given += [] if threads is None else ["--threads", str(threads)]
     shown = _Shown(bars=progress is None)
     on_event: Callable[[Event], object] = progress or shown
@@ -259,7 +268,7 @@ def _ended(command: PathLike, exit_code: int) -> str:
 def _manifest_file(manifest: PathLike | Mapping[str, Any]) -> Iterator[PathLike]:
     """The manifest's path; for a dictionary that of a temporary file."""
     if not isinstance(manifest, Mapping):
-        yield manifest
+        yield path_of(manifest, "a manifest, folder, video or recording")
         return
     try:
         temporary = tempfile.NamedTemporaryFile("w", dir=".", prefix="manifest-", suffix=".json", encoding="utf-8")

@@ -17,6 +17,7 @@ import numpy as np
 
 from .open_shards import OpenShard, OpenShards, PathLike, Sample, check_version
 from .outlines import mask
+from .words import did_you_mean, path_of
 
 PLAN = "plan.json"
 DESCRIPTION, DESCRIPTION_FORMAT, DESCRIPTION_VERSION = "dataset.json", "eventgan-dataset", "1.0"
@@ -88,7 +89,7 @@ class Shards(Sequence):
         self._changes: tuple[Callable[[Sample], np.ndarray], ...] = ()
         self._files = OpenShards(open_files)
         if not isinstance(paths, (str, os.PathLike)):
-            paths = list(paths)
+            paths = list(paths) if isinstance(paths, Iterable) else path_of(paths, "a folder of shards, or a shard")
         self._described_as = str(paths)
         shards = _find_shards(paths, partial)
         self._all_paths = [shard.path for shard in shards]
@@ -539,7 +540,7 @@ class Shards(Sequence):
         if unknown:
             there = _first(map(repr, sorted(known)), 20) or "none"
             raise ValueError(f"expected {what} of {self._described_as} ({there}), got {len(unknown)} that it does not "
-                             f"have ({_first(map(repr, unknown))}), in {source}")
+                             f"have ({_first(map(repr, unknown))}), in {source}{did_you_mean(unknown, known)}")
 
 
 def _one_of(what: str, words: Iterable[str], known: Sequence[str]) -> None:

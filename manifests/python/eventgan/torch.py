@@ -33,6 +33,7 @@ from .augmentation import (EventAugmentation, Item, detection_item, fitted, inve
 from .detection_scores import DONT_CARE
 from .frame_pairs import FrameAugmentation, FramePairs
 from .shards import Shards
+from .words import did_you_mean, sides
 
 __all__ = [
     "DetectionDataset", "EventAugmentation", "FrameAugmentation", "FramePairs", "HalfVolumes", "Item",
@@ -94,8 +95,8 @@ class DetectionDataset(Dataset):
         unknown = [name for name in self.classes if name not in known]
         if unknown:
             raise ValueError(f"expected classes of {', '.join(known)}, got {', '.join(unknown)}, in "
-                             f"{shards._described_as}")
-        self._size, self._augmentation, self._visible, self._view = size, augmentation, visible, view
+                             f"{shards._described_as}{did_you_mean(unknown, known)}")
+        self._size, self._augmentation, self._visible, self._view = size and sides(size), augmentation, visible, view
 
     def __len__(self) -> int:
         return len(self._shards)
@@ -283,7 +284,7 @@ class KeypointDataset(Dataset):
                  view: np.ndarray | None = None) -> None:
         self._shards, self._joints = shards, _Joints(shards, joints, bool(augmentation and augmentation.flip))
         shards.annotated(self._joints.names)  # an error now if a source does not have them
-        self._size, self._augmentation, self._margin, self._view = size, augmentation, margin, view
+        self._size, self._augmentation, self._margin, self._view = size and sides(size), augmentation, margin, view
         self.classes, self.joint_names = {"person": 0}, self._joints.names
 
     def __len__(self) -> int:
@@ -386,6 +387,7 @@ class PoseDataset(Dataset):
 
     def __init__(self, shards: Shards, size: tuple[int, int] = (256, 256), joints: Sequence[str] | None = None,
                  sigma: float = 2.0, augmentation: PoseAugmentation | None = None, moved: bool = False) -> None:
+        size = sides(size)
         if size[0] % 4 or size[1] % 4:
             raise ValueError(f"expected sides that are multiples of 4, got {size}")
         self._shards, self._joints = shards, _Joints(shards, joints, bool(augmentation and augmentation.flip))

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <set>
 #include <utility>
 
+#include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "stages/frames/dataset/wrapped_dataset.h"
 
 namespace eventgan {
@@ -14,11 +17,13 @@ namespace {
 /// A dataset with other numbers for its classes.
 class RenumberedDataset final : public WrappedDataset {
  public:
-  /// `names` has all the dataset's.
-  RenumberedDataset(std::unique_ptr<Dataset> dataset, ClassNames names)
+  /// `names` has all that are taken.
+  RenumberedDataset(std::unique_ptr<Dataset> dataset, const ClassNames& taken, ClassNames names)
       : WrappedDataset(std::move(dataset)), schema_(dataset_->label_schema()) {
     for (const std::string& name : schema_.class_names) {
-      numbers_.push_back(static_cast<int>(std::ranges::find(names, name) - names.begin()));
+      const bool is_taken = std::ranges::find(taken, name) != taken.end();
+      numbers_.push_back(is_taken ? static_cast<int>(std::ranges::find(names, name) - names.begin())
+                                  : kLeftOut);
     }
     schema_.class_names = std::move(names);
   }
@@ -37,9 +42,12 @@ class RenumberedDataset final : public WrappedDataset {
   Outcome<Annotation> renumbered(Outcome<Annotation> read) const {
     if (is_fault(read)) return read;
     for (Box& box : read->boxes) box.class_id = numbers_.at(static_cast<std::size_t>(box.class_id));
+    read->of_other_classes +=
+        std::erase_if(read->boxes, [](const Box& box) { return box.class_id == kLeftOut; });
     return read;
   }
 
+  static constexpr int kLeftOut = -1;
   LabelSchema schema_;
   std::vector<int> numbers_;  ///< by the dataset's own
 };
@@ -55,6 +63,24 @@ void add_names(const ClassNames& more, ClassNames& names) {
     if (known.insert(name).second) added.push_back(name);
   }
   std::ranges::move(added, std::back_inserter(names));
+}
+
+/// The names of the classes that are taken.
+ClassNames taken_of(const Dataset& dataset, const SourceSpec& source) {
+  const ClassNames& all = dataset.label_schema().class_names;
+  if (source.classes.empty()) return all;
+  ClassNames taken;
+  for (const std::string& name : source.classes) {
+    if (std::ranges::find(all, name) == all.end()) {
+      throw InputError("expected classes of the source (" + joined(all, ", ", std::identity()) +
+                       "), got " + name + ", in " + source.root);
+    }
+    if (std::ranges::find(taken, name) == taken.end()) taken.push_back(name);
+  }
+  for (const std::string& name : all) {  // regions to ignore, of whatever class
+    if (name == "DontCare" && std::ranges::find(taken, name) == taken.end()) taken.push_back(name);
+  }
+  return taken;
 }
 
 bool begins_with(const ClassNames& names, const ClassNames& first) {
@@ -75,7 +101,7 @@ void number_classes(const std::vector<SourceSpec>& sources,
       datasets[i] = earlier->take();
     }
     if (!datasets[i]) continue;
-    add_names(datasets[i]->label_schema().class_names, of_kind[sources[i].dataset]);
+    add_names(taken_of(*datasets[i], sources[i]), of_kind[sources[i].dataset]);
   }
   for (std::size_t i = 0; i < datasets.size(); ++i) {
     if (!datasets[i]) continue;
@@ -89,8 +115,10 @@ void number_classes(const std::vector<SourceSpec>& sources,
     } else if (today.empty()) {
       continue;
     }
-    if (names == today) continue;
-    datasets[i] = std::make_unique<RenumberedDataset>(std::move(datasets[i]), std::move(names));
+    const ClassNames taken = taken_of(*datasets[i], sources[i]);
+    if (names == today && taken == today) continue;
+    datasets[i] =
+        std::make_unique<RenumberedDataset>(std::move(datasets[i]), taken, std::move(names));
   }
 }
 

@@ -1,12 +1,17 @@
 #include "stages/frames/sources/find_source.h"
 
 #include <algorithm>
+#include <array>
 #include <system_error>
 #include <utility>
 
+#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
+#include "stages/frames/listing/image_folder.h"
 #include "stages/frames/listing/source_folders.h"
 #include "stages/frames/sources/dataset_kinds.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 namespace {
@@ -43,20 +48,34 @@ std::optional<Place> look_at(const fs::path& root, std::optional<DatasetKind> da
 
 std::optional<Place> look_around(const fs::path& path, std::optional<DatasetKind> dataset) {
   if (auto found = look_at(path, dataset, /*own_too=*/false)) return found;
-  std::vector<Place> below;
-  for (const std::string& name : look_into(path).folders) {
-    const auto found = look_at(path / name, dataset, /*own_too=*/false);
-    if (found) below.push_back(*found);
+  const std::vector<std::string> folders = look_into(path).folders;
+  const auto look_below = [&](bool own_too) {
+    std::vector<Place> below;
+    for (const std::string& name : folders) {
+      if (const auto found = look_at(path / name, dataset, own_too)) below.push_back(*found);
+    }
+    return below;
+  };
+  std::vector<Place> below = look_below(/*own_too=*/false);
+  if (below.empty()) {
+    if (auto own = look_at(path, dataset, /*own_too=*/true)) return own;
   }
-  if (below.empty()) return look_at(path, dataset, /*own_too=*/true);
   if (below.size() == 1) return below.front();
-  std::string names;
+  below = look_below(/*own_too=*/true);
+  if (below.size() < 2) return std::nullopt;
+  std::string names, frames, events;
   for (const Place& found : below) {
     names += (names.empty() ? "" : ", ") + found.root.filename().string() + " (" +
              std::string(found.word()) + ")";
+    (has_events(found.dataset) ? events : frames) += " \"" + found.root.string() + "\"";
+  }
+  std::string lines;
+  for (const std::string& roots : {frames, events}) {
+    if (!roots.empty())
+      lines += (lines.empty() ? "" : "; of the recordings ") + ("eventgan init" + roots);
   }
   throw InputError("expected one dataset, got " + std::to_string(below.size()) + ": " + names +
-                   ", in " + path.string());
+                   ", in " + path.string() + " (one manifest of several: " + lines + ")");
 }
 
 /// The dataset that a folder is a part of, if the one above it is its root.
@@ -103,7 +122,74 @@ std::string known_titles() {
   return titles;
 }
 
+/// What a file is that somebody gave in place of a dataset, and what to do with it.
+struct FileKind {
+  std::string_view title, way_out;
+};
+
+constexpr std::string_view kGiveFolder =
+    "give the folder of its images: labels in or beside it are found";
+
+std::optional<FileKind> kind_of_text(std::string_view text) {
+  const auto has = [&](const char* what) { return text.find(what) != text.npos; };
+  text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
+  const std::string_view line = trimmed(text.substr(0, text.find('\n')));
+  if (line.starts_with("<")) return FileKind{"XML, as Pascal VOC's and CVAT's labels", kGiveFolder};
+  if (line.starts_with("//") || line.starts_with("/*"))
+    return std::nullopt;  // a manifest's comment
+  if (line.starts_with("{") || line.starts_with("[")) {
+    const bool is_coco = has("\"images\"") && (has("\"annotations\"") || has("\"file_name\""));
+    if (is_coco && !has("eventgan-")) return FileKind{"labels as COCO's", kGiveFolder};
+    return std::nullopt;
+  }
+  constexpr std::array kImages{".jpg", ".jpeg", ".png"};
+  const fs::path name(line);
+  if (is_video_name(name) || std::ranges::find(kImages, lower_extension(name)) != kImages.end()) {
+    return FileKind{"a list of files",
+                    "give the folder that holds them, or each: eventgan init A B"};
+  }
+  if (line.find(',') != line.npos) return FileKind{"a table", kGiveFolder};
+  return std::nullopt;
+}
+
+std::optional<FileKind> kind_of_file(std::string_view text) {
+  constexpr FileKind kCheckpoint{"a checkpoint of PyTorch",
+                                 "eventgan import-weights makes weights of EventGAN's, which a "
+                                 "manifest's \"generator\" names"};
+  constexpr FileKind kArchive{"an archive", "unpack it and give the folder"};
+  if (text.starts_with("\xff\xd8\xff") || text.starts_with("\x89PNG")) {
+    return FileKind{"an image", "give its folder"};
+  }
+  if (text.starts_with("PK")) {
+    return text.find("/data.pkl") != text.npos ? kCheckpoint : kArchive;
+  }
+  if (text.starts_with("\x80\x02")) return kCheckpoint;
+  if (text.starts_with("\x1f\x8b")) return kArchive;
+  if (text.size() > 8 && text[8] == '{' && text[7] == '\0') {
+    return FileKind{"weights (safetensors)",
+                    "a manifest names them: \"generator\": {\"weights\": "
+                    "...}"};
+  }
+  return kind_of_text(text);
+}
+
 }  // namespace
+
+std::string fault_of_file(const fs::path& file) {
+  constexpr std::size_t kLooked = 1 << 16;
+  std::string reason;
+  const auto input = InputFile::open(file, reason);
+  if (!input) return {};
+  if (const RecordingFault recording = recording_fault(file, {}); recording.is_recording) {
+    return recording.reason;
+  }
+  std::string text(kLooked, '\0');
+  text.resize(input->read_some(0, text));
+  const auto kind = kind_of_file(text);
+  if (!kind) return {};
+  return "expected a manifest, folder, video or recording, got " + std::string(kind->title) +
+         ", in " + file.string() + " (" + std::string(kind->way_out) + ")";
+}
 
 std::vector<FoundSource> find_sources(const fs::path& path, std::optional<DatasetKind> dataset) {
   fs::path root = fs::absolute(path).lexically_normal();
@@ -116,6 +202,7 @@ std::vector<FoundSource> find_sources(const fs::path& path, std::optional<Datase
   }
   const std::optional<Place> place = look_around(root, dataset);
   if (!place) {
+    if (const std::string fault = fault_of_file(root); !fault.empty()) throw InputError(fault);
     const auto other = dataset ? look_around(root, std::nullopt) : std::nullopt;
     throw InputError("expected " + (dataset ? std::string(to_string(*dataset)) : known_titles()) +
                      ", got " + std::string(other ? other->word() : "none of these") + ", in " +

@@ -10,6 +10,11 @@
 
 namespace eventgan {
 
+/// Of a file that is neither dataset nor manifest, "expected a manifest, ..., got TITLE, in PATH
+/// (what to do with it)", by what is in it: labels, a list of files, weights, an image, an archive,
+/// a recording that is not read. Empty if nothing tells.
+std::string fault_of_file(const std::filesystem::path& file);
+
 /// Finds out which dataset lies at `path` or, if it is none, in a folder of it; `dataset`, if it is
 /// given, must be that one. What belongs to it is looked for beside it, too: KITTI raw and the
 /// development kit in the two folders above the root and in their folders. Only names are looked

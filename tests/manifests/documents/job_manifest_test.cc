@@ -68,7 +68,7 @@ TEST(JobManifest, HasTheDefaultsOfItsHeader) {
   EXPECT_EQ(manifest.generator.precision, Precision::kFloat32);
   EXPECT_EQ(manifest.volume.bins, 9);
   EXPECT_EQ(manifest.volume.normalize, Normalization::kNone);
-  EXPECT_EQ(manifest.output.samples_per_shard, 64);
+  EXPECT_EQ(manifest.output.samples_per_shard, std::nullopt);
   EXPECT_EQ(manifest.output.dtype, StoredType::kFloat16);
   EXPECT_EQ(manifest.output.deflate_level, 1);
   EXPECT_EQ(manifest.errors.policy, ErrorPolicy::kQuarantine);
@@ -253,6 +253,12 @@ TEST(JobManifest, SaysWhatIsWrongWithTextThatIsNoObject) {
   EXPECT_THAT(faults_of(""), ::testing::StartsWith("m.json:1:1: expected JSON, got an error"));
   EXPECT_EQ(faults_of("\xef\xbb\xbf{}"),
             "m.json:1:1: expected UTF-8 without a byte order mark, got a byte order mark");
+}
+
+TEST(JobManifest, ReportsAMisspeltKeyOnce) {
+  EXPECT_EQ(faults_of(testing::edited(kSoundManifest,
+                                      {{"/output", ""}, {"/ouput", R"({"directory": "o"})"}})),
+            "m.json: $.ouput: expected the key \"output\" or none, got an unknown key");
 }
 
 TEST(JobManifest, ReportsADoubleKeyBesideOtherFaults) {

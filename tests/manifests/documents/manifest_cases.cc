@@ -518,7 +518,6 @@ std::vector<ManifestCase> setting_cases() {
         {"/errors/max_fraction", R"("1%")"},
         {"/zzzzzz", "[]"}},
        {"$.name: " + kNameRule + "7", "$.seed: expected an integer 0..9223372036854775807, got 9.7",
-        "$.sources[0].root: expected a path, got nothing",
         "$.sources[0].pairs.gaps[0]: expected an integer 1..6, got 7",
         R"($.sources[0].rot: expected the key "root" or none, got an unknown key)",
         "$.image.width: expected an integer 16..8192, got 9.7",

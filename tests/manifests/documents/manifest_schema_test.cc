@@ -103,8 +103,6 @@ TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
   EXPECT_EQ(stated("/properties/volume/properties/bins"), manifest.volume.bins);
   EXPECT_EQ(stated("/properties/volume/properties/normalize"),
             to_string(manifest.volume.normalize));
-  EXPECT_EQ(stated("/properties/output/properties/samples_per_shard"),
-            manifest.output.samples_per_shard);
   EXPECT_EQ(stated("/properties/output/properties/dtype"), to_string(manifest.output.dtype));
   EXPECT_EQ(stated("/properties/output/properties/deflate_level"), manifest.output.deflate_level);
   EXPECT_EQ(stated("/properties/errors/properties/policy"), to_string(manifest.errors.policy));

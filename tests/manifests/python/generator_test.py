@@ -223,6 +223,13 @@ def test_many(generator, images):
             generator.many(broken, following, threads=threads)
 
 
+@pytest.mark.parametrize("path", ["a.png", pathlib.Path("a.png"), b"a.png"])
+def test_a_path_is_to_be_read_first(generator, path):
+    for call in (generator, generator.sample, generator.many, lambda image, _: generator.prepare(image)):
+        with pytest.raises(ValueError, match="expected an image array, got a path for (previous|image): read it first"):
+            call(path, path)
+
+
 def test_static_black_and_saturated_pairs(generator):
     for level in (0, 255):
         flat = np.full((40, 30), level, np.uint8)

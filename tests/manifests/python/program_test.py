@@ -106,6 +106,27 @@ def test_a_dictionary_is_converted_as_a_file_of_the_current_folder(job):
     assert converted["shards_done_before"] == SHARDS
 
 
+def test_a_trial_of_some_classes(demo, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shards = eventgan.convert(demo / "kitti" / "training", limit=3, classes=["Car"], progress=False)
+    assert len(shards) == 3 and shards.paths[0].parent.name == "kitti-events-trial-3"
+    assert shards.known_classes() == ["Car", "DontCare"]
+    with pytest.raises(eventgan.ProgramError, match="expected classes of the source .*, got Cra"):
+        eventgan.convert(demo / "kitti" / "training", tmp_path / "new", classes=["Cra"], progress=False)
+
+
+@pytest.mark.parametrize("call, message", [
+    (lambda: eventgan.init("/nonexistent"), "expected a folder or a video, got 'No such file or directory', in /non"),
+    (lambda: eventgan.init(3), "expected the path of a folder, video or recording, got 3"),
+    (lambda: eventgan.convert(3), "expected the path of a manifest, folder, video or recording, got 3"),
+    (lambda: eventgan.convert("/", output=3), "expected the path of a folder, got 3"),
+    (lambda: eventgan.convert("/", classes="Car"), r"expected a list of classes, such as \['person'\], got 'Car'"),
+    (lambda: eventgan.Shards(3), "expected the path of a folder of shards, or a shard, got 3")])
+def test_wrong_arguments_get_a_sentence(call, message):
+    with pytest.raises((ValueError, eventgan.ProgramError), match=message):
+        call()
+
+
 def test_all_shards_are_made_whatever_a_cluster_says(job, monkeypatch):
     monkeypatch.setenv("SHARD_INDEX", "1")
     monkeypatch.setenv("SHARD_COUNT", "2")

@@ -199,6 +199,12 @@ def test_classes_may_be_joined_chosen_or_unknown(shards):
     assert DetectionDataset(shards, ["DontCare"])[0]["boxes"].shape == (1, 4)
     with pytest.raises(ValueError, match="expected classes of Car, DontCare, got Bus"):
         DetectionDataset(shards, ["Car", "Bus"])
+    with pytest.raises(ValueError, match=r"got cra, in .*; did you mean Car\?$"):
+        DetectionDataset(shards, ["cra"])
+    with pytest.raises(ValueError, match=r"expected a list of classes, such as \['person'\], got 'Car'"):
+        DetectionDataset(shards, "Car")
+    with pytest.raises(ValueError, match=r"expected a size of height and width, such as \(192, 320\), got 192"):
+        DetectionDataset(shards, size=192)
 
 
 def test_detection_items_of_another_size(shards):

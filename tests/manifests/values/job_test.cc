@@ -93,6 +93,17 @@ TEST(BeyondLimits, CountAndFractionBothBind) {
   EXPECT_TRUE(beyond_limits(errors, 4, 1000));
 }
 
+TEST(BeyondLimits, OfFewSamplesOneMayFail) {
+  const ErrorSpec errors;  // 1 %
+  for (const std::int64_t planned : {2, 9, 44, 99, 100, 199}) {
+    EXPECT_EQ(most_quarantined(errors, planned), 1) << planned;
+  }
+  EXPECT_EQ(most_quarantined(errors, 200), 2);
+  EXPECT_EQ(most_quarantined(errors, 1), 0);  // then nothing is made
+  EXPECT_EQ(most_quarantined({ErrorPolicy::kQuarantine, 100, 0}, 44), 0);
+  EXPECT_EQ(most_quarantined({ErrorPolicy::kQuarantine, 0, 1}, 44), 0);
+}
+
 TEST(BeyondLimits, PolicyFailAllowsNone) {
   const ErrorSpec errors{ErrorPolicy::kFail, 100, 1};
   EXPECT_FALSE(beyond_limits(errors, 0, 10));
@@ -100,9 +111,9 @@ TEST(BeyondLimits, PolicyFailAllowsNone) {
 }
 
 TEST(LimitsText, SaysWhatThePolicyAllows) {
-  EXPECT_EQ(limits_text({ErrorPolicy::kQuarantine, 3, 0.25}),
-            "at most 3 quarantined pairs and a share of 0.25 (errors in the manifest)");
-  EXPECT_EQ(limits_text({ErrorPolicy::kFail, 3, 0.25}),
+  EXPECT_EQ(limits_text({ErrorPolicy::kQuarantine, 3, 0.25}, 8),
+            "at most 2 quarantined pairs (errors in the manifest)");
+  EXPECT_EQ(limits_text({ErrorPolicy::kFail, 3, 0.25}, 8),
             "no quarantined pair (errors.policy in the manifest is \"fail\")");
 }
 

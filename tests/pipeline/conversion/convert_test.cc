@@ -315,8 +315,8 @@ TEST_F(Convert, BeyondTheLimitsFinishesTheShardAndStops) {
 }
 
 TEST_F(Convert, TheFractionIsOfTheWholePlan) {
-  testing::write_file(image(11), "");
-  manifest_.errors = {ErrorPolicy::kQuarantine, 100, 1.0 / 11};
+  testing::write_file(image(1), "");  // of two pairs
+  manifest_.errors = {ErrorPolicy::kQuarantine, 100, 2.0 / 11};
   EXPECT_FALSE(run("a").too_many_faults);
   manifest_.errors.max_fraction = 0.05;
   EXPECT_TRUE(run("b").too_many_faults);

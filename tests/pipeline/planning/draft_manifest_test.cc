@@ -54,8 +54,9 @@ class DraftManifest : public ::testing::Test {
     return source;
   }
 
-  ManifestDraft draft(const std::vector<FoundSource>& sources) const {
-    return draft_manifest(sources, {folder_.path(), /*is_relative=*/true, "out/job"});
+  ManifestDraft draft(const std::vector<FoundSource>& sources,
+                      const DraftWishes& wishes = {}) const {
+    return draft_manifest(sources, {folder_.path(), /*is_relative=*/true, "out/job"}, wishes);
   }
   JobManifest read(const ManifestDraft& draft) const {
     return parse_job_manifest(draft.text, folder_.path(), "the draft");
@@ -91,6 +92,38 @@ TEST_F(DraftManifest, OfASequenceTakesPairsOfNeighboursAsTheyAre) {
   EXPECT_THAT(made.findings, ElementsAre("what was found: 3 frames of 1 sequence, NO LABELS",
                                          HasSubstr("by gap: gap 1: 2, gap 2: 1, gap 3: 0"),
                                          HasSubstr("set \"frames_per_second\"")));
+}
+
+TEST_F(DraftManifest, OfPhotographsIsForTheCameraThatIsWanted) {
+  FoundSource photos = images("photos", {kOneSize, kOtherSize});
+  testing::write_file(folder_ / "boxes.csv",
+                      "image,class,left,top,right,bottom\n0.png,car,1,1,9,9\n1.png,dog,1,1,9,9\n");
+  photos.labels = FoundLabels{LabelFormat::kCsv, folder_ / "boxes.csv"};
+  struct Case {
+    std::optional<CameraMotion> camera;
+    double rests;
+    GeneratorKind kind;
+  };
+  for (const Case& one : {Case{std::nullopt, 0.5, GeneratorKind::kEsim},
+                          Case{CameraMotion::kRests, 0.5, GeneratorKind::kEsim},
+                          Case{CameraMotion::kMoves, 0, GeneratorKind::kNetwork},
+                          Case{CameraMotion::kBoth, 0.25, GeneratorKind::kNetwork}}) {
+    const JobManifest job = read(draft({photos}, {one.camera, {"dog"}}));
+    EXPECT_EQ(job.sources[0].pairs.stills.value().rests, one.rests);
+    EXPECT_EQ(job.generator.kind, one.kind);
+    if (one.kind == GeneratorKind::kNetwork) EXPECT_EQ(job.generator.weights, "shipped:16");
+    EXPECT_THAT(job.sources[0].classes, ElementsAre("dog"));
+  }
+  EXPECT_THAT(
+      [&] {
+        draft({photos}, {std::nullopt, {"cat"}});
+      },
+      ThrowsMessage<InputError>(HasSubstr("(car, dog), got cat")));
+  EXPECT_THAT(
+      [&] {
+        draft({images("walk", {kOneSize, kOneSize})}, {CameraMotion::kMoves, {}});
+      },
+      ThrowsMessage<UsageError>(HasSubstr("--camera: expected photographs with labels")));
 }
 
 TEST_F(DraftManifest, OfOneImageProposesStillsWithTheirDefaultsWrittenOut) {

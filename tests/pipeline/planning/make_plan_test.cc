@@ -24,7 +24,7 @@ struct Source {
 };
 
 std::vector<PlannedShard> lay_out(const std::vector<Source>& sources, int samples_per_shard) {
-  ShardLayout layout("job", samples_per_shard);
+  ShardLayout layout("job", [=](int, ImageSize) { return samples_per_shard; });
   for (std::size_t i = 0; i < sources.size(); ++i) {
     layout.begin_source(static_cast<int>(i), sources[i].split);
     for (std::size_t k = 0; k < sources[i].sizes.size(); ++k) {
@@ -96,7 +96,7 @@ TEST(ShardLayout, OfSizesThatAreEquallyCommonTheFirstIsTheGuess) {
 }
 
 TEST(ShardLayout, SamplesOfOneUnreadableVideoShareShards) {
-  ShardLayout layout("job", 2);
+  ShardLayout layout("job", [](int, ImageSize) { return 2; });
   layout.begin_source(0, "train");
   for (const char* video : {"a.mp4", "a.mp4", "a.mp4", "b.mp4"}) {
     layout.add({video, "", "", {{video, 0}, {video, 1}}, ""}, {});
@@ -109,7 +109,7 @@ TEST(ShardLayout, SamplesOfOneUnreadableVideoShareShards) {
 }
 
 TEST(ShardLayout, SamplesOfASequenceWithoutAnyImageShareShards) {
-  ShardLayout layout("job", 2);
+  ShardLayout layout("job", [](int, ImageSize) { return 2; });
   layout.begin_source(0, "train");
   const auto add = [&](const char* id, const char* sequence, std::int64_t index, ImageSize size) {
     const FrameRef frame{std::string(id) + ".png", index};
@@ -129,6 +129,32 @@ TEST(ShardLayout, SamplesOfASequenceWithoutAnyImageShareShards) {
   for (std::size_t i = 1; i < shards.size(); ++i) {
     EXPECT_TRUE(shards[i].size_unknown);
     EXPECT_EQ(shards[i].volume_size, kSmall);
+  }
+}
+
+TEST(SamplesPerShard, AreWhatTheManifestSaysOrWhatOneCoreMakesInTwentySeconds) {
+  struct Case {
+    GeneratorKind kind;
+    std::string weights;
+    ImageSize size;
+    bool cuts_out;
+    int samples;
+  };
+  const ImageSize kitti{260, 861};
+  for (const Case& one :
+       std::vector<Case>{{GeneratorKind::kNetwork, "shipped:8", kitti, false, 64},  // 34 ms a pair
+                         {GeneratorKind::kNetwork, "my.safetensors", kitti, false, 36},  // 0.55 s
+                         {GeneratorKind::kNetwork, "untrained:32", {720, 1280}, false, 8},  // 2.3 s
+                         {GeneratorKind::kEsim, "shipped", {192, 320}, true, 19},  // 1 s and 6 ms
+                         {GeneratorKind::kDifference, "shipped", {}, false, 64}}) {
+    JobManifest manifest;
+    manifest.generator.kind = one.kind;
+    manifest.generator.weights = one.weights;
+    SourceSpec source;
+    if (one.cuts_out) source.pairs.stills = StillsSpec{.objects = ObjectMotionSpec()};
+    EXPECT_EQ(samples_per_shard(manifest, source, one.size), one.samples) << one.weights;
+    manifest.output.samples_per_shard = 1000;
+    EXPECT_EQ(samples_per_shard(manifest, source, one.size), 1000);
   }
 }
 

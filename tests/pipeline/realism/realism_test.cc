@@ -191,6 +191,18 @@ TEST(RealismText, MarksTheBestOfEachRow) {
   EXPECT_THAT(text, ContainsRegex("correlation of mean times +↑ +- +-\n"));
 }
 
+TEST(RealismText, EndsWithWhatToTake) {
+  RealismReport report = two_methods();
+  EXPECT_THAT(
+      text_of(report),
+      ::testing::EndsWith("By F1 summed over time: network 0.500, difference 0.250. For your "
+                          "own videos and sequences take \"network\" as generator.kind.\n"));
+  report.methods.push_back(method_of("esim", 0.75, 0.02, 0.3));  // whatever it has here
+  EXPECT_THAT(text_of(report), HasSubstr("esim 0.750, network 0.500"));
+  EXPECT_THAT(text_of(report),
+              HasSubstr("take \"network\" as generator.kind. esim is for photographs"));
+}
+
 TEST(RealismText, SaysHowSureItIs) {
   RealismReport report = two_methods();
   report.methods[0].bounds.emplace();

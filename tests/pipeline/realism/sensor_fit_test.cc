@@ -210,8 +210,9 @@ TEST(FitSensor, FindsTheThresholdOfACameraThatKeepsItsLevels) {
     ASSERT_TRUE(fit.difference && fit.difference_anew);
     EXPECT_NEAR(fit.difference->threshold.mean, threshold, 0.1 * threshold);
     EXPECT_LT(*fit.difference_anew, 0.85 * threshold);  // pairs alone lack what came before
-    EXPECT_EQ(fit.sensor("n", "").threshold->range[0],
-              std::round(fit.difference->threshold.mean * 1e3) / 1e3);
+    const auto told = fit.sensor("n", "").threshold;    // for convert, whose pairs begin anew
+    ASSERT_EQ(told.has_value(), fit.is_better("difference").value());
+    if (told) EXPECT_NEAR(told->range[0], *fit.difference_anew, 5e-3 * threshold);
   }
 }
 
@@ -309,7 +310,7 @@ TEST(FitSensor, FindsThresholdsByPolarityThroughANetwork) {
   EXPECT_NEAR(sensor.network->threshold.range[0], fit.network->threshold.mean, 5e-3);
   EXPECT_NEAR(sensor.network->threshold.ratio, fit.network->threshold.ratio, 5e-3);
   EXPECT_EQ(sensor.network->weights, "abc");
-  EXPECT_NEAR(sensor.threshold->range[0], fit.difference->threshold.mean, 5e-3);
+  EXPECT_NEAR(sensor.threshold->range[0], *fit.difference_anew, 5e-3);
   EXPECT_EQ(sensor.threshold->ratio, 1);
   EXPECT_EQ(sensor.name, "mine");
   EXPECT_EQ(sensor.origin, "a test");
@@ -403,8 +404,27 @@ SensorFit made_fit() {
 
 TEST(SensorFit, GivesThreeDigits) {
   const CameraSensor sensor = made_fit().sensor("n", "");
-  EXPECT_EQ(sensor.threshold, (ThresholdSpec{{0.312, 0.312}, 1}));
+  EXPECT_EQ(sensor.threshold, (ThresholdSpec{{0.25, 0.25}, 1}));  // as convert's pairs
   EXPECT_EQ(sensor.noise, (NoiseSpec{{0.512, 1}, {0, 0}, {1e-4, 1e-4}}));
+}
+
+TEST(SensorFitText, DecidesByThePairsKeptAside) {
+  SensorFit fit = made_fit();
+  EXPECT_THAT(verdict_text(fit, "my.json", ""), HasSubstr("difference: no verdict"));
+  fit.rows.push_back({"difference, default", 0.6});  // 1.2 times the camera's; fitted 0.9 times
+  EXPECT_EQ(verdict_text(fit, "my.json", ""),
+            "difference: the fitted threshold is better than the default (0.90 times the camera's "
+            "events on the pairs kept aside, by default 1.20). Put this line into the manifest:\n"
+            "  \"generator\": { \"kind\": \"difference\", \"sensor\": \"my.json\" }\n");
+  fit.network = FittedThreshold{{0.2}, {}, {}};
+  fit.rows.push_back({"network, fitted", 0.45});
+  fit.rows.push_back({"network, default", 0.55});  // 1.1 times: 10 % too many are nearer than 10 %
+  EXPECT_THAT(verdict_text(fit, "my.json", "shipped:sensor"),  // too few: ln 1.1 < -ln 0.9
+              HasSubstr("network: keep the default: the fitted threshold is worse (0.90 times the "
+                        "camera's events on the pairs kept aside, by default 1.10)\n"));
+  // What is worse is in no document.
+  EXPECT_TRUE(fit.sensor("n", "").threshold);
+  EXPECT_FALSE(fit.sensor("n", "").network);
 }
 
 TEST(SensorFitText, SaysHowSureItIs) {
@@ -416,9 +436,10 @@ TEST(SensorFitText, SaysHowSureItIs) {
   EXPECT_THAT(text, HasSubstr("shot_hz 0.512..1, leak_hz 0, hot_pixels 0.0001 (1 of them)"));
   EXPECT_THAT(text, HasSubstr("from 1000 pixels, 2 s each, of 21 pairs"));
   EXPECT_THAT(text, ::testing::ContainsRegex("difference, fitted +0.4500 +0.90\n"));
-  EXPECT_EQ(origin_text(made_fit(), "shipped:sensor"),
-            "21 pairs of frames of mean grey level 64 (60..70); threshold 0.312 ± 0.015 of "
-            "difference; noise of 2e+03 pixel seconds");
+  EXPECT_EQ(
+      origin_text(made_fit(), "shipped:sensor"),
+      "21 pairs of frames of mean grey level 64 (60..70); threshold 0.25 of difference, of pairs "
+      "that begin anew; noise of 2e+03 pixel seconds");
 }
 
 }  // namespace

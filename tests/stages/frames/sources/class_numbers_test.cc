@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "manifests/values/faults.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/sources/open_dataset.h"
 #include "tests/testing/image_file.h"
@@ -146,6 +147,27 @@ TEST_F(ClassNumbers, EachKindOfDatasetHasItsOwn) {
   number_classes(sources_, datasets_);
   EXPECT_THAT(names(0), ElementsAre("car"));
   EXPECT_THAT(names(1), ElementsAre("person"));
+}
+
+TEST_F(ClassNumbers, OthersThanTheSourceTakesAreLeftOutAndCounted) {
+  add_table("train", {"person", "bike", "car", "DontCare"});
+  add_table("val", {"person", "car"});
+  for (SourceSpec& source : sources_) source.classes = {"person", "car"};
+  for (int call = 0; call < 2; ++call) {
+    number_classes(sources_, datasets_);
+    EXPECT_THAT(names(0), ElementsAre("person", "car", "DontCare"));
+    EXPECT_EQ(names(1), names(0));
+    EXPECT_THAT(boxes(0), ElementsAre("person", "car", "DontCare"));
+    EXPECT_EQ(datasets_[0]->annotation("1.png")->of_other_classes, 1u);
+    EXPECT_EQ(datasets_[1]->annotation("1.png")->of_other_classes, 0u);
+  }
+  sources_[0].classes = {};  // all of its own, with the numbers of both
+  number_classes(sources_, datasets_);
+  EXPECT_THAT(boxes(0), ElementsAre("person", "bike", "car", "DontCare"));
+  sources_[1].classes = {"bike"};
+  EXPECT_THAT([&] { number_classes(sources_, datasets_); },
+              ::testing::ThrowsMessage<InputError>(
+                  "expected classes of the source (car, person), got bike, in val/images"));
 }
 
 TEST_F(ClassNumbers, WhatIsStoredKeepsItsNumbers) {

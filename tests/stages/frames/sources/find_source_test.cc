@@ -172,6 +172,56 @@ TEST_F(FindSource, SaysWhatThereIsInstead) {
               refused("expected frames, got none of these, in "));
 }
 
+TEST_F(FindSource, SaysWhatAFileIsAndWhatToDoWithIt) {
+  using namespace std::string_literals;
+  const struct {
+    std::string name, text, title, way_out;
+  } cases[] = {
+      {"x.aedat", "#!AER-DAT2.0\r\n\xc0", "AEDAT of another version than 4.0", "write AEDAT4"},
+      {"instances.json", R"({"images": [{"file_name": "a"}], "annotations": []})",
+       "labels as COCO's", "give the folder of its images"},
+      {"a.xml", "<annotation>", "XML", "give the folder"},
+      {"videos.txt", "clips/a.mp4\nclips/b.mp4\n", "a list of files", "eventgan init A B"},
+      {"boxes.csv", "image,class,left\n", "a table", "give the folder"},
+      {"EventGAN.pt", "\x80\x02\x8a\n", "a checkpoint of PyTorch", "eventgan import-weights"},
+      {"new.pt", "PK\3\4 archive/data.pkl", "a checkpoint of PyTorch", "eventgan import-weights"},
+      {"a.zip", "PK\3\4 a.jpg", "an archive", "unpack it"},
+      {"w.safetensors", "\x10\0\0\0\0\0\0\0{}"s, "weights", "a manifest names them"},
+      {"a.jpg", "\xff\xd8\xff", "an image", "give its folder"}};
+  for (const auto& one : cases) {
+    write(one.name, one.text);
+    const auto is_said =
+        AllOf(HasSubstr("got " + one.title), HasSubstr("in " + at(one.name).string()),
+              HasSubstr(one.way_out), Not(HasSubstr("\n")));
+    EXPECT_THAT(fault_of_file(at(one.name)), is_said);
+    EXPECT_THAT([&] { find(one.name); }, ThrowsMessage<InputError>(is_said));
+  }
+  write("manifest.json", R"({"format": "eventgan-manifest", "sources": [{"annotations": "a"}]})");
+  write("notes.txt", "notes");
+  write("commented.json", "\n// of images, annotations\n{}");
+  for (const char* name : {"manifest.json", "commented.json", "notes.txt", "nothing"}) {
+    EXPECT_EQ(fault_of_file(at(name)), "") << name;
+  }
+}
+
+TEST_F(FindSource, OfSeveralNamesAllWithTheLineForOneManifest) {
+  for (const char* name : {"a", "d"}) {
+    write(std::string("data/") + name + "/label_2/000000.txt");
+    write(std::string("data/") + name + "/image_2/000000.png");
+    write(std::string("many/") + name + "/images/1.png");
+  }
+  write("data/b/1.png");
+  const auto refused = [this](const std::string& names, const std::string& last) {
+    return ThrowsMessage<InputError>(
+        AllOf(HasSubstr("expected one dataset, got " + names + ", in "),
+              HasSubstr("(one manifest of several: eventgan init \""),
+              ::testing::EndsWith(" \"" + at(last).string() + "\")")));
+  };
+  EXPECT_THAT([&] { find("data"); },
+              refused("3: a (kitti_object), b (frames), d (kitti_object)", "data/d"));
+  EXPECT_THAT([&] { find("many"); }, refused("2: a (frames), d (frames)", "many/d"));
+}
+
 TEST_F(FindSource, LabelsOfOnesOwnLieBesideTheImages) {
   const std::string coco = R"({"info": {}, "images": [{"id": 1, "file_name": "1.jpg"}], )"
                            R"("annotations": [], "categories": []})";
