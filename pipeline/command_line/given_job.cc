@@ -49,9 +49,8 @@ void require_labels_read(const std::vector<FoundSource>& sources) {
   for (const FoundSource& source : sources) {
     if (source.unread.empty()) continue;
     throw InputError(fmt::format(
-        "expected labels that can be read, or none, got: {} (eventgan init writes a manifest that "
-        "goes without labels)",
-        fmt::join(source.unread, "; ")));
+        "expected labels that can be read, or none, got: {} ({} goes on without labels)",
+        fmt::join(source.unread, "; "), kNoLabelsOption));
   }
 }
 
@@ -75,9 +74,15 @@ ImageSize parse_sensor(const std::string& text) {
 }  // namespace
 
 GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& output,
-                        const std::optional<std::string>& sensor) {
+                        const std::optional<std::string>& sensor, bool no_labels) {
   GivenJob job;
   if (!may_be_source(given)) {
+    if (no_labels) {
+      throw UsageError(std::string(kNoLabelsOption) +
+                       ": expected a folder or a video, got a manifest, which says so with "
+                       "\"labels\": \"none\", in " +
+                       given.string());
+    }
     if (sensor) {
       throw UsageError(
           "--sensor: expected a recording, got a manifest, whose \"sensor\" counts, in " +
@@ -90,6 +95,7 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
     return job;
   }
   std::vector<FoundSource> sources = find_sources(given);
+  if (no_labels) go_without_labels(sources);
   FoundSource& found = sources.front();
   if (sensor) {
     found.sensor = parse_sensor(*sensor);

@@ -38,16 +38,18 @@ struct GivenJob {
 /// draft_manifest writes for it, with absolute paths, or that an earlier run has kept as
 /// manifest.json in the output folder: it stays as it is, whatever becomes of the source. `output`:
 /// --output; without it a folder's job goes to out/NAME, which starts at the program's own folder
-/// as that of a manifest in it would. `sensor`: --sensor, WIDTHxHEIGHT. Writes nothing.
+/// as that of a manifest in it would. `sensor`: --sensor, WIDTHxHEIGHT. `no_labels`: --no-labels
+/// (go_without_labels). Writes nothing.
 ///
 /// Throws UsageError or InputError as read_job_manifest, find_source and draft_manifest do;
 /// InputError if nothing found makes a pair, or labels lie there that are not read
 /// (FoundSource::unread); UsageError if the output folder has the manifest of
 /// another source or sensor, or a job that was given by a manifest elsewhere; for a sensor of what
-/// is no recording.
+/// is no recording, or going without labels of what is no folder of images or videos.
 GivenJob read_given_job(const std::filesystem::path& given,
                         const std::optional<std::filesystem::path>& output,
-                        const std::optional<std::string>& sensor = std::nullopt);
+                        const std::optional<std::string>& sensor = std::nullopt,
+                        bool no_labels = false);
 
 /// Keeps the manifest before the job's plan is frozen, if that is left to do, and tells where. Of
 /// several workers that begin at once one writes it. Throws UsageError if that one wrote another,

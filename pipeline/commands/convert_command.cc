@@ -20,6 +20,7 @@
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"
 #include "pipeline/runtime/trace.h"
+#include "stages/frames/find_source.h"
 
 namespace eventgan {
 namespace {
@@ -28,6 +29,7 @@ struct ConvertArguments {
   JobOptions job;
   std::optional<std::string> shards;
   std::optional<std::string> sensor;
+  bool no_labels = false;
   std::optional<std::int64_t> limit;
   bool no_finalize = false;
   double grace_s = ConversionOptions().grace_s;
@@ -113,7 +115,8 @@ fs::path trial_folder(fs::path output, std::int64_t limit) {
 int run(const ConvertArguments& arguments) {
   const JobOptions& job = arguments.job;
   const StopSignal signal(shard_stopping_line(arguments.grace_s));
-  const GivenJob given = read_given_job(job.manifest, job.output, arguments.sensor);
+  const GivenJob given =
+      read_given_job(job.manifest, job.output, arguments.sensor, arguments.no_labels);
   ConversionOptions options;
   options.part = choose_part(arguments.shards, [](const char* name) { return std::getenv(name); });
   options.grace_s = arguments.grace_s;
@@ -162,6 +165,7 @@ void add_convert_command(CLI::App& app, int& exit_code) {
   command->add_flag("--no-finalize", arguments->no_finalize,
                     "Leave dataset.json and dataset.h5 to `eventgan finalize`; so does a part");
   command->add_option(kSensorOption, arguments->sensor, kSensorText)->option_text("WIDTHxHEIGHT");
+  command->add_flag(kNoLabelsOption, arguments->no_labels, kNoLabelsText);
   add_grace_option(*command, arguments->grace_s);
   add_profile_option(*command, arguments->profile);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });

@@ -29,6 +29,7 @@ struct InitArguments {
   std::vector<std::string> where;  ///< PATH..., or DATASET PATH...
   std::string out = "manifest.json";
   bool has_out = false;  ///< --out was given
+  bool no_labels = false;
 };
 
 std::vector<FoundSource> find_all(const std::vector<std::string>& where) {
@@ -62,7 +63,8 @@ int run(const InitArguments& arguments) {
   const fs::path out = arguments.out;
   if (!out.has_filename()) throw UsageError("--out: expected a file, got " + out.string());
   if (fs::exists(fs::symlink_status(out))) refuse_to_overwrite(arguments);
-  const std::vector<FoundSource> found = find_all(arguments.where);
+  std::vector<FoundSource> found = find_all(arguments.where);
+  if (arguments.no_labels) go_without_labels(found);
   const ManifestDraft draft = draft_manifest(
       found, {fs::absolute(out).lexically_normal().parent_path(),
               std::ranges::none_of(arguments.where,
@@ -97,6 +99,7 @@ void add_init_command(CLI::App& app, int& exit_code) {
   auto* out = command->add_option("--out", arguments->out,
                                   "The manifest to write, a new file; default: manifest.json");
   out->option_text("FILE");
+  command->add_flag(kNoLabelsOption, arguments->no_labels, kNoLabelsText);
   command->callback([arguments, out, &exit_code] {
     arguments->has_out = out->count() > 0;
     exit_code = run(*arguments);

@@ -19,6 +19,7 @@
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/threads.h"
+#include "stages/frames/find_source.h"
 #include "stages/recordings/event_index.h"
 
 namespace eventgan {
@@ -31,6 +32,7 @@ struct PlanArguments {
   bool freeze = false;
   std::optional<std::string> output;
   std::optional<std::string> sensor;
+  bool no_labels = false;
   ProgressStyle progress = ProgressStyle::kAuto;
 };
 
@@ -63,7 +65,8 @@ int freeze(const PlanArguments& arguments, const GivenJob& given, Plan plan) {
 }
 
 int run(const PlanArguments& arguments) {
-  const GivenJob given = read_given_job(arguments.manifest, arguments.output, arguments.sensor);
+  const GivenJob given =
+      read_given_job(arguments.manifest, arguments.output, arguments.sensor, arguments.no_labels);
   const JobManifest& manifest = given.manifest;
   const LoadedGenerator loaded = load_generator(manifest);
   EventIndexes indexes(given.output / kEventIndexFile);
@@ -94,6 +97,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<PlanArguments>();
   command->add_option(kGivenJob, arguments->manifest, kGivenJobText)->required();
   command->add_option(kSensorOption, arguments->sensor, kSensorText)->option_text("WIDTHxHEIGHT");
+  command->add_flag(kNoLabelsOption, arguments->no_labels, kNoLabelsText);
   add_threads_option(*command, arguments->threads);
   add_json_option(*command, arguments->json);
   auto* freeze_flag =
