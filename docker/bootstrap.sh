@@ -81,7 +81,7 @@ wheel() {
   JOBS=$jobs docker/wheel/ffmpeg.sh build/wheel/ffmpeg
   say "building"
   PKG_CONFIG_PATH=$PWD/build/wheel/ffmpeg/lib/pkgconfig \
-    cmake --preset release -B build/wheel -DEVENTGAN_TESTS=OFF -DEVENTGAN_PORTABLE=ON
+    cmake --preset release -B build/wheel -DEVENTGAN_TESTS=OFF -DEVENTGAN_TORCH=OFF -DEVENTGAN_PORTABLE=ON
   cmake --build build/wheel -j "$jobs" --target eventgan libeventgan
   say "packing"
   docker/wheel/pack.py build/wheel

@@ -17,7 +17,6 @@ constexpr int kSmallestSensorSide = 16;
 constexpr int kLargestSensorSide = 8192;
 
 void list_clip(Fields& fields, SimulationSource& source) {
-  using enum SimulationMethod;
   fields.at("path", source.path, paths(),
             "A video, or a folder of images, taken in the order of their names. With method stills "
             "the manifest of a job of convert.");
@@ -36,7 +35,10 @@ void list_clip(Fields& fields, SimulationSource& source) {
               "moves by one random affine motion. difference: each pixel's log intensity moves on "
               "a line from frame to frame. stills: the clips that convert makes of photographs "
               "(pairs from stills, with frames), each a recording with its labels beside it.");
-  fields.only_for({kAffine, kClip, kDifference})
+  const auto kinds = [](auto&& holds) { return words_where(kSimulationMethodWords, holds); };
+  fields
+      .only_for(
+          kinds([](const auto& row) { return row.value.motion != SimulationMethod::kStills; }))
       .find("frames_per_second", source.frames_per_second, numbers(1e-6, 1e6),
             "frame rate of the whole clip. Default: the video's own times; 30 for images.");
   fields.find("first_frame", source.first_frame, integers(0, kMostClipFrames),
@@ -45,21 +47,25 @@ void list_clip(Fields& fields, SimulationSource& source) {
       "frame_count", source.frame_count, integers(0, kMostClipFrames),
       "How many frames are used, with methods affine and stills how many images; 0 = to "
       "the end.");
-  if (count && source.frame_count == 1 && fields.is_sound("method") && source.method != kAffine &&
-      source.method != kStills) {
+  if (count && source.frame_count == 1 && fields.is_sound("method") &&
+      !source.method.records_each()) {
     count->fault("0 (to the end) or at least 2 frames, since events lie between frames");
   }
-  fields.rule(
-      R"({"if": {"required": ["method"], "properties": {"method": {"enum": ["affine", "stills"]}}},
-                  "else": {"properties": {"frame_count": {"not": {"const": 1}}}}})");
+  Fields::Schema rule = Fields::Schema::parse(R"({
+      "if": {"required": ["method"], "properties": {"method": {"enum": []}}},
+      "else": {"properties": {"frame_count": {"not": {"const": 1}}}}})");
+  rule["if"]["properties"]["method"]["enum"] =
+      kinds([](const auto& row) { return row.value.records_each(); });
+  fields.rule(rule);
   fields.find("frame_step", source.frame_step, integers(1, 100),
               "Uses each n-th frame, with method stills each n-th still.");
-  fields.only_for({kAffine}).find("frames_per_image", source.frames_per_image, integers(2, 100),
-                                  "frames of the motion of one image.");
-  fields.only_for({kAffine}).find("max_displacement_px", source.max_displacement_px,
-                                  numbers(0.1, 100),
-                                  "how far an image moves from one of its frames to the next is "
-                                  "drawn uniformly from 0 to this, for each image.");
+  auto of_one_frame =
+      fields.only_for(kinds([](const auto& row) { return row.value.moves_one_frame(); }));
+  of_one_frame.find("frames_per_image", source.frames_per_image, integers(2, 100),
+                    "frames of the motion of one image.");
+  of_one_frame.find("max_displacement_px", source.max_displacement_px, numbers(0.1, 100),
+                    "how far an image moves from one of its frames to the next is drawn uniformly "
+                    "from 0 to this, for each image.");
 }
 
 /// "a" for "a-000": the source of numbered recordings that could have one of this name.
@@ -74,9 +80,7 @@ void check_names(const std::vector<StrictValue>& elements,
                  const std::vector<SimulationSource>& sources) {
   std::set<std::string_view> names, numbered_names;
   for (const SimulationSource& source : sources) {
-    if (source.method == SimulationMethod::kAffine || source.method == SimulationMethod::kStills) {
-      numbered_names.insert(source.name);
-    }
+    if (source.method.records_each()) numbered_names.insert(source.name);
   }
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const std::string& name = sources[i].name;

@@ -36,11 +36,9 @@ Bytes zeros(std::size_t count, const std::string& name) try {
 std::optional<InputFile> InputFile::open(const std::filesystem::path& file, std::string& reason) {
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) {
-    if (errno == EMFILE || errno == ENFILE) {
-      throw LimitReached("cannot open " + file.string() + ": " + std::strerror(errno) +
-                         " (ulimit -n sets how many the process may have)");
-    }
-    reason = std::strerror(errno);
+    const int error = errno;
+    require_open_files_left(error, file.string());
+    reason = std::strerror(error);
     return std::nullopt;
   }
   struct stat status {};
@@ -216,6 +214,12 @@ std::string read_text_file(const std::filesystem::path& file) {
   std::string reason;
   if (auto bytes = try_read_file(file, reason)) return *std::move(bytes);
   throw std::runtime_error("cannot read " + file.string() + ": " + reason);
+}
+
+void require_open_files_left(int error, const std::string& name) {
+  if (error != EMFILE && error != ENFILE) return;
+  throw LimitReached("cannot open " + name + ": " + std::strerror(error) +
+                     " (ulimit -n sets how many the process may have)");
 }
 
 std::size_t files_to_keep_open(std::size_t most) {

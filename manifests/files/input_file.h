@@ -105,6 +105,9 @@ std::string read_text_file(const std::filesystem::path& file);
 /// Throws InputError unless it can be opened as an InputFile. Thread safe.
 void require_regular_file(const std::filesystem::path& file);
 
+/// Throws LimitReached naming the file if `error`, an errno, says that no more files may be open.
+void require_open_files_left(int error, const std::string& name);
+
 /// How many files may be kept open for later: a quarter of those that the process may have open, at
 /// least 8, and no more than `most`. Thread safe.
 std::size_t files_to_keep_open(std::size_t most);

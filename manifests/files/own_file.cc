@@ -1,7 +1,7 @@
 #include "manifests/files/own_file.h"
 
 #include <algorithm>
-#include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -74,13 +74,18 @@ bool is_replaceable(const fs::path& file, OwnFile kind) {
   std::error_code unknown;
   if (!fs::exists(fs::symlink_status(file, unknown))) return true;
   const OwnFileRow& row = kOwnFiles[static_cast<std::size_t>(kind)];
+  if (!fs::is_regular_file(file, unknown)) return false;  // a folder is nobody's to replace
   std::string reason;
   const auto found = InputFile::open(file, reason);
-  if (!found) return false;  // a folder, or what may not be read, is nobody's to replace
+  if (!found) throw std::runtime_error("cannot read " + file.string() + ": " + reason);
   if (found->size_bytes() == 0) return true;
-  std::string start(row.begins.size(), '\0');
-  return found->read_some(0, start) == start.size() && start == row.begins &&
-         (row.mark.empty() || contains(*found, row.mark));
+  try {
+    std::string start(row.begins.size(), '\0');
+    return found->read_some(0, start) == start.size() && start == row.begins &&
+           (row.mark.empty() || contains(*found, row.mark));
+  } catch (const InputError& error) {  // of the disk, and no input here
+    throw std::runtime_error(error.what());
+  }
 }
 
 bool has_own_mark(std::string_view beginning) {

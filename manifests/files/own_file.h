@@ -32,7 +32,8 @@ enum class OwnFile {
 };
 
 /// Whether `file` may be written as `kind`: nothing is there, an empty file, or one that the
-/// program wrote as that kind. Of a damaged file what is left of it decides.
+/// program wrote as that kind. Of a damaged file what is left of it decides. Throws
+/// std::runtime_error if it cannot be read.
 bool is_replaceable(const std::filesystem::path& file, OwnFile kind);
 
 /// Whether a file with this beginning is one that the program wrote, of any kind, as far as that

@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "manifests/values/rows.h"
+
 namespace eventgan {
 
 enum class DatasetKind {
@@ -37,7 +39,7 @@ struct WindowSpec {
 enum class LabelFormat { kMot, kCoco, kYolo, kVoc, kCsv, kMasks };
 
 /// A format of labels. What finds and reads them is in its own file
-/// (stages/frames/own_labels/own_labels.h).
+/// (stages/frames/own_labels/label_readers.h).
 struct LabelFormatRow {
   std::string_view word;  ///< the manifest's
   LabelFormat value;
@@ -52,9 +54,10 @@ inline constexpr std::array kLabelFormats{
     LabelFormatRow{"voc", LabelFormat::kVoc, "Pascal VOC"},
     LabelFormatRow{"csv", LabelFormat::kCsv, "CSV"},
     LabelFormatRow{"masks", LabelFormat::kMasks, "index masks"}};
+static_assert(are_in_order(kLabelFormats));
 
 /// What a manifest may say of a kind of dataset. What finds and reads it is in its own file
-/// (stages/frames/dataset_kinds.h).
+/// (stages/frames/sources/dataset_kinds.h).
 struct DatasetRow {
   std::string_view word;  ///< the manifest's, and that of shards, plans and reports
   DatasetKind value;
@@ -128,6 +131,7 @@ inline constexpr std::array kDatasets{
                .preset = "demo",
                .keys = {"frames_per_second", "labels"},
                .is_own = true}};
+static_assert(are_in_order(kDatasets));
 
 /// A value's row. Throws std::invalid_argument for a number that is no value, which only a bad cast
 /// can make.

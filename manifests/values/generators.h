@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "manifests/values/rows.h"
+
 namespace eventgan {
 
 /// What makes the volumes: the EventGAN network, a model to compare it with, or a camera.
@@ -32,6 +34,10 @@ struct GeneratorRow {
   bool has_sensor_settings = false;
   /// It looks at what is seen between two frames, where that is known: of stills (FramesBetween).
   bool sees_between = false;
+  /// It looks at the previous frame alone, under a motion that is drawn: `realism` takes the mean
+  /// of several, and `simulate` makes a recording of each image.
+  bool moves_one_frame = false;
+  std::string_view simulation = {};  ///< what `simulate` calls it; empty: it does not have it
 };
 
 /// Every kind, in the order in which messages list them.
@@ -48,16 +54,20 @@ inline constexpr std::array kGenerators{
                  .title = "ESIM, a random motion of one frame",
                  .keys = {"sensor", "duration_s", "max_displacement_px"},
                  .has_sensor_settings = true,
-                 .sees_between = true},
+                 .sees_between = true,
+                 .moves_one_frame = true,
+                 .simulation = "affine"},
     GeneratorRow{.word = "difference",
                  .value = GeneratorKind::kDifference,
                  .title = "log difference of two frames",
                  .keys = {"sensor", "duration_s"},
-                 .has_sensor_settings = true},
+                 .has_sensor_settings = true,
+                 .simulation = "difference"},
     GeneratorRow{.word = "events",
                  .value = GeneratorKind::kEvents,
                  .title = "events of a camera",
                  .needs_frames = false}};
+static_assert(are_in_order(kGenerators));
 
 /// The kind's row. Throws std::invalid_argument for a number that is no kind, which only a bad cast
 /// can make.

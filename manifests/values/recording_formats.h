@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "manifests/values/rows.h"
+
 namespace eventgan {
 
 /// How a recording of an event camera lies on disk (manifests/guides/real_events.md).
@@ -24,7 +26,7 @@ enum class RecordingFormat {
 };
 
 /// What manifests, commands and pages may say of a format. What recognises and opens it is in its
-/// own file (stages/recordings/detail/recording_reader.h).
+/// own file (stages/recordings/readers/detail/recording_reader.h).
 struct RecordingFormatRow {
   std::string_view word;  ///< the training manifest's
   RecordingFormat value;
@@ -109,6 +111,7 @@ inline constexpr std::array kRecordingFormats{
                        .has_frames = false,
                        .keys = {"sensor", "columns"},
                        .extensions = {".npy", ".npz", ".csv"}}};
+static_assert(are_in_order(kRecordingFormats));
 
 /// The format's row. Throws std::invalid_argument for a number that is no format, which only a bad
 /// cast can make.

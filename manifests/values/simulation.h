@@ -8,16 +8,28 @@
 
 #include "manifests/values/events.h"
 #include "manifests/values/frames.h"
+#include "manifests/values/generators.h"
 #include "manifests/values/job.h"
 
 namespace eventgan {
 
 /// How the intensity between the given images comes about.
-enum class SimulationMethod {
-  kAffine,      ///< ESIM as the EventGAN paper uses it: a random affine motion of each image
-  kClip,        ///< a real clip, frames between its frames by dense optical flow
-  kDifference,  ///< log intensity moves on a line from each frame to the next
-  kStills       ///< clips made of stills: layers move on their own
+struct SimulationMethod {
+  enum Motion {
+    kClip,      ///< a real clip, frames between its frames by dense optical flow
+    kStills,    ///< clips made of stills: layers move on their own
+    kSimulator  ///< as a simulator has it
+  };
+  Motion motion = kClip;
+  GeneratorKind simulator = {};  ///< with kSimulator: one of kGenerators that `simulate` has
+
+  bool operator==(const SimulationMethod&) const = default;
+
+  bool moves_one_frame() const {
+    return motion == kSimulator && generator_row(simulator).moves_one_frame;
+  }
+  /// Whether each image gives a recording, not all of them one.
+  bool records_each() const { return motion == kStills || moves_one_frame(); }
 };
 
 /// What a recording is written as, and the ending of its file.
@@ -27,19 +39,19 @@ enum class SimulatedFile {
   kRaw      ///< Prophesee's RAW, EVT 3.0: events
 };
 
-/// A clip (a video, a folder of images) and how recordings are made of it; with kStills the
+/// A clip (a video, a folder of images) and how recordings are made of it; of stills the
 /// manifest of a job of `convert`, and its clips.
 struct SimulationSource {
   std::string path;  ///< as written in the manifest
   std::string name;  ///< the recording's file name without its ending; default: the path's stem
-  SimulationMethod method = SimulationMethod::kClip;
-  std::optional<double> frames_per_second;  ///< default: the video's, 30 for images; not of kStills
-  std::int64_t first_frame = 0;             ///< of kStills, as the next two: of the stills
-  std::int64_t frame_count = 0;  ///< 0: to the end. With kAffine the number of images used
+  SimulationMethod method;
+  std::optional<double> frames_per_second;  ///< default: the video's, 30 for images; not of stills
+  std::int64_t first_frame = 0;             ///< of stills, as the next two: of these
+  std::int64_t frame_count = 0;  ///< 0: to the end. With moves_one_frame the number of images
   std::int64_t frame_step = 1;   ///< takes each n-th frame, 1..100
-  int frames_per_image = 7;      ///< kAffine: frames of the motion of one image, 2..100
-  /// kAffine: how far an image moves from one of its frames to the next is drawn uniformly from 0
-  /// to this, for each image; 0.1..100.
+  int frames_per_image = 7;      ///< moves_one_frame: frames of an image's motion, 2..100
+  /// moves_one_frame: how far an image moves from one of its frames to the next is drawn uniformly
+  /// from 0 to this, for each image; 0.1..100.
   double max_displacement_px = 5;
 };
 

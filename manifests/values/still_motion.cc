@@ -142,6 +142,21 @@ bool holds_pixel(const Rectangle& box, const std::optional<ImageSize>& image) {
   return between(box.left, box.right, size.width) && between(box.top, box.bottom, size.height);
 }
 
+/// Whether a pixel's centre in the image lies in the outline: else nobody sees it move.
+bool covers_pixel(Outline outline, ImageSize image) {
+  const Rectangle around = bounds(outline);
+  const auto within = [](double edge, int side) { return std::clamp(edge, 0.0, double(side)); };
+  const double left = within(std::floor(around.left), image.width);
+  const double top = within(std::floor(around.top), image.height);
+  const ImageSize size{static_cast<int>(within(std::ceil(around.bottom), image.height) - top),
+                       static_cast<int>(within(std::ceil(around.right), image.width) - left)};
+  for (auto& ring : outline.rings) {
+    for (Point& corner : ring) corner = {corner.x - left, corner.y - top};
+  }
+  const GreyImage mask = mask_of(outline, size);
+  return std::ranges::any_of(mask.pixels, [](std::uint8_t pixel) { return pixel != 0; });
+}
+
 }  // namespace
 
 ImageMotion draw_motion(const StillsSpec& spec, const CounterRandom& pair) {
@@ -157,7 +172,9 @@ void settle_motion(const PairSpec& spec, const PairKey& key, const std::vector<B
   const auto& objects = spec.stills->objects;
   // What has no outline is cut out of its box.
   const auto may_move = [&](const Box& box) {
-    return !box.ignore && holds_pixel(box.outline.empty() ? box.xyxy : bounds(box.outline), image);
+    if (box.ignore) return false;
+    if (box.outline.empty()) return holds_pixel(box.xyxy, image);
+    return image ? covers_pixel(box.outline, *image) : holds_pixel(bounds(box.outline), image);
   };
   pair.objects.clear();
   if (!objects || std::ranges::none_of(boxes, may_move)) {
@@ -367,7 +384,12 @@ std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& s
                                   int frames) {
   const double side = std::min(image.height, image.width);
   const PathLimits of_image{0.07 * side, 2, 0.02}, of_object{0.3 * side, 10, 0.15};
-  const bool any_moves = spec.objects && std::ranges::any_of(boxes, moves_alone);
+  std::vector<bool> moves;
+  for (const Box& box : boxes) {
+    moves.push_back(spec.objects && moves_alone(box) && covers_pixel(box.outline, image));
+  }
+  const auto is_carried = [&](std::size_t k) { return carrier[k] != k && moves[carrier[k]]; };
+  const bool any_moves = std::ranges::find(moves, true) != moves.end();
   const bool image_rests = any_moves && draw_motion(spec, still) == ImageMotion();
   std::optional<Path> path;
   if (!image_rests) {
@@ -377,9 +399,9 @@ std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& s
   std::vector<std::optional<Path>> paths(boxes.size());
   StillPose pose{{}, std::vector<std::optional<ImageMotion>>(any_moves ? boxes.size() : 0)};
   for (std::size_t k = 0; k < pose.objects.size(); ++k) {
-    if (!moves_alone(boxes[k])) continue;
+    if (!moves[k]) continue;
     pose.objects[k] = ImageMotion();
-    if (carrier[k] != k) continue;
+    if (is_carried(k)) continue;
     const CounterRandom random = still.keyed("objects").keyed(std::to_string(k));
     const auto& objects = *spec.objects;
     if (!image_rests && random.uniform(kRests) < objects.rests) continue;
@@ -399,7 +421,7 @@ std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& s
       pose.objects[k] = paths[k]->at();
     }
     for (std::size_t k = 0; k < pose.objects.size(); ++k) {
-      if (!pose.objects[k] || carrier[k] == k) continue;
+      if (!pose.objects[k] || !is_carried(k)) continue;
       const std::size_t by = carrier[k];
       pose.objects[k] =
           carried(pose.objects[by].value(), centre_of(boxes[by].xyxy), centre_of(boxes[k].xyxy));

@@ -72,7 +72,7 @@ std::vector<std::size_t> carriers(const std::vector<Box>& boxes);
 /// drawn as the motions of single pairs are; directions change slowly, and now and then a thing
 /// pauses. The image stays where clip_window sees nothing beyond it. An object moves by a quarter
 /// of its size a frame at most (the root of its box's area), and as its carrier does, one of
-/// `carriers`. Pure.
+/// `carriers`. An outline that holds no pixel's centre in the image is part of it. Pure.
 std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& still,
                                   const std::vector<Box>& boxes,
                                   const std::vector<std::size_t>& carriers, ImageSize image,
@@ -83,10 +83,10 @@ std::vector<StillPose> clip_poses(const StillsSpec& spec, const CounterRandom& s
 ImageMotion draw_motion(const StillsSpec& spec, const CounterRandom& pair);
 
 /// Gives a planned still what its labels decide: FramePair::objects, of boxes whose outline or, to
-/// cut one out of, whose area holds a pixel of the image, and are not to be ignored; and to an
-/// image that was to rest, if no object moves before it, the motion that it would have had, since a
-/// sensor would see nothing. `image`: its size; not known, it has every pixel, and the motion may
-/// be settled again once it is. Pure; does nothing to other pairs.
+/// cut one out of, whose area holds a pixel's centre in the image, and are not to be ignored; and
+/// to an image that was to rest, if no object moves before it, the motion that it would have had,
+/// since a sensor would see nothing. `image`: its size; not known, it has every pixel, and the
+/// motion may be settled again once it is. Pure; does nothing to other pairs.
 void settle_motion(const PairSpec& spec, const PairKey& key, const std::vector<Box>& boxes,
                    const std::optional<ImageSize>& image, FramePair& pair);
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <optional>
@@ -106,11 +107,20 @@ inline constexpr std::array kStoredTypeWords{Word<StoredType>{"float32", StoredT
 inline constexpr std::array kPolicyWords{Word<ErrorPolicy>{"fail", ErrorPolicy::kFail},
                                          Word<ErrorPolicy>{"quarantine", ErrorPolicy::kQuarantine}};
 
-inline constexpr std::array kSimulationMethodWords{
-    Word<SimulationMethod>{"affine", SimulationMethod::kAffine},
-    Word<SimulationMethod>{"clip", SimulationMethod::kClip},
-    Word<SimulationMethod>{"difference", SimulationMethod::kDifference},
-    Word<SimulationMethod>{"stills", SimulationMethod::kStills}};
+/// The simulators' words and those of given motion, sorted.
+inline constexpr auto kSimulationMethodWords = [] {
+  constexpr auto has_word = [](const GeneratorRow& row) { return !row.simulation.empty(); };
+  std::array<Word<SimulationMethod>, 2 + std::ranges::count_if(kGenerators, has_word)> words{
+      {{"clip", {SimulationMethod::kClip}}, {"stills", {SimulationMethod::kStills}}}};
+  std::size_t count = 2;
+  for (const GeneratorRow& row : kGenerators) {
+    if (has_word(row)) {
+      words[count++] = {row.simulation, {SimulationMethod::kSimulator, row.value}};
+    }
+  }
+  std::ranges::sort(words, {}, &Word<SimulationMethod>::word);
+  return words;
+}();
 
 inline constexpr std::array kSimulatedFileWords{
     Word<SimulatedFile>{"hdf5", SimulatedFile::kHdf5},

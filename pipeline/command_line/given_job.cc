@@ -14,7 +14,7 @@
 #include "manifests/values/faults.h"
 #include "pipeline/command_line/standard_streams.h"
 #include "pipeline/planning/draft_manifest.h"
-#include "stages/frames/find_source.h"
+#include "stages/frames/sources/find_source.h"
 
 namespace eventgan {
 namespace {
@@ -144,6 +144,13 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
   job.findings = std::move(draft.findings);
   job.unwritten = file;
   return job;
+}
+
+fs::path job_folder(const GivenJob& job, const std::optional<fs::path>& output,
+                    std::optional<std::int64_t> limit) {
+  fs::path folder = job.output;  // which is `output`, if there is one
+  if (limit && !output) folder += fmt::format("-trial-{}", *limit);
+  return folder;
 }
 
 void keep_manifest(const GivenJob& job) {

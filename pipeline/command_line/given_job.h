@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -50,6 +51,12 @@ GivenJob read_given_job(const std::filesystem::path& given,
                         const std::optional<std::filesystem::path>& output,
                         const std::optional<std::string>& sensor = std::nullopt,
                         bool no_labels = false);
+
+/// Where the job is made: `output` (--output), or else its own folder, or for a trial of `limit`
+/// pairs OUT-trial-20 beside that.
+std::filesystem::path job_folder(const GivenJob& job,
+                                 const std::optional<std::filesystem::path>& output,
+                                 std::optional<std::int64_t> limit);
 
 /// Keeps the manifest before the job's plan is frozen, if that is left to do, and tells where. Of
 /// several workers that begin at once one writes it. Throws UsageError if that one wrote another,

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <exception>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <string>
 #include <system_error>
@@ -54,6 +55,15 @@ void add_grace_option(CLI::App& command, double& grace_s) {
                   "Seconds to finish the current shard after a signal; default: 20")
       ->check(CLI::Range(0.0, 1e9))
       ->option_text("SECONDS");
+}
+
+void add_limit_option(CLI::App& command, std::optional<std::int64_t>& limit) {
+  command
+      .add_option("--limit", limit,
+                  "Trial run: only N pairs, the first ones of each source, into OUTPUT-trial-N "
+                  "beside the manifest's output folder, or into --output")
+      ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()))
+      ->option_text("N");
 }
 
 void add_json_option(CLI::App& command, bool& json) {

@@ -34,6 +34,9 @@ void add_threads_option(CLI::App& command, int& threads);
 /// --grace SECONDS, of a run that makes shards.
 void add_grace_option(CLI::App& command, double& grace_s);
 
+/// --limit N: of a trial, into another folder (job_folder).
+void add_limit_option(CLI::App& command, std::optional<std::int64_t>& limit);
+
 /// --json
 void add_json_option(CLI::App& command, bool& json);
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "manifests/values/training.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace CLI {
 class App;

@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
-#include <limits>
 #include <memory>
 
 #include "manifests/values/job.h"
@@ -20,7 +19,7 @@
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"
 #include "pipeline/runtime/trace.h"
-#include "stages/frames/find_source.h"
+#include "stages/frames/sources/find_source.h"
 
 namespace eventgan {
 namespace {
@@ -107,11 +106,6 @@ int convert_and_report(const ConvertArguments& arguments, const GivenJob& given,
   return code == kComplete && !report.finalized && finalizes ? kFailed : code;
 }
 
-/// OUT-trial-20 beside OUT.
-fs::path trial_folder(fs::path output, std::int64_t limit) {
-  return output += fmt::format("-trial-{}", limit);
-}
-
 int run(const ConvertArguments& arguments) {
   const JobOptions& job = arguments.job;
   const StopSignal signal(shard_stopping_line(arguments.grace_s));
@@ -122,8 +116,7 @@ int run(const ConvertArguments& arguments) {
   options.grace_s = arguments.grace_s;
   options.since_stop_request = [&] { return signal.seconds_since_request(); };
   options.limit = arguments.limit;
-  fs::path folder = given.output;
-  if (options.limit && !job.output) folder = trial_folder(folder, *options.limit);
+  const fs::path folder = job_folder(given, job.output, options.limit);
   options.output = folder;
   options.threads = job.threads;
   options.overwrite = job.overwrite;
@@ -156,12 +149,7 @@ void add_convert_command(CLI::App& app, int& exit_code) {
                    "This worker's part of the plan: I/N (0 <= I < N) or all; default: as set in "
                    "the environment by SHARD_INDEX, Slurm, Kubernetes or Open MPI, otherwise all")
       ->option_text("I/N");
-  command
-      ->add_option("--limit", arguments->limit,
-                   "Trial run: convert only N pairs, the first ones of each source, into "
-                   "OUTPUT-trial-N beside the manifest's output folder, or into --output")
-      ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()))
-      ->option_text("N");
+  add_limit_option(*command, arguments->limit);
   command->add_flag("--no-finalize", arguments->no_finalize,
                     "Leave dataset.json and dataset.h5 to `eventgan finalize`; so does a part");
   command->add_option(kSensorOption, arguments->sensor, kSensorText)->option_text("WIDTHxHEIGHT");

@@ -22,6 +22,7 @@ namespace {
 
 const std::map<std::string, bool> kIgnored = {{"keep", true}, {"drop", false}};
 const std::map<std::string, bool> kIsFloat32 = {{"float16", false}, {"float32", true}};
+const std::map<std::string, bool> kIsPng = {{"npy", false}, {"png", true}};
 const std::map<std::string, EventCounts> kCounts = {{"poisson", EventCounts::kPoisson},
                                                     {"rounded", EventCounts::kRounded}};
 const std::map<std::string, EventFile> kEventFiles = {{"text", EventFile::kText},
@@ -120,6 +121,10 @@ void add_export_command(CLI::App& app, int& exit_code) {
   add("--full-scale", options.full_scale, "volume value that becomes 255; default: 1")
       ->check(CLI::Range(1e-6, 1e6))
       ->option_text("VALUE");
+  take_one_of(
+      add("--images", options.as_images,
+          "volumes as .npy (default), or as PNG of three channels, which stock loaders open"),
+      kIsPng);
   take_one_of(add("--dtype", arguments->is_float32, "type of the values; default: float16"),
               kIsFloat32);
   take_one_of(add("--counts", options.counts,

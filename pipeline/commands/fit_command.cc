@@ -20,7 +20,7 @@
 #include "pipeline/realism/volume_method.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/threads.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 namespace {

@@ -18,7 +18,7 @@
 #include "pipeline/commands/commands.h"
 #include "pipeline/planning/draft_manifest.h"
 #include "pipeline/runtime/errors.h"
-#include "stages/frames/find_source.h"
+#include "stages/frames/sources/find_source.h"
 
 namespace eventgan {
 namespace {

@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -19,8 +20,8 @@
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/threads.h"
-#include "stages/frames/find_source.h"
-#include "stages/recordings/event_index.h"
+#include "stages/frames/sources/find_source.h"
+#include "stages/recordings/order/event_index.h"
 
 namespace eventgan {
 namespace {
@@ -33,6 +34,7 @@ struct PlanArguments {
   std::optional<std::string> output;
   std::optional<std::string> sensor;
   bool no_labels = false;
+  std::optional<std::int64_t> limit;
   ProgressStyle progress = ProgressStyle::kAuto;
 };
 
@@ -51,8 +53,8 @@ void print_frozen(const std::filesystem::path& folder, const FrozenPlan& frozen,
             << count_text(std::ssize(frozen.plan.shards), "shard") << std::endl;
 }
 
-int freeze(const PlanArguments& arguments, const GivenJob& given, Plan plan) {
-  const std::filesystem::path& folder = given.output;
+int freeze(const PlanArguments& arguments, const GivenJob& given,
+           const std::filesystem::path& folder, Plan plan) {
   require_own_results(folder);
   std::filesystem::create_directories(folder);
   remove_stale_temporaries(folder);
@@ -69,13 +71,15 @@ int run(const PlanArguments& arguments) {
       read_given_job(arguments.manifest, arguments.output, arguments.sensor, arguments.no_labels);
   const JobManifest& manifest = given.manifest;
   const LoadedGenerator loaded = load_generator(manifest);
-  EventIndexes indexes(given.output / kEventIndexFile);
-  PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description(),
-                             {.show_phase = show_phases(arguments.progress)});
+  const std::filesystem::path folder = job_folder(given, arguments.output, arguments.limit);
+  EventIndexes indexes(folder / kEventIndexFile);
+  PlannedJob job =
+      make_plan(manifest, loaded.weights_hash, loaded.generator->description(),
+                {.show_phase = show_phases(arguments.progress), .limit = arguments.limit});
   for (const std::string& line : given.findings) tell(line);
   for (const std::string& warning : job.warnings) tell_warning(warning);
   if (arguments.freeze) {
-    const int exit_code = freeze(arguments, given, std::move(job.plan));
+    const int exit_code = freeze(arguments, given, folder, std::move(job.plan));
     indexes.save();
     return exit_code;
   }
@@ -98,6 +102,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
   command->add_option(kGivenJob, arguments->manifest, kGivenJobText)->required();
   command->add_option(kSensorOption, arguments->sensor, kSensorText)->option_text("WIDTHxHEIGHT");
   command->add_flag(kNoLabelsOption, arguments->no_labels, kNoLabelsText);
+  add_limit_option(*command, arguments->limit);
   add_threads_option(*command, arguments->threads);
   add_json_option(*command, arguments->json);
   auto* freeze_flag =

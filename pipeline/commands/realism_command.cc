@@ -9,10 +9,13 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "manifests/documents/sensor_document.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/generators.h"
+#include "manifests/values/job.h"
 #include "pipeline/command_line/options.h"
 #include "pipeline/command_line/recording_arguments.h"
 #include "pipeline/command_line/standard_streams.h"
@@ -20,7 +23,7 @@
 #include "pipeline/commands/commands.h"
 #include "pipeline/realism/realism.h"
 #include "pipeline/runtime/errors.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 namespace {
@@ -35,9 +38,13 @@ struct RealismArguments {
   bool json = false;
 };
 
-const std::map<std::string, RealismMethod> kMethods{{"network", RealismMethod::kNetwork},
-                                                    {"difference", RealismMethod::kDifference},
-                                                    {"esim", RealismMethod::kEsim}};
+const std::map<std::string, GeneratorKind> kMethods = [] {
+  std::map<std::string, GeneratorKind> methods;
+  for (const GeneratorKind method : realism_methods()) {
+    methods.emplace(to_string(method), method);
+  }
+  return methods;
+}();
 
 double number_in(const std::string& text, const std::string& expected) {
   double value = 0;
@@ -94,11 +101,14 @@ int run_realism(const RealismArguments& arguments) {
 
 void add_methods(CLI::App& command, RealismArguments& arguments) {
   RealismOptions& options = arguments.options;
-  take_one_of(command
-                  .add_option("--with", options.methods,
-                              "Methods to compare: network,difference,esim; default: all")
-                  ->delimiter(','),
-              kMethods)
+  std::vector<std::string_view> words;
+  for (const GeneratorKind method : options.methods) words.push_back(to_string(method));
+  take_one_of(
+      command
+          .add_option("--with", options.methods,
+                      fmt::format("Methods to compare: {}; default: all", fmt::join(words, ",")))
+          ->delimiter(','),
+      kMethods)
       ->option_text("METHOD,...");
   command.add_option(
       "--weights", options.weights,

@@ -27,8 +27,8 @@
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/runtime/trace.h"
-#include "stages/frames/class_numbers.h"
-#include "stages/recordings/event_index.h"
+#include "stages/frames/sources/class_numbers.h"
+#include "stages/recordings/order/event_index.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {

@@ -13,6 +13,7 @@
 #include "stages/events/event_volume.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/sources/open_dataset.h"
 #include "stages/labels/label_mapping.h"
 
 namespace eventgan {

@@ -12,7 +12,7 @@
 #include "manifests/values/job.h"
 #include "manifests/values/pair_key.h"
 #include "manifests/values/shard.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/pair_reader.h"
 #include "stages/generator/generator.h"
 #include "stages/shards/codec/volume_codec.h"

@@ -10,9 +10,9 @@
 #include "manifests/values/job.h"
 #include "manifests/values/labels.h"
 #include "manifests/values/shard.h"
-#include "stages/frames/class_numbers.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/sources/class_numbers.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_tables.h"
 

@@ -15,7 +15,7 @@
 #include "pipeline/exports/detail/recordings.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/preview/preview_reader.h"
-#include "stages/recordings/aedat4_writer.h"
+#include "stages/recordings/writers/aedat4_writer.h"
 
 namespace eventgan {
 namespace {

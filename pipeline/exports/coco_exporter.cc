@@ -182,24 +182,36 @@ class KeptIds {
   bool persons_agree_ = true;
 };
 
-/// instances_SPLIT.json, person_keypoints_SPLIT.json, volumes/SPLIT/NAME.npy.
+/// instances_SPLIT.json, person_keypoints_SPLIT.json, volumes/SPLIT/NAME.npy or
+/// images/SPLIT/NAME.png.
 class CocoExporter : public Exporter {
  public:
   CocoExporter(const ExportInput& input, const ExportOptions& options)
-      : numbers_(input, options, 1), keep_ignored_(options.keep_ignored.value_or(true)) {
+      : numbers_(input, options, 1),
+        keep_ignored_(options.keep_ignored.value_or(true)),
+        full_scale_(options.full_scale),
+        as_images_(options.as_images) {
+    if (!as_images_ && full_scale_ != 1) {
+      throw UsageError("--full-scale: expected --images png with --to coco, got none");
+    }
     if (options.classes) return;
     kept_ids_.emplace(input);
     numbers_.renumber(kept_ids_->categories(), 1);
   }
 
   std::string settings() const override {
-    return fmt::format("classes {}\nignored {}\n", numbers_.text(),
-                       keep_ignored_ ? "keep" : "drop");
+    return fmt::format("classes {}\nignored {}\n{}", numbers_.text(),
+                       keep_ignored_ ? "keep" : "drop",
+                       as_images_ ? fmt::format("images png, full scale {}\n", full_scale_) : "");
   }
 
   void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
                    ExportFolder::Step& step) const override {
     work.for_each_sample(shard, reader, [&](const OutgoingSample& sample) {
+      if (as_images_) {
+        write_polarity_image(sample, "images/" + sample.source.split, full_scale_, step);
+        return;
+      }
       const VolumeShape& shape = reader.header().volume;
       const std::vector<float> volume = reader.volume(sample.slot);
       std::vector<std::uint16_t> halves(volume.size());
@@ -207,7 +219,7 @@ class CocoExporter : public Exporter {
       const std::vector<std::size_t> sides{static_cast<std::size_t>(shape.channels()),
                                            static_cast<std::size_t>(shape.size.height),
                                            static_cast<std::size_t>(shape.size.width)};
-      step.write(volume_name(sample), npy_file("<f2", sides, halves));
+      step.write(file_name(sample), npy_file("<f2", sides, halves));
     });
   }
 
@@ -233,8 +245,9 @@ class CocoExporter : public Exporter {
   }
 
  private:
-  static std::string volume_name(const OutgoingSample& sample) {
-    return "volumes/" + sample.source.split + "/" + sample.name + ".npy";
+  std::string file_name(const OutgoingSample& sample) const {
+    return (as_images_ ? "images/" : "volumes/") + sample.source.split + "/" + sample.name +
+           (as_images_ ? ".png" : ".npy");
   }
 
   static bool is_for(const ExportShard& shard, const ExportWork& work, bool persons) {
@@ -314,7 +327,7 @@ class CocoExporter : public Exporter {
     work.walk(shards, [&](const OutgoingSample& sample) {
       ++place;
       if (!is_for(sample.shard, work, persons)) return;
-      file.add(coco_image(image_id(sample, place), volume_name(sample),
+      file.add(coco_image(image_id(sample, place), file_name(sample),
                           sample.reader.header().volume.size, sample.labels.sample_id));
     });
     file.begin_list("annotations");
@@ -370,18 +383,20 @@ class CocoExporter : public Exporter {
   ClassNumbers numbers_;
   std::optional<KeptIds> kept_ids_;  ///< none where the user numbers the classes
   bool keep_ignored_;
+  double full_scale_;
+  bool as_images_;
 };
 
 }  // namespace
 
 ExportFormat coco_format() {
-  return {
-      .word = "coco",
-      .title = "COCO's JSON for boxes and for keypoints of persons, event volumes as .npy",
-      .need = LabelNeed::kBoxesOrJoints,
-      .options = {"--classes", "--ignored"},
-      .files = {"instances_SPLIT.json", "person_keypoints_SPLIT.json", "volumes/SPLIT/NAME.npy"},
-      .make = make_exporter<CocoExporter>};
+  return {.word = "coco",
+          .title = "COCO's JSON for boxes and for keypoints of persons, event volumes as .npy",
+          .need = LabelNeed::kBoxesOrJoints,
+          .options = {"--classes", "--ignored", "--full-scale", "--images"},
+          .files = {"instances_SPLIT.json", "person_keypoints_SPLIT.json", "volumes/SPLIT/NAME.npy",
+                    "images/SPLIT/NAME.png"},
+          .make = make_exporter<CocoExporter>};
 }
 
 }  // namespace eventgan

@@ -6,7 +6,7 @@
 
 #include "pipeline/exports/detail/recordings.h"
 #include "stages/exports/sampled_events.h"
-#include "stages/recordings/mvsec_writer.h"
+#include "stages/recordings/writers/mvsec_writer.h"
 
 namespace eventgan {
 namespace {

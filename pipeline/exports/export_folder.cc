@@ -12,6 +12,7 @@
 #include "manifests/documents/json_text.h"
 #include "manifests/files/atomic_file.h"
 #include "manifests/files/input_file.h"
+#include "manifests/files/sha256.h"
 #include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
 #include "pipeline/exports/export_job.h"
@@ -219,14 +220,22 @@ void ExportFolder::begin(const std::string& step) {
   if (fs::remove(folder_ / kExportDescription)) sync_to_disk(folder_);
 }
 
+ExportFolder::NameHash ExportFolder::hash_of(const std::string& name) {
+  constexpr std::size_t kDigits = 16;
+  const std::string hex = sha256_hex(name);
+  return {std::stoull(hex.substr(0, kDigits), nullptr, 16),
+          std::stoull(hex.substr(kDigits, kDigits), nullptr, 16)};
+}
+
 void ExportFolder::require_own_name(const std::string& relative) {
   std::string small = relative;
   std::ranges::transform(small, small.begin(), [](char c) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   });
-  const std::size_t exact = std::hash<std::string>()(relative);
+  const NameHash exact = hash_of(relative);
+  const NameHash folded = hash_of(small);
   const std::lock_guard lock(mutex_);
-  if (names_.try_emplace(std::hash<std::string>()(small), exact).first->second == exact) return;
+  if (names_.try_emplace(folded, exact).first->second == exact) return;
   throw InputError("expected names of files that differ in more than the case of letters, got " +
                    relative + " beside another, in " + folder_.string() +
                    " (Windows and macOS take both for one: rename the image or sequence)");

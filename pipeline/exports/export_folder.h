@@ -1,12 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <mutex>
 #include <set>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 #include <utility>
 
 namespace eventgan {
@@ -75,8 +76,11 @@ class ExportFolder {
   std::filesystem::path folder_;
   std::mutex mutex_;
   std::set<std::filesystem::path> made_;
+  /// The first half of a SHA-256.
+  using NameHash = std::array<std::uint64_t, 2>;
+  static NameHash hash_of(const std::string& name);
   /// Hashes, since there may be millions: of each name in small letters, of the name as it is.
-  std::unordered_map<std::size_t, std::size_t> names_;
+  std::map<NameHash, NameHash> names_;
   bool has_begun_ = false;
 };
 

@@ -51,8 +51,9 @@ struct ExportOptions {
   std::vector<std::string> splits;               ///< none: all
   std::optional<std::filesystem::path> classes;  ///< JSON, class name → number or null
   std::optional<bool>
-      keep_ignored;       ///< whether boxes to ignore are kept; unset: as the format does
-  double full_scale = 1;  ///< the value that becomes 255, > 0
+      keep_ignored;        ///< whether boxes to ignore are kept; unset: as the format does
+  double full_scale = 1;   ///< the value that becomes 255, > 0
+  bool as_images = false;  ///< volumes as PNG images of three channels
   StoredType dtype = StoredType::kFloat16;  ///< or kFloat32
   EventCounts counts = EventCounts::kPoisson;
   EventFile event_file = EventFile::kText;

@@ -106,6 +106,13 @@ void write_image_pair(const OutgoingSample& sample, const std::string& folder, d
              npy_file("|u1", sides, channels_last(codes, sides[2])));
 }
 
+void write_polarity_image(const OutgoingSample& sample, const std::string& folder,
+                          double full_scale, ExportFolder::Step& step) {
+  step.write(folder + "/" + sample.name + ".png",
+             polarity_image_png(sample.reader.volume(sample.slot), sample.reader.header().volume,
+                                full_scale));
+}
+
 void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut& left_out) {
   // Normalised values end at 1; the statistics are of the values before that.
   const bool is_normalized = sample.reader.header().normalization == Normalization::kEta98;

@@ -27,6 +27,10 @@ class MpiiExporter : public Exporter {
     }
   }
 
+  std::vector<std::string> notes() const override {
+    return {"MMPose's MpiiDataset reads numbers as the images' names alone: for MMPose --to coco"};
+  }
+
   void account(const OutgoingSample& sample, LeftOut& left_out) const override {
     account_full_scale(sample, full_scale_, left_out);
     const JointChoice choice = choose_joints(sample.reader.header().label_schema);

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "pipeline/exports/detail/recordings.h"
-#include "stages/recordings/evt3_writer.h"
+#include "stages/recordings/writers/evt3_writer.h"
 
 namespace eventgan {
 namespace {

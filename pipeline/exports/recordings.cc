@@ -5,10 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <deque>
 #include <limits>
 #include <map>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
@@ -19,6 +17,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
 #include "manifests/values/pair_key.h"
+#include "manifests/values/recently_used.h"
 #include "manifests/values/text.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/archives/numpy_arrays.h"
@@ -150,20 +149,13 @@ class LastReaders {
   explicit LastReaders(const ExportInput& input) : input_(input) {}
 
   std::shared_ptr<const ShardReader> of(const ExportShard& shard) {
-    constexpr std::size_t kMost = 8;
-    const std::lock_guard lock(mutex_);
-    const auto known = std::ranges::find(readers_, &shard, &Entry::first);
-    if (known != readers_.end()) return known->second;
-    readers_.emplace_front(&shard, std::make_shared<ShardReader>(input_.open(shard)));
-    if (readers_.size() > kMost) readers_.pop_back();
-    return readers_.front().second;
+    return readers_.get(&shard,
+                        [&] { return std::make_shared<const ShardReader>(input_.open(shard)); });
   }
 
  private:
-  using Entry = std::pair<const ExportShard*, std::shared_ptr<const ShardReader>>;
   const ExportInput& input_;
-  std::mutex mutex_;
-  std::deque<Entry> readers_;
+  RecentlyUsed<const ExportShard*, std::shared_ptr<const ShardReader>> readers_{8};
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,8 @@ class YoloExporter : public Exporter {
   YoloExporter(const ExportInput& input, const ExportOptions& options)
       : numbers_(input, options, 0),
         keep_ignored_(options.keep_ignored.value_or(false)),
-        full_scale_(options.full_scale) {
+        full_scale_(options.full_scale),
+        as_images_(options.as_images) {
     if (const auto entry = numbers_.of(kDontCare); entry.fate == ClassNumbers::Fate::kKept) {
       throw UsageError(fmt::format(
           "--classes: expected no number for {}, whose boxes are all to be ignored, got {} (leave "
@@ -39,6 +41,11 @@ class YoloExporter : public Exporter {
       names_.push_back(name);
     }
     if (keep_ignored_) names_.push_back("ignored");
+    for (const ExportShard& shard : input.shards()) {
+      const ExportSource& source = input.source_of(shard);
+      if (source.has_boxes()) splits_[""].insert(source.split);
+      if (has_poses(source)) splits_[pose_folder(input, source)].insert(source.split);
+    }
     for (const ExportSource& source : input.sources()) {
       if (!has_poses(source)) continue;
       pose_text_ +=
@@ -57,8 +64,9 @@ class YoloExporter : public Exporter {
   }
 
   std::string settings() const override {
-    return fmt::format("classes {}\nignored {}\nfull scale {}\n{}", numbers_.text(),
-                       keep_ignored_ ? "keep" : "drop", full_scale_, pose_text_);
+    return fmt::format("classes {}\nignored {}\nfull scale {}\n{}{}", numbers_.text(),
+                       keep_ignored_ ? "keep" : "drop", full_scale_,
+                       as_images_ ? "images png\n" : "", pose_text_);
   }
 
   void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
@@ -68,11 +76,11 @@ class YoloExporter : public Exporter {
     work.for_each_sample(shard, reader, [&](const OutgoingSample& sample) {
       const std::string below = source.split + "/" + sample.name + ".txt";
       if (source.has_boxes()) {
-        write_image_pair(sample, "images/" + source.split, full_scale_, step);
+        write_image(sample, "images/" + source.split, step);
         step.write("labels/" + below, labels_of(sample));
       }
       if (has_poses(source)) {
-        write_image_pair(sample, pose + "images/" + source.split, full_scale_, step);
+        write_image(sample, pose + "images/" + source.split, step);
         step.write(pose + "labels/" + below, poses_of(sample));
       }
     });
@@ -90,8 +98,23 @@ class YoloExporter : public Exporter {
     for (const auto& [folder, of_it] : of_folder) write_lists(work, folder, of_it);
   }
 
+  /// Ultralytics' trainer stops where one is missing.
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes;
+    for (const auto& [folder, splits] : splits_) {
+      if (!splits.contains("train")) {
+        notes.push_back(folder + "data.yaml has no split train, which Ultralytics needs");
+      } else if (!splits.contains("val")) {
+        notes.push_back(folder +
+                        "data.yaml has val: train.txt, since there is no split val: scores are of "
+                        "what is trained on");
+      }
+    }
+    return notes;
+  }
+
   void account(const OutgoingSample& sample, LeftOut& left_out) const override {
-    account_full_scale(sample, full_scale_, left_out);
+    if (!as_images_) account_full_scale(sample, full_scale_, left_out);
     const ShardHeader& header = sample.reader.header();
     const auto take = [&](const auto&, const VolumeBox& box) {
       if (lines == Lines::kBoxes) return;
@@ -111,6 +134,15 @@ class YoloExporter : public Exporter {
  private:
   static bool has_poses(const ExportSource& source) {
     return lines == Lines::kBoxes && source.has_joints();
+  }
+
+  void write_image(const OutgoingSample& sample, const std::string& folder,
+                   ExportFolder::Step& step) const {
+    if (as_images_) {
+      write_polarity_image(sample, folder, full_scale_, step);
+    } else {
+      write_image_pair(sample, folder, full_scale_, step);
+    }
   }
 
   std::string labels_of(const OutgoingSample& sample) const {
@@ -178,7 +210,7 @@ class YoloExporter : public Exporter {
       work.walk(of_it, [&](const OutgoingSample& sample) {
         list += "./images/" + split + "/" + sample.name + ".png\n";
         const ShardHeader& header = sample.reader.header();
-        channels = header.volume.channels();
+        channels = as_images_ ? 3 : header.volume.channels();
         if (!folder.empty()) joint_names = choose_joints(header.label_schema).names;
       });
       step.write(folder + split + ".txt", list);
@@ -192,8 +224,10 @@ class YoloExporter : public Exporter {
   ClassNumbers numbers_;
   bool keep_ignored_;
   double full_scale_;
+  bool as_images_;
   std::string pose_text_;  ///< which joints are in which of the folders of persons
   std::vector<std::string> names_;
+  std::map<std::string, std::set<std::string>> splits_;  ///< by the folder of a data.yaml
 };
 
 }  // namespace
@@ -202,7 +236,7 @@ ExportFormat yolo_format() {
   return {.word = "yolo",
           .title = "YOLO's text files for boxes and poses, images, volumes as .npy",
           .need = LabelNeed::kBoxesOrJoints,
-          .options = {"--classes", "--ignored", "--full-scale"},
+          .options = {"--classes", "--ignored", "--full-scale", "--images"},
           .files = {"images/SPLIT/NAME.png", "images/SPLIT/NAME.npy", "labels/SPLIT/NAME.txt",
                     "SPLIT.txt", "data.yaml", "pose[-N]/images/SPLIT/NAME.png",
                     "pose[-N]/images/SPLIT/NAME.npy", "pose[-N]/labels/SPLIT/NAME.txt",
@@ -214,7 +248,7 @@ ExportFormat yolo_seg_format() {
   return {.word = "yolo-seg",
           .title = "YOLO's text files for segmentation, images, volumes as .npy",
           .need = LabelNeed::kBoxes,
-          .options = {"--classes", "--ignored", "--full-scale"},
+          .options = {"--classes", "--ignored", "--full-scale", "--images"},
           .files = {"images/SPLIT/NAME.png", "images/SPLIT/NAME.npy", "labels/SPLIT/NAME.txt",
                     "SPLIT.txt", "data.yaml"},
           .make = make_exporter<YoloExporter<Lines::kOutlines>>};

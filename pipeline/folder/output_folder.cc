@@ -4,13 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <istream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <streambuf>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -36,13 +34,19 @@ constexpr char kRunName[] = "run.json";
 constexpr char kManifestFolder[] = "manifest_folder";
 constexpr char kManifestFolderBytes[] = "manifest_folder_bytes";  // of a name that is not UTF-8
 
+/// plan.json cannot be read to its end, which says nothing of the plan.
+class ReadingFailed : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// A file that is hashed as it is read: what was parsed and what was hashed are the same bytes, and
-/// a large file is read once. To be read through a std::istream; its errors are std::system_error
+/// a large file is read once. To be read through a std::istream; its errors are ReadingFailed
 /// naming the path, which the stream passes on if its exceptions include badbit.
 class HashedFile : public std::streambuf {
  public:
   explicit HashedFile(const fs::path& file)
-      : path_(file), file_(InputFile::open(file, reason_)), block_(std::size_t{1} << 20) {}
+      : file_(InputFile::open(file, reason_)), block_(std::size_t{1} << 20) {}
 
   bool is_open() const { return file_.has_value(); }
   const std::string& why_not() const { return reason_; }
@@ -56,8 +60,8 @@ class HashedFile : public std::streambuf {
     std::size_t size = 0;
     try {
       size = file_->read_some(offset_, block_);
-    } catch (const InputError&) {
-      throw std::system_error(errno, std::generic_category(), "cannot read " + path_.string());
+    } catch (const InputError& error) {
+      throw ReadingFailed(error.what());
     }
     if (size == 0) return traits_type::eof();
     offset_ += size;
@@ -67,7 +71,6 @@ class HashedFile : public std::streambuf {
   }
 
  private:
-  fs::path path_;
   std::string reason_;
   std::optional<InputFile> file_;
   std::uint64_t offset_ = 0;
@@ -92,7 +95,7 @@ Frozen read_plan_file(const fs::path& folder, const Read& read) {
     stream.exceptions(std::ios::badbit);  // else an error of reading would pass for the end
     auto plan = read(stream, file.string());
     return {std::move(plan), hashed.hash_of_read()};
-  } catch (const std::system_error&) {
+  } catch (const ReadingFailed&) {
     throw;  // the file system's trouble, not the plan's: starting again would be the wrong advice
   } catch (const UnreadableVersion&) {
     throw;
@@ -325,9 +328,11 @@ void require_own_results(const fs::path& folder) {
 }
 
 void require_own_shard(const fs::path& folder, const std::string& shard) {
-  const fs::path record = folder / commit_record_name(shard);
-  require_replaceable(record, OwnFile::kCommitRecord);
-  if (!fs::exists(record)) require_replaceable(folder / shard, OwnFile::kShard);
+  const fs::path record = folder / commit_record_name(shard), file = folder / shard;
+  if (fs::exists(record) && is_replaceable(record, OwnFile::kCommitRecord)) return;
+  require_replaceable(file, OwnFile::kShard);
+  // A record that is torn tells nothing of itself: beside a shard of the program it is its own.
+  if (!fs::exists(file)) require_replaceable(record, OwnFile::kCommitRecord);
 }
 
 void discard_output(const fs::path& folder, const Fingerprint& fingerprint,

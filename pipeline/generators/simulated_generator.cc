@@ -50,16 +50,6 @@ std::string content_key(const GreyImage& previous, const GreyImage& next) {
   return content.hex();
 }
 
-/// Two frames and what their events depend on beside them.
-struct SimulatedPair {
-  const GreyImage& previous;
-  const GreyImage& next;
-  const GeneratorSpec& spec;
-  SensorSpec sensor;  ///< the pair's
-  CounterRandom random;
-  const FramesBetween* between;  ///< null: not known
-};
-
 /// Images that are kept at once, or as much memory as a Sensor takes that sees one by one.
 constexpr int kMostImages = 64;
 
@@ -70,7 +60,7 @@ std::vector<Event> between_events(const SimulatedPair& pair) {
   const int steps = std::max(1, static_cast<int>(std::ceil(between.displacement_px - kRoundingPx)));
   const auto image = [&](int step) { return between.at(static_cast<double>(step) / steps); };
   const CounterRandom random = pair.random.keyed("sensor");
-  const double duration_s = pair.spec.duration_s;
+  const double duration_s = pair.duration_s;
   if (steps < kMostImages) {
     std::vector<GreyImage> images;
     for (int step = 0; step <= steps; ++step) images.push_back(image(step));
@@ -90,27 +80,22 @@ std::vector<Event> between_events(const SimulatedPair& pair) {
 
 std::vector<Event> esim_events(const SimulatedPair& pair) {
   if (pair.between != nullptr) return between_events(pair);
-  return simulate_affine(pair.previous, pair.spec.max_displacement_px, pair.sensor,
-                         pair.spec.duration_s, pair.random, EventOrder::kPixel);
+  return simulate_affine(pair.previous, pair.max_displacement_px, pair.sensor, pair.duration_s,
+                         pair.random, EventOrder::kPixel);
 }
 
 std::vector<Event> difference_events(const SimulatedPair& pair) {
-  return simulate_difference(pair.previous, pair.next, pair.sensor, pair.spec.duration_s,
-                             pair.random, EventOrder::kPixel);
+  return simulate_difference(pair.previous, pair.next, pair.sensor, pair.duration_s, pair.random,
+                             EventOrder::kPixel);
 }
 
-struct Model {
-  GeneratorKind kind;
-  std::vector<Event> (*events)(const SimulatedPair&);
-};
-
-constexpr Model kModels[] = {{GeneratorKind::kEsim, esim_events},
-                             {GeneratorKind::kDifference, difference_events}};
+constexpr Simulator kSimulators[] = {{GeneratorKind::kEsim, esim_events},
+                                     {GeneratorKind::kDifference, difference_events, fade_between}};
 
 class SimulatedGenerator final : public Generator {
  public:
-  SimulatedGenerator(const Model& model, const GeneratorSpec& spec, int bins, std::uint64_t seed)
-      : model_(model),
+  SimulatedGenerator(const GeneratorSpec& spec, int bins, std::uint64_t seed)
+      : model_(simulator(spec.kind)),
         spec_(spec),
         bins_(bins),
         random_(seed),
@@ -135,9 +120,9 @@ class SimulatedGenerator final : public Generator {
     const GreyImage next = grey_image(pair.frames.last(pixels), pair.size);
     CounterRandom random = random_.keyed(content_key(previous, next));
     if (pair.draw != 0) random = random.keyed(std::to_string(pair.draw));
-    pixel_event_volume(
-        model_.events({previous, next, spec_, sensor_of(pair), random, pair.between}),
-        {bins_, pair.size}, volume);
+    pixel_event_volume(model_.events({previous, next, spec_.duration_s, spec_.max_displacement_px,
+                                      sensor_of(pair), random, pair.between}),
+                       {bins_, pair.size}, volume);
     return {};
   }
 
@@ -161,7 +146,7 @@ class SimulatedGenerator final : public Generator {
     return spec_.threshold.value_or(ThresholdSpec()).applied(spec_.sensor, *pair.threshold);
   }
 
-  Model model_;
+  const Simulator& model_;
   GeneratorSpec spec_;
   int bins_;
   CounterRandom random_;
@@ -170,14 +155,18 @@ class SimulatedGenerator final : public Generator {
 
 }  // namespace
 
+const Simulator& simulator(GeneratorKind kind) {
+  const auto* const found = std::ranges::find(kSimulators, kind, &Simulator::kind);
+  if (found == std::end(kSimulators)) {
+    throw std::invalid_argument("expected a kind of simulator, got " +
+                                std::string(to_string(kind)));
+  }
+  return *found;
+}
+
 std::unique_ptr<Generator> make_simulated_generator(const GeneratorSpec& spec, int bins,
                                                     std::uint64_t seed) {
-  const auto* const model = std::ranges::find(kModels, spec.kind, &Model::kind);
-  if (model == std::end(kModels)) {
-    throw std::invalid_argument("expected a kind of simulator, got " +
-                                std::string(to_string(spec.kind)));
-  }
-  return std::make_unique<SimulatedGenerator>(*model, spec, bins, seed);
+  return std::make_unique<SimulatedGenerator>(spec, bins, seed);
 }
 
 }  // namespace eventgan

@@ -17,7 +17,7 @@
 #include "manifests/values/job.h"
 #include "pipeline/planning/outline_masks.h"
 #include "pipeline/planning/source_draft.h"
-#include "stages/frames/dataset_kinds.h"
+#include "stages/frames/dataset/dataset_reader.h"
 #include "stages/generator/onednn/onednn_generator.h"
 
 namespace eventgan {

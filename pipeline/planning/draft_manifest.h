@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/frames/find_source.h"
+#include "stages/frames/sources/find_source.h"
 
 namespace eventgan {
 

@@ -20,11 +20,12 @@
 #include "manifests/values/text.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/trace.h"
-#include "stages/frames/class_numbers.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
-#include "stages/frames/frame_selection.h"
-#include "stages/frames/still_clips.h"
+#include "stages/frames/sources/class_numbers.h"
+#include "stages/frames/sources/frame_selection.h"
+#include "stages/frames/sources/open_dataset.h"
+#include "stages/frames/sources/still_clips.h"
 
 namespace eventgan {
 namespace {

@@ -16,7 +16,7 @@
 #include "manifests/values/job.h"
 #include "pipeline/runtime/progress.h"
 #include "pipeline/runtime/trace.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
 
 namespace eventgan {
 

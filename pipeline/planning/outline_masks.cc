@@ -22,11 +22,12 @@
 #include "pipeline/planning/spread.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/images/image_file.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
-#include "stages/frames/frame_selection.h"
-#include "stages/frames/index_mask.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/decoding/index_mask.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/sources/frame_selection.h"
+#include "stages/frames/sources/open_dataset.h"
 
 namespace eventgan {
 namespace {

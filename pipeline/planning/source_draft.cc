@@ -18,8 +18,10 @@
 #include "manifests/values/text.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/planning/spread.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/sources/dataset_kinds.h"
+#include "stages/frames/sources/open_dataset.h"
 
 namespace eventgan {
 namespace {

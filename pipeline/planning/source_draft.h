@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "manifests/values/job.h"
-#include "stages/frames/dataset_kinds.h"
-#include "stages/frames/find_source.h"
+#include "stages/frames/sources/find_source.h"
 
 namespace eventgan {
 

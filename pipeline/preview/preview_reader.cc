@@ -19,9 +19,10 @@
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/frames/decoding/still_clip.h"
-#include "stages/frames/still_clips.h"
-#include "stages/recordings/event_index.h"
-#include "stages/recordings/recording.h"
+#include "stages/frames/sources/open_dataset.h"
+#include "stages/frames/sources/still_clips.h"
+#include "stages/recordings/order/event_index.h"
+#include "stages/recordings/readers/recording.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {
@@ -68,10 +69,10 @@ bool is_moved(const FrameRef& frame, const FramePair& pair) {
 }
 
 /// The colour frame, one of those of the sample's pair, laid into the volume; empty, with a
-/// warning, if it cannot be had.
+/// warning, if it cannot be had. `boxes`: the still's, of which objects move.
 std::vector<std::uint8_t> frame_image(const Outcome<ColourFrame>& decoded, const FrameRef& frame,
-                                      const ShardSample& sample, const ImageSpec& image,
-                                      std::vector<std::string>& warnings) {
+                                      const ShardSample& sample, std::vector<Box> boxes,
+                                      const ImageSpec& image, std::vector<std::string>& warnings) {
   if (is_fault(decoded)) {
     warnings.push_back(decoded.fault().reason + " (" + sample.sample_id + ")");
     return {};
@@ -86,7 +87,6 @@ std::vector<std::uint8_t> frame_image(const Outcome<ColourFrame>& decoded, const
   try {
     const Placement placement = place(sample.source_size, image, sample.pair);
     if (!is_moved(frame, sample.pair)) return place_colour(colour, placement);
-    std::vector<Box> boxes = sample.annotation.boxes;
     if (!sample.pair.objects.empty()) cut_out_missing({colour.size, colour.bgr.data()}, boxes);
     return place_colour(move_still(colour, sample.pair, boxes), placement);
   } catch (const std::exception& error) {  // a still whose motion no plan has drawn
@@ -106,12 +106,13 @@ struct PreviewReader::State {
   std::optional<ShardReader> reader{};
   JobManifest manifest{};
   bool has_events = false;  ///< is made of a camera's events
-  /// Of events and of clips of stills: the source that `shard` is of; null if nothing tells.
+  /// Of events, and of stills whose objects move: the source that `shard` is of; null if nothing
+  /// tells.
   const SourceSpec* source = nullptr;
-  std::vector<std::unique_ptr<Dataset>> clips{};   ///< opened is that of one source
-  std::pair<std::string, std::size_t> clips_of{};  ///< the hash of its plan, its number there
-  fs::path planned{};                              ///< the folder whose plan was asked for
-  std::optional<FrozenOutline> frozen{};           ///< if it has a sound one
+  std::vector<std::unique_ptr<Dataset>> datasets{};  ///< opened is that of one source
+  std::pair<std::string, std::size_t> dataset_of{};  ///< the hash of its plan, its number there
+  fs::path planned{};                                ///< the folder whose plan was asked for
+  std::optional<FrozenOutline> frozen{};             ///< if it has a sound one
 
   void open(const fs::path& file) {
     if (reader && shard == file) return;
@@ -122,10 +123,49 @@ struct PreviewReader::State {
     manifest = parse_job_manifest(reader->header().manifest_text, frames, file.string());
     has_events = !needs_frames(manifest.generator.kind);
     shard = file;
-    const auto is_of_clips = [](const SourceSpec& spec) {
-      return spec.pairs.clip_frames.has_value();
+    const auto has_moving_objects = [](const SourceSpec& spec) {
+      return spec.pairs.clip_frames || (spec.pairs.stills && spec.pairs.stills->objects);
     };
-    if (has_events || std::ranges::any_of(manifest.sources, is_of_clips)) find_source();
+    if (has_events || std::ranges::any_of(manifest.sources, has_moving_objects)) find_source();
+  }
+
+  /// The dataset of `source`.
+  const Dataset& labels() {
+    const auto number = static_cast<std::size_t>(source - manifest.sources.data());
+    if (datasets.empty() || dataset_of != std::pair(reader->header().plan_hash, number)) {
+      std::vector<std::unique_ptr<Dataset>> opened(manifest.sources.size());
+      opened[number] = open_dataset(*source, manifest.directory);
+      make_clips(manifest, opened);
+      datasets = std::move(opened);
+      dataset_of = {reader->header().plan_hash, number};
+    }
+    return *datasets[number];
+  }
+
+  /// Of `labels`; null if there is none.
+  const LabelledFrame* labelled_frame(const ShardSample& sample) {
+    const std::vector<LabelledFrame>& all = labels().labelled_frames();
+    const auto found =
+        std::ranges::lower_bound(all, sample.sample_id, {}, &LabelledFrame::sample_id);
+    return found == all.end() || found->sample_id != sample.sample_id ? nullptr : &*found;
+  }
+
+  /// The boxes of a still whose objects move: the labels' own where these are as they were, since
+  /// the shard's outlines are rounded, and a corner beside a pixel's centre decides what moves.
+  std::vector<Box> boxes_of(const ShardSample& sample) try {
+    const auto has_outline = [](const Box& box) { return !box.outline.empty(); };
+    if (sample.pair.objects.empty() || source == nullptr ||
+        std::ranges::none_of(sample.annotation.boxes, has_outline)) {
+      return sample.annotation.boxes;
+    }
+    const LabelledFrame* const labelled = labelled_frame(sample);
+    if (labelled == nullptr) return sample.annotation.boxes;
+    Outcome<Annotation> own = labels().annotation(labelled->label_key);
+    const bool is_same = !is_fault(own) && own->original == sample.annotation.original &&
+                         own->boxes.size() == sample.annotation.boxes.size();
+    return is_same ? std::move(own->boxes) : sample.annotation.boxes;
+  } catch (const std::runtime_error&) {  // labels can have been taken elsewhere
+    return sample.annotation.boxes;
   }
 
   /// The frames of a sample of a clip that is made of a still, made again: the shard has neither
@@ -136,19 +176,9 @@ struct PreviewReader::State {
           "expected the shard's plan beside it, since its manifest has several such "
           "sources, got none"};
     }
-    const auto number = static_cast<std::size_t>(source - manifest.sources.data());
-    if (clips.empty() || clips_of != std::pair(reader->header().plan_hash, number)) {
-      std::vector<std::unique_ptr<Dataset>> opened(manifest.sources.size());
-      opened[number] = open_dataset(*source, manifest.directory);
-      make_clips(manifest, opened);
-      clips = std::move(opened);
-      clips_of = {reader->header().plan_hash, number};
-    }
-    const Dataset& dataset = *clips[number];
-    const std::vector<LabelledFrame>& all = dataset.labelled_frames();
-    const auto labelled =
-        std::ranges::lower_bound(all, sample.sample_id, {}, &LabelledFrame::sample_id);
-    if (labelled == all.end() || labelled->sample_id != sample.sample_id) {
+    const Dataset& dataset = labels();
+    const LabelledFrame* const labelled = labelled_frame(sample);
+    if (labelled == nullptr) {
       return SampleFault{"expected its still, got none, in " + source->root};
     }
     Outcome<MadePair> made = dataset.made_pair(labelled->label_key);
@@ -221,6 +251,8 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
                        frames.previous.path == frames.next.path &&
                        frames.previous.video_frame == frames.next.video_frame &&
                        frames.previous.index != frames.next.index;
+  const std::vector<Box> boxes =
+      sample.valid && frames.motion ? state_->boxes_of(sample) : std::vector<Box>();
   const auto frame = [&](const FrameRef& which) {
     // Of events there may be no frames, or none yet.
     if (!sample.valid || (state_->has_events && which.video_frame < 0)) {
@@ -231,7 +263,7 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
                                              which, state_->recording)
                            : state_->decoder.decode(which, sample.pair.video_stride(), orientation,
                                                     state_->manifest.image.range),
-                       which, sample, state_->manifest.image, state_->warnings);
+                       which, sample, boxes, state_->manifest.image, state_->warnings);
   };
   if (is_made && sample.valid) {
     Outcome<std::array<ColourFrame, 2>> made = state_->made_frames(sample);
@@ -239,7 +271,7 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
       state_->warnings.push_back(made.fault().reason + " (" + sample.sample_id + ")");
     } else {
       const auto laid = [&](ColourFrame& image, const FrameRef& which) {
-        return frame_image(std::move(image), which, sample, state_->manifest.image,
+        return frame_image(std::move(image), which, sample, boxes, state_->manifest.image,
                            state_->warnings);
       };
       content.previous_bgr = laid((*made)[0], frames.previous);

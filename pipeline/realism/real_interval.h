@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "manifests/values/frames.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 

@@ -133,6 +133,16 @@ MethodSummary summary_of(std::string name, std::string settings,
 
 }  // namespace
 
+std::vector<GeneratorKind> realism_methods() {
+  std::vector<GeneratorKind> methods;
+  for (const bool drawn : {false, true}) {
+    for (const GeneratorRow& row : kGenerators) {
+      if (row.needs_frames && row.moves_one_frame == drawn) methods.push_back(row.value);
+    }
+  }
+  return methods;
+}
+
 RealismReport compare_volumes(const Recording& recording, std::span<const FrameInterval> intervals,
                               std::span<const std::unique_ptr<VolumeMethod>> methods,
                               const ComparisonRun& run) {
@@ -166,7 +176,7 @@ constexpr int kDefaultBins = 9;
 constexpr std::size_t kMostFitted = 16;
 
 void check_options(const RealismOptions& options) {
-  const std::set<RealismMethod> distinct(options.methods.begin(), options.methods.end());
+  const std::set<GeneratorKind> distinct(options.methods.begin(), options.methods.end());
   if (distinct.empty() || distinct.size() != options.methods.size()) {
     throw UsageError("--with: expected different methods, at least one, got " +
                      std::to_string(options.methods.size()) + ", " +
@@ -217,24 +227,16 @@ class MethodMaker {
   std::vector<std::unique_ptr<VolumeMethod>> make() {
     const auto& wanted = options_.methods;
     NamedNetwork opened;
-    if (std::ranges::find(wanted, RealismMethod::kNetwork) != wanted.end()) {
+    if (std::ranges::find(wanted, GeneratorKind::kNetwork) != wanted.end()) {
       opened = open_network(options_.weights);
       bins_ = opened.generator->bins();
     }
     std::vector<std::unique_ptr<VolumeMethod>> methods;
-    for (const RealismMethod method : wanted) {
-      switch (method) {
-        case RealismMethod::kNetwork:
-          methods.push_back(network(opened));
-          break;
-        case RealismMethod::kDifference:
-          methods.push_back(simulated(difference_scene()));
-          break;
-        case RealismMethod::kEsim:
-          methods.push_back(
-              simulated(esim_scene(options_.esim_displacement_px, options_.esim_draws)));
-          break;
-      }
+    for (const GeneratorKind method : wanted) {
+      methods.push_back(method == GeneratorKind::kNetwork
+                            ? network(opened)
+                            : simulated(simulated_scene(method, options_.esim_displacement_px,
+                                                        options_.esim_draws)));
     }
     return methods;
   }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "manifests/values/generators.h"
 #include "manifests/values/sensor_input.h"
 #include "pipeline/realism/realism_report.h"
 #include "pipeline/realism/volume_method.h"
@@ -16,20 +17,16 @@
 
 namespace eventgan {
 
-/// What makes volumes in place of an event camera (as the EventGAN paper compares them).
-enum class RealismMethod {
-  kNetwork,     ///< the EventGAN generator
-  kDifference,  ///< log intensity on a line from frame to frame
-  kEsim         ///< a random affine motion of the previous frame
-};
+/// What makes volumes in place of an event camera (as the EventGAN paper compares them): all of
+/// kGenerators that need frames, in their order, those that draw a motion last.
+std::vector<GeneratorKind> realism_methods();
 
 /// Which pairs of a recording are compared, and with what.
 struct RealismOptions {
   std::int64_t first_frame = 0;            ///< frames before are not used
   std::optional<std::int64_t> last_frame;  ///< frames after are not used; none: to the end
   std::vector<int> gaps = {1};             ///< frames between previous and next, each ≥ 1
-  std::vector<RealismMethod> methods = {RealismMethod::kNetwork, RealismMethod::kDifference,
-                                        RealismMethod::kEsim};
+  std::vector<GeneratorKind> methods = realism_methods();  ///< of these
   std::string weights = "shipped";  ///< of the network: a file, "shipped" or "shipped:WIDTH"
 
   /// Contrast thresholds of the two models, and of a network that knows its sensor, 0.01..5; none:

@@ -180,8 +180,8 @@ class Fitter {
 
   /// None: no threshold makes as many.
   std::optional<double> difference_anew() const {
-    const double threshold =
-        fitted_threshold(difference_scene(), frames_, kFrameLogEpsilon, kSeed, threads_);
+    const double threshold = fitted_threshold(simulated_scene(GeneratorKind::kDifference), frames_,
+                                              kFrameLogEpsilon, kSeed, threads_);
     if (is_at_end(threshold, {kLeastFittedThreshold, kMostFittedThreshold})) return std::nullopt;
     return threshold;
   }

@@ -13,7 +13,7 @@
 #include "pipeline/realism/still_pixels.h"
 #include "stages/events/realism/realism_scores.h"
 #include "stages/generator/generator.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 

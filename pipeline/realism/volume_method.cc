@@ -13,6 +13,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/weights.h"
 #include "pipeline/generators/load_generator.h"
+#include "pipeline/generators/simulated_generator.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/events/drawn_events.h"
 #include "stages/events/event_volume.h"
@@ -148,13 +149,15 @@ class SimulatedMethod final : public VolumeMethod {
 
 }  // namespace
 
-SimulatedScene difference_scene() {
-  return {"difference",
-          [](const IntervalFrames& frames, const SensorSpec& sensor, CounterRandom random) {
-            return simulate_difference(frames.previous, frames.next, sensor, frames.duration_s,
-                                       random, EventOrder::kPixel);
+SimulatedScene simulated_scene(GeneratorKind kind, double displacement_px, int draws) {
+  const GeneratorRow& row = generator_row(kind);
+  return {std::string(row.word),
+          [=, events = simulator(kind).events](const IntervalFrames& frames,
+                                               const SensorSpec& sensor, CounterRandom random) {
+            return events({frames.previous, frames.next, frames.duration_s,
+                           displacement_px * frames.interval.gap(), sensor, random});
           },
-          1};
+          row.moves_one_frame ? draws : 1};
 }
 
 SimulatedScene running_difference_scene() {
@@ -172,15 +175,6 @@ SimulatedScene running_difference_scene() {
             return events;
           },
           1};
-}
-
-SimulatedScene esim_scene(double displacement_px, int draws) {
-  return {"esim",
-          [=](const IntervalFrames& frames, const SensorSpec& sensor, CounterRandom random) {
-            return simulate_affine(frames.previous, displacement_px * frames.interval.gap(), sensor,
-                                   frames.duration_s, random, EventOrder::kPixel);
-          },
-          draws};
 }
 
 SensorSpec realism_sensor(const ContrastThreshold& threshold, double log_epsilon) {

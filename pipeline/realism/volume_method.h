@@ -10,6 +10,7 @@
 
 #include "manifests/values/counter_random.h"
 #include "manifests/values/events.h"
+#include "manifests/values/generators.h"
 #include "pipeline/realism/real_interval.h"
 #include "stages/generator/generator.h"
 
@@ -56,17 +57,15 @@ struct SimulatedScene {
   int draws = 1;
 };
 
-/// Log intensity on a line from frame to frame: "difference".
-SimulatedScene difference_scene();
+/// A simulator of kGenerators, called by its word. One that moves_one_frame moves it by at most
+/// `displacement_px` a frame, and draws `draws` times.
+SimulatedScene simulated_scene(GeneratorKind kind, double displacement_px = 0, int draws = 1);
 
-/// The same, of a camera that was on before: a pixel is at level 0 at the first of
-/// IntervalFrames::before, and at `previous` where the frames in between have led it,
+/// The difference of two frames, of a camera that was on before: a pixel is at level 0 at the first
+/// of IntervalFrames::before, and at `previous` where the frames in between have led it,
 ///   d(previous) = L(previous) - L(its last event),
 /// since a camera that records on does not begin each pair anew. Events of the pair alone.
 SimulatedScene running_difference_scene();
-
-/// A random affine motion of the previous frame, by at most `displacement_px` a frame: "esim".
-SimulatedScene esim_scene(double displacement_px, int draws);
 
 /// The sensor of a threshold; its spread over the pixels is 15 % of the lower polarity's, as in
 /// SensorSpec's defaults; no refractory time and no noise.

@@ -23,6 +23,10 @@ int thread_count(int requested, const std::filesystem::path& root) {
 }
 
 void for_each_index(std::size_t count, int threads, const std::function<void(std::size_t)>& work) {
+  if (threads == 1) {  // a budget of one would hold for what `work` calls, too
+    for (std::size_t i = 0; i < count; ++i) work(i);
+    return;
+  }
   const oneapi::tbb::global_control budget(oneapi::tbb::global_control::max_allowed_parallelism,
                                            static_cast<std::size_t>(threads));
   oneapi::tbb::task_arena arena(threads);

@@ -15,6 +15,7 @@ int thread_count(int requested, const std::filesystem::path& root = "/");
 /// Calls `work` with each of 0 .. count - 1 on up to `threads` threads, the calling one included,
 /// which may be more than there are cores: many waits for a network file system fit side by side.
 /// The first exception that leaves `work` is rethrown; then some indexes have not had their turn.
+/// A call within `work` has no more threads than this one, unless this one has a single thread.
 void for_each_index(std::size_t count, int threads, const std::function<void(std::size_t)>& work);
 
 /// Processor time that the calling thread has used so far, in nanoseconds: waiting is not in it.

@@ -6,9 +6,8 @@
 #include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "stages/frames/decoding/prepared_frame.h"
-#include "stages/frames/sequences/frames_dataset.h"
-#include "stages/frames/sequences/image_folder.h"
-#include "stages/frames/sequences/video_clip.h"
+#include "stages/frames/decoding/video_clip.h"
+#include "stages/frames/listing/image_folder.h"
 
 namespace eventgan {
 
@@ -124,9 +123,9 @@ ClipFrames::ClipFrames(const SimulationSource& source, const SimulationManifest&
     frames_.push_back(clip.frames[at(i)]);
     frames_.back().time_s -= clip.frames[at(source.first_frame)].time_s;
   }
-  const std::int64_t least = !to_the_end                                  ? source.frame_count
-                             : source.method == SimulationMethod::kAffine ? 1
-                                                                          : 2;
+  const std::int64_t least = !to_the_end                       ? source.frame_count
+                             : source.method.moves_one_frame() ? 1
+                                                               : 2;
   if (count() < least) {
     throw InputError("expected " + std::to_string(least) + " or more frames from frame " +
                      std::to_string(source.first_frame) + " on in steps of " +

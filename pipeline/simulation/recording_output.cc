@@ -8,9 +8,9 @@
 #include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
 #include "stages/base/hdf5/hdf5.h"
-#include "stages/recordings/aedat4_writer.h"
-#include "stages/recordings/evt3_writer.h"
-#include "stages/recordings/mvsec_writer.h"
+#include "stages/recordings/writers/aedat4_writer.h"
+#include "stages/recordings/writers/evt3_writer.h"
+#include "stages/recordings/writers/mvsec_writer.h"
 
 namespace eventgan {
 namespace {

@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 

@@ -17,11 +17,11 @@ namespace {
 
 nlohmann::json source_json(const SimulationSource& source) {
   nlohmann::json json = {{"path", source.path}, {"method", to_string(source.method)}};
-  if (source.method == SimulationMethod::kStills) return json;  // each is what it is of
+  if (source.method.motion == SimulationMethod::kStills) return json;  // each is what it is of
   json["first_frame"] = source.first_frame;
   json["frame_step"] = source.frame_step;
   if (source.frames_per_second) json["frames_per_second"] = *source.frames_per_second;
-  if (source.method == SimulationMethod::kAffine) {
+  if (source.method.moves_one_frame()) {
     json["frames_per_image"] = source.frames_per_image;
     json["max_displacement_px"] = source.max_displacement_px;
   } else {
@@ -106,7 +106,7 @@ std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest
                           recording_settings(manifest, source, name, clip.files_hash(), number),
                           position, frame_count});
   };
-  if (source.method != SimulationMethod::kAffine) {
+  if (!source.method.moves_one_frame()) {
     add(source.name, std::nullopt, clip.count());
   } else {
     for (std::int64_t i = 0; i < clip.count(); ++i) {

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "stages/events/simulation/flow_interval.h"
-#include "stages/events/simulation/sensor.h"
 
 namespace eventgan {
 namespace {
@@ -104,38 +103,14 @@ std::unique_ptr<Interval> AffineScene::advance() {
   return std::make_unique<AffinePart>(image_, motion_, from, to);
 }
 
-namespace {
-
-/// Two frames and no image between them: the sensor itself takes the log intensity to move on a
-/// line from one image to the next.
-class FadeInterval final : public Interval {
- public:
-  FadeInterval(GreyImage previous, GreyImage next)
-      : previous_(std::move(previous)), next_(std::move(next)) {}
-  ImageSize size() const override { return previous_.size; }
-  int steps() const override { return 1; }
-  std::vector<float> render(int step) const override {
-    return linear_intensity(step == 0 ? previous_ : next_);
-  }
-  FlowDisplacement flow() const override { return {}; }
-
- private:
-  GreyImage previous_;
-  GreyImage next_;
-};
-
-}  // namespace
-
-ClipScene::ClipScene(ClipFrames& clip, ClipMotion motion)
-    : clip_(clip), motion_(motion), frame_(clip.frame(0)) {}
+ClipScene::ClipScene(ClipFrames& clip, Between between)
+    : clip_(clip), between_(between), frame_(clip.frame(0)) {}
 
 std::unique_ptr<Interval> ClipScene::advance() {
   if (position_ + 1 == clip_.count()) return nullptr;
   GreyImage previous = std::exchange(frame_, clip_.frame(position_ + 1));
   ++position_;
-  if (motion_ == ClipMotion::kFade) {
-    return std::make_unique<FadeInterval>(std::move(previous), frame_);
-  }
+  if (between_ != nullptr) return between_(std::move(previous), frame_);
   return std::make_unique<FlowInterval>(std::move(previous), frame_);
 }
 

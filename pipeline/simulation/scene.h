@@ -50,25 +50,21 @@ class AffineScene final : public Scene {
   GreyImage frame_;
 };
 
-/// How the intensity gets from one frame of a clip to the next.
-enum class ClipMotion {
-  kFlow,  ///< things move along the dense optical flow (FlowInterval)
-  kFade   ///< each pixel fades on a line in log intensity; nothing moves, no flow
-};
-
 /// A real clip as a scene: its frames at their times. `clip` must outlive it; members throw
-/// InputError as ClipFrames::frame does.
+/// InputError as ClipFrames::frame does. `between`: what is seen from one frame to the next,
+/// without flow; null: things move along the dense optical flow (FlowInterval).
 class ClipScene final : public Scene {
  public:
-  ClipScene(ClipFrames& clip, ClipMotion motion);
+  using Between = std::unique_ptr<Interval> (*)(GreyImage previous, GreyImage next);
+  explicit ClipScene(ClipFrames& clip, Between between = nullptr);
   const GreyImage& frame() const override { return frame_; }
   double time_s() const override { return clip_.time_s(position_); }
   std::unique_ptr<Interval> advance() override;
-  bool has_flow() const override { return motion_ == ClipMotion::kFlow; }
+  bool has_flow() const override { return between_ == nullptr; }
 
  private:
   ClipFrames& clip_;
-  ClipMotion motion_;
+  Between between_;
   std::int64_t position_ = 0;
   GreyImage frame_;
 };

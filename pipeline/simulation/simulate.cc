@@ -17,6 +17,7 @@
 #include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
+#include "pipeline/generators/simulated_generator.h"
 #include "pipeline/runtime/memory.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/simulation/clip_frames.h"
@@ -26,7 +27,7 @@
 #include "pipeline/simulation/still_scenes.h"
 #include "stages/events/simulation/sensor.h"
 #include "stages/events/simulation/simulate_pair.h"
-#include "stages/recordings/evt3_writer.h"
+#include "stages/recordings/writers/evt3_writer.h"
 
 namespace eventgan {
 namespace {
@@ -147,7 +148,7 @@ std::vector<SourceWork> plan_work(const SimulationManifest& manifest, const fs::
       kept.push_back(recording.name);
       return false;
     };
-    if (source.method == SimulationMethod::kStills) {
+    if (source.method.motion == SimulationMethod::kStills) {
       const auto stills = std::make_shared<const StillScenes>(source, manifest);
       for (PlannedRecording& recording :
            plan_recordings(manifest, source, *stills, folder, faults)) {
@@ -178,15 +179,14 @@ std::vector<SourceWork> plan_work(const SimulationManifest& manifest, const fs::
 std::unique_ptr<Scene> make_scene(const SourceWork& work, const PlannedRecording& recording,
                                   CounterRandom random) {
   const SimulationSource& source = *work.source;
-  switch (source.method) {
+  switch (source.method.motion) {
     case SimulationMethod::kClip:
-      return std::make_unique<ClipScene>(*work.clip, ClipMotion::kFlow);
-    case SimulationMethod::kDifference:
-      return std::make_unique<ClipScene>(*work.clip, ClipMotion::kFade);
+      return std::make_unique<ClipScene>(*work.clip);
     case SimulationMethod::kStills:
       return work.stills->scene(recording.image.value());
-    case SimulationMethod::kAffine:
-      break;
+    case SimulationMethod::kSimulator:
+      if (source.method.moves_one_frame()) break;
+      return std::make_unique<ClipScene>(*work.clip, simulator(source.method.simulator).between);
   }
   GreyImage image = work.clip->frame(recording.image.value());
   const int frames = source.frames_per_image;

@@ -45,11 +45,12 @@ std::string to_json(const SimulationReport& report);
 
 /// Lets a sensor look at a scene to its end and writes frames, events and flows as a recording
 /// (open_recording_output), which appears under its name when it is whole. `on_frame` is called
-/// after each frame. Throws what scene, sensor and writer throw. Thread safe for different scenes
-/// and files.
+/// after each frame, `before_publishing` once the recording is on disk under another name. Throws
+/// what scene, sensor, writer and these throw. Thread safe for different scenes and files.
 RecordingSummary record(Scene& scene, const SensorSpec& sensor, CounterRandom random,
                         const std::filesystem::path& file, const std::string& settings,
-                        const std::function<void()>& on_frame);
+                        const std::function<void()>& on_frame,
+                        const std::function<void()>& before_publishing = {});
 
 struct SimulationOptions {
   std::optional<std::filesystem::path> output;  ///< instead of the manifest's

@@ -22,9 +22,10 @@
 #include "manifests/values/still_motion.h"
 #include "pipeline/simulation/clip_frames.h"
 #include "stages/events/simulation/sensor.h"
-#include "stages/frames/class_numbers.h"
 #include "stages/frames/decoding/still_clip.h"
-#include "stages/frames/still_clips.h"
+#include "stages/frames/sources/class_numbers.h"
+#include "stages/frames/sources/open_dataset.h"
+#include "stages/frames/sources/still_clips.h"
 #include "stages/labels/label_mapping.h"
 
 namespace eventgan {

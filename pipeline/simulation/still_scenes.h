@@ -10,7 +10,7 @@
 #include "manifests/values/job.h"
 #include "manifests/values/simulation.h"
 #include "pipeline/simulation/scene.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
 
 namespace eventgan {

@@ -11,7 +11,7 @@
 #include "pipeline/tradeoff/loss.h"
 #include "pipeline/tradeoff/tradeoff.h"
 #include "stages/events/realism/realism_scores.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 

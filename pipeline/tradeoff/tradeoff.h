@@ -13,7 +13,7 @@
 #include "pipeline/tradeoff/configuration.h"
 #include "pipeline/tradeoff/loss.h"
 #include "stages/events/realism/realism_scores.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 

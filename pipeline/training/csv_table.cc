@@ -7,47 +7,32 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <string_view>
+#include <utility>
 
 #include "manifests/files/atomic_file.h"
+#include "manifests/files/csv_records.h"
+#include "manifests/files/input_file.h"
 
 namespace eventgan {
 namespace {
 
 std::string joined(const CsvTable::Row& row) { return fmt::format("{}\n", fmt::join(row, ",")); }
 
-CsvTable::Row split(const std::string& line) {
-  CsvTable::Row row(1);
-  for (const char c : line) {
-    if (c == ',') {
-      row.emplace_back();
-    } else {
-      row.back() += c;
-    }
-  }
-  return row;
-}
-
-/// The file's lines that end in a line end.
-std::vector<std::string> whole_lines(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::vector<std::string> lines;
-  for (std::string line; std::getline(stream, line) && !stream.eof();) lines.push_back(line);
-  return lines;
-}
-
 }  // namespace
 
 CsvTable::CsvTable(const std::filesystem::path& file, const Row& columns,
                    const std::function<bool(const Row&)>& keep)
     : file_(file) {
-  const std::vector<std::string> lines = whole_lines(file);
+  std::string reason;  // of a file that is not there yet
+  std::string before = try_read_file(file, reason).value_or("");
+  before.erase(before.rfind('\n') + 1);  // the row that a killed run wrote; without a line end, all
   std::string text = joined(columns);
-  if (!lines.empty() && lines.front() + '\n' == text) {
-    for (std::size_t i = 1; i < lines.size(); ++i) {
-      Row row = split(lines[i]);
+  CsvReader reader(before);
+  if (const auto header = reader.next(); header && header->bytes == text) {
+    while (const auto record = reader.next()) {
+      Row row(record->fields.begin(), record->fields.end());
       if (row.size() != columns.size() || !keep(row)) break;
-      text += lines[i] + '\n';
+      text += record->bytes;
       kept_.push_back(std::move(row));
     }
   }

@@ -24,7 +24,7 @@
 #include "stages/generator/generator.h"
 #include "stages/generator/torch/torch_generator.h"
 #include "stages/generator/weights_file.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 #include "stages/training/training_sample.h"
 
 namespace eventgan {

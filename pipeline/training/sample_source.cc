@@ -20,7 +20,7 @@
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/moving_planes.h"
 #include "stages/frames/decoding/prepared_frame.h"
-#include "stages/frames/sequences/image_folder.h"
+#include "stages/frames/listing/image_folder.h"
 #include "stages/generator/weights_file.h"
 
 namespace eventgan {

@@ -60,11 +60,15 @@ void TrainingFolder::require_own(bool overwrite) const {
   require_replaceable(lock(), OwnFile::kTrainingLock);
   fs::path result;
   bool has_checkpoints = false;
-  for (const auto& [file, kind] : files_of(*this)) {
-    require_replaceable(file, kind);
-    if (!fs::exists(file)) continue;
-    if (kind == OwnFile::kCheckpoint) has_checkpoints = true;
-    result = file;
+  const auto files = files_of(*this);
+  // One of them may be damaged; it is a training's all the same beside another.
+  for (const auto& [file, kind] : files) {
+    has_checkpoints |=
+        kind == OwnFile::kCheckpoint && fs::exists(file) && is_replaceable(file, kind);
+  }
+  for (const auto& [file, kind] : files) {
+    if (kind != OwnFile::kCheckpoint || !has_checkpoints) require_replaceable(file, kind);
+    if (fs::exists(file)) result = file;
   }
   if (overwrite || has_checkpoints || result.empty()) return;
   throw UsageError(

@@ -10,7 +10,7 @@
 #include "stages/events/event_volume.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/frames/decoding/prepared_frame.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 namespace {
@@ -65,8 +65,8 @@ std::vector<TrainingRecording> open_training_recordings(std::span<const Recordin
 
 namespace {
 
-constexpr std::size_t kFrameBytes = std::size_t{128} << 20;
-constexpr std::size_t kEventBytes = std::size_t{512} << 20;
+constexpr std::int64_t kFrameBytes = std::int64_t{128} << 20;
+constexpr std::int64_t kEventBytes = std::int64_t{512} << 20;
 
 void append_cut(const GreyImage& frame, const CropBox& box, std::vector<float>& values) {
   const auto width = static_cast<std::size_t>(box.size.width);
@@ -97,20 +97,23 @@ CropBox centre_crop(ImageSize image, ImageSize size) {
 CropReader::CropReader(std::vector<TrainingRecording> recordings, int bins)
     : recordings_(std::move(recordings)),
       bins_(bins),
-      frames_(kFrameBytes, [](const GreyImage& frame) { return frame.pixels.size(); }),
-      intervals_(kEventBytes,
-                 [](const std::vector<Event>& events) { return events.size() * sizeof(Event); }) {}
+      frames_(kFrameBytes, [](const auto& frame) { return std::ssize(frame->pixels); }),
+      intervals_(kEventBytes, [](const auto& events) {
+        return std::ssize(*events) * std::int64_t{sizeof(Event)};
+      }) {}
 
 std::shared_ptr<const GreyImage> CropReader::frame(std::size_t recording,
                                                    std::int64_t index) const {
-  return frames_.get({recording, index},
-                     [&] { return recordings_[recording].recording->frame(index); });
+  return frames_.get({recording, index}, [&] {
+    return std::make_shared<const GreyImage>(recordings_[recording].recording->frame(index));
+  });
 }
 
 std::shared_ptr<const std::vector<Event>> CropReader::interval(std::size_t recording,
                                                                std::int64_t index) const {
   return intervals_.get({recording, index}, [&] {
-    return recordings_[recording].recording->events_between(index, index + 1);
+    return std::make_shared<const std::vector<Event>>(
+        recordings_[recording].recording->events_between(index, index + 1));
   });
 }
 

@@ -156,8 +156,12 @@ std::optional<std::vector<int>> flip_indices(const std::vector<std::string>& joi
 
 std::string yolo_data_yaml(const std::vector<std::string>& names, int channels,
                            const std::vector<std::string>& splits) {
-  std::string text = "path: .\n";
+  std::string text;
   for (const std::string& split : splits) text += fmt::format("{0}: {0}.txt\n", split);
+  const auto has = [&](const char* name) {
+    return std::ranges::find(splits, name) != splits.end();
+  };
+  if (has("train") && !has("val")) text += "val: train.txt\n";
   // A JSON list is a YAML list.
   return text + fmt::format("nc: {}\nchannels: {}\nnames: {}\n", names.size(), channels,
                             dump_json(nlohmann::json(names)));

@@ -46,7 +46,9 @@ std::string yolo_pose_line(int class_number, const Rectangle& box,
 /// side has no counterpart, or no name tells a side: then the names do not say how to mirror.
 std::optional<std::vector<int>> flip_indices(const std::vector<std::string>& joint_names);
 
-/// data.yaml of `names` (number i is names[i]) and of the splits' lists, SPLIT.txt each.
+/// data.yaml of `names` (number i is names[i]) and of the splits' lists, SPLIT.txt each. It has no
+/// `path`: so Ultralytics begins at the file's own folder, wherever it is started. Without a split
+/// val, which its trainer needs, that is train's list.
 std::string yolo_data_yaml(const std::vector<std::string>& names, int channels,
                            const std::vector<std::string>& splits);
 

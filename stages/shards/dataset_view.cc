@@ -172,11 +172,7 @@ class ViewColumns {
                           : header.dtype == StoredType::kFloat16
                               ? static_cast<const void*>(&kHalfNan)
                               : static_cast<const void*>(&byte);
-    const ColumnSpec spec{kVolumePath,
-                          Rows::kSamples,
-                          {static_cast<std::size_t>(header.volume.channels()),
-                           static_cast<std::size_t>(header.volume.size.height),
-                           static_cast<std::size_t>(header.volume.size.width)}};
+    const ColumnSpec spec = volume_column(header.volume);
     Hdf5Handle volume =
         create_virtual_dataset(group_, below_group(kVolumePath), kVolumePath,
                                volume_type(header.dtype), dims(spec), mapped_rows(spec), missing);

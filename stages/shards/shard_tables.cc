@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <utility>
 
+#include "stages/shards/detail/shard_objects.h"
+
 namespace eventgan {
 namespace {
 
@@ -28,6 +30,17 @@ double generated_fraction(const ShardSample& sample) {
   if (sample.tiles.empty()) return 1;
   const auto generated = std::count(sample.tiles.begin(), sample.tiles.end(), 1);
   return static_cast<double>(generated) / static_cast<double>(sample.tiles.size());
+}
+
+ColumnSpec volume_column(const VolumeShape& volume) {
+  return {
+      kVolumePath,
+      "float16, float32 or uint8, as the manifest asks. Channels 0..B-1 are of positive polarity, "
+      "B..2B-1 of "
+      "negative, in time order; values are ≥ 0, in `unit`",
+      Rows::kSamples,
+      {static_cast<std::size_t>(volume.channels()), static_cast<std::size_t>(volume.size.height),
+       static_cast<std::size_t>(volume.size.width)}};
 }
 
 ShardContents contents_of(const ShardTables& tables, const ShardHeader& header) {

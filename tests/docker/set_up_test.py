@@ -158,23 +158,31 @@ class Image(unittest.TestCase):
 
 
 class Workflow(unittest.TestCase):
-    def test_runs_the_readmes_commands_on_each_debian_and_all_checks_on_one(self):
+    def test_runs_the_readmes_commands_on_each_debian_once_and_all_checks_on_one(self):
         workflow = yaml.safe_load((SOURCE / ".github" / "workflows" / "ci.yml").read_text())
-        debian, checks, image = (workflow["jobs"][name] for name in ("debian", "checks", "image"))
-        self.assertEqual(debian["strategy"]["matrix"], {"release": ["bookworm", "trixie"]})
-        self.assertEqual(debian["container"], "debian:${{ matrix.release }}")
-        commands = [step["run"] for step in debian["steps"] if "run" in step]
+        trixie, checks, image = (workflow["jobs"][name] for name in ("trixie", "checks", "image"))
+        self.assertEqual((trixie["container"], checks["container"]), ("debian:trixie", "debian:bookworm"))
+        commands = [step["run"] for step in trixie["steps"] if "run" in step]
         self.assertEqual(commands, re.findall(r"(?m)^    (docker/bootstrap\.sh .*?) +#", README))
         self.assertEqual(len(commands), 2)
         self.assertIn("Debian 12 or 13", README)
         build = next(step["run"] for step in image["steps"] if "run" in step)
         for page in (README, (DOCKER / "bootstrap.sh").read_text()):
             self.assertIn(build, page)
-        self.assertEqual(checks["container"], "debian:bookworm")
         self.assertIn(".ci/run", [step.get("run") for step in checks["steps"]])
         self.assertTrue(os.access(SOURCE / ".ci" / "run", os.X_OK))
-        for step in debian["steps"] + checks["steps"] + image["steps"]:
+        for command in commands:
+            self.assertRegex((SOURCE / ".ci" / "run").read_text(), rf"(?m)^{command}\b")
+        for step in trixie["steps"] + checks["steps"] + image["steps"]:
             self.assertRegex(step.get("uses", "actions/checkout@v4"), r"@v\d+$")
+
+    def test_the_fuzzers_run_at_night(self):
+        workflow = yaml.safe_load((SOURCE / ".github" / "workflows" / "nightly.yml").read_text())
+        self.assertIn("schedule", workflow[True])  # YAML 1.1 takes `on` for a truth value
+        self.assertIn(".ci/run nightly", [step.get("run") for step in workflow["jobs"]["checks"]["steps"]])
+        fuzzing = (SOURCE / ".ci" / "run").read_text().partition('step "fuzzers"')[2]
+        self.assertRegex(fuzzing, r"^\nif \[\[ \$\{1:-\} != nightly \]\]; then\n  echo")
+        self.assertNotIn("preset fuzz", fuzzing.partition("elif")[0])
 
     def test_a_release_is_what_bootstrap_makes_on_the_oldest_debian(self):
         workflow = yaml.safe_load((SOURCE / ".github" / "workflows" / "release.yml").read_text())

@@ -17,7 +17,7 @@ from program import PACKAGE, SOURCE, run
 
 MOST_WORDS = {
     "README.md": 1300,
-    "CONTRIBUTING.md": 1250,
+    "CONTRIBUTING.md": 1300,
     "CHANGELOG.md": 2300,
     "docker/running.md": 1150,
     "manifests/weights/README.md": 1200,

@@ -88,6 +88,8 @@ class Formats(Export):
         self.assertEqual(data["nc"], 8)
         self.assertEqual(data["channels"], 18)
         self.assertNotIn("DontCare", data["names"])
+        self.assertNotIn("path", data)  # Ultralytics begins at the file's folder then
+        self.assertEqual(self.described()["notes"], [])
         for split in ("train", "val"):
             lines = (self.out / data[split]).read_text().split()
             self.assertEqual(lines, [f"./images/{split}/{name_of(key)}.png" for key in of(split, "kitti_object")])
@@ -157,8 +159,39 @@ class Formats(Export):
                                     or dataset == "human36m")
         self.assertEqual(self.described()["left_out"].get("joints outside the volume (as not annotated)", 0), outside)
         alone = self.out.parent / "alone"
-        self.export("yolo", "--split", "val", out=alone)
+        out, _ = self.export("yolo", "--split", "val", out=alone)
         self.assertFalse((alone / "pose").exists())
+        self.assertIn("note: data.yaml has no split train, which Ultralytics needs", out)
+        out, _ = self.export("yolo", "--split", "train", "--overwrite", out=alone)
+        for folder in ("", "pose/", "pose-2/"):
+            self.assertIn(f"note: {folder}data.yaml has val: train.txt, since there is no split val", out)
+            self.assertEqual(yaml.safe_load((alone / folder / "data.yaml").read_text())["val"], "train.txt")
+
+    def test_images_of_three_channels(self):
+        def expected(sample, full_scale):
+            bins = len(sample["volume"]) // 2
+            positive, negative = (part.astype(float).sum(axis=0) / full_scale
+                                  for part in (sample["volume"][:bins], sample["volume"][bins:]))
+            channels = np.stack([positive, 0.5 + (positive - negative) / 2, negative], axis=-1)
+            return 255 * np.clip(channels, 0, 1)
+
+        self.export("yolo", "--split", "val", "--images", "png", "--full-scale", "3")
+        self.assertFalse(list(self.out.rglob("*.npy")))
+        self.assertEqual(yaml.safe_load((self.out / "data.yaml").read_text())["channels"], 3)
+        coco = self.out.parent / "coco"
+        self.export("coco", "--split", "val", "--images", "png", out=coco)
+        listed = {image["sample_id"]: image["file_name"]
+                  for name in ("instances", "person_keypoints") if (coco / f"{name}_val.json").exists()
+                  for image in json.loads((coco / f"{name}_val.json").read_text())["images"]}
+        for key, sample in of("val").items():
+            name = f"images/val/{name_of(key)}.png"
+            self.assertEqual(listed[key[2]], name)
+            for folder, full_scale in ((self.out, 3), (coco, 1)):
+                with PIL.Image.open(folder / name) as image:
+                    self.assertEqual(image.mode, "RGB")
+                    self.assertLess(np.abs(np.asarray(image) - expected(sample, full_scale)).max(), 0.502)
+        _, err = self.export("coco", "--full-scale", "2", out=self.out.parent / "none", expect=64)
+        self.assertIn("--full-scale: expected --images png with --to coco", err)
 
     def test_yolo_classes_and_ignored(self):
         classes = demo.folder / "classes.json"
@@ -283,7 +316,8 @@ class Formats(Export):
                          (self.out / "person_keypoints_train.json").read_bytes())
 
     def test_mpii(self):
-        self.export("mpii")
+        out, _ = self.export("mpii")
+        self.assertIn("for MMPose --to coco", out)
         self.assertEqual(sorted(path.name for path in (self.out / "annot").iterdir()),
                          ["gt_train-human36m.mat", "gt_train-mpii.mat", "train-human36m.json", "train-mpii.json"])
         for dataset, joints in (("mpii", 16), ("human36m", 17)):

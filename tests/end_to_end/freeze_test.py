@@ -51,6 +51,13 @@ class Freeze(program.InFolder):
         run("plan", self.manifest, "--freeze")
         self.assertTrue((self.manifest.parent / "out" / "plan.json").exists())
 
+    def test_a_trial_is_the_one_that_convert_takes(self):
+        frozen = json.loads(run("plan", self.manifest, "--freeze", "--limit", 3, "--json")[0])
+        trial = self.manifest.parent / "out-trial-3"
+        self.assertEqual((frozen["folder"], frozen["samples"]), (str(trial), 3))
+        run("convert", self.manifest, "--limit", 3)
+        self.assertEqual({record["plan_hash"] for record in records(trial).values()}, {frozen["plan_hash"]})
+
     def test_wrong_usage(self):
         run("plan", self.manifest, "--output", self.out, expect=64)  # an output, but nothing to write
         run("plan", self.manifest, "--freeze", "--output", "", expect=64)

@@ -102,6 +102,15 @@ class OwnLabels(program.InFolder):
         (self.folder / "instances.json").write_text(json.dumps(document))
         return document
 
+    def test_tracks_of_coco_go_out_again(self):
+        squares = self.make_images()
+        boxes = [(f"{name}.png", label, *edges) for name, edges in squares.items() for label in ("person", "car")]
+        self.coco({f"{name}.png": (64, 48) for name in squares}, boxes, lambda i: {"instance_id": 11 + i % 2})
+        self.job({"format": "coco", "path": "instances.json"})
+        self.assertEqual([sample["tracks"] for sample in self.samples.values()], [[11, 12]] * 5)
+        tracks = [np.load(path) for path in self.export("dsec").rglob("tracks.npy")]
+        self.assertEqual(set(np.concatenate(tracks)["track_id"]), {11, 12})
+
     def test_coco_comes_out_as_it_went_in(self):
         squares = self.make_images()
         boxes = [(f"{name}.png", label, *edges) for name, edges in squares.items() for label in ("person", "car")]

@@ -11,23 +11,23 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/outlines.h"
 #include "stages/base/archives/cdf_matrix.h"
+#include "stages/base/archives/mat_json.h"
 #include "stages/base/images/image_file.h"
+#include "stages/frames/dataset/label_name.h"
+#include "stages/frames/decoding/index_mask.h"
 #include "stages/frames/events/recording_labels.h"
-#include "stages/frames/index_mask.h"
-#include "stages/frames/label_name.h"
-#include "stages/frames/mpii/detail/mat_json.h"
 #include "stages/frames/own_labels/detail/coco_entry.h"
 #include "stages/frames/own_labels/detail/csv_labels.h"
 #include "stages/frames/own_labels/detail/mot_labels.h"
 #include "stages/frames/own_labels/detail/voc_labels.h"
-#include "stages/frames/own_labels/detail/yolo_text.h"
+#include "stages/frames/own_labels/yolo_text.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/checkpoints/fold.h"
 #include "stages/generator/safetensors.h"
 #include "stages/generator/weights_file.h"
-#include "stages/recordings/detail/aedat4_recording.h"
-#include "stages/recordings/detail/prophesee_recording.h"
-#include "stages/recordings/detail/table_recording.h"
+#include "stages/recordings/readers/detail/aedat4_recording.h"
+#include "stages/recordings/readers/detail/prophesee_recording.h"
+#include "stages/recordings/readers/detail/table_recording.h"
 #include "tests/testing/zip_file.h"
 
 namespace eventgan::testing {
@@ -221,11 +221,13 @@ void read_coco_input(std::span<const std::uint8_t> input, const std::filesystem:
       return text.substr(range.offset, range.length);
     };
     try {
-      const ImageSize size = read_coco_image(part(image.entry), image.id, "input");
+      const CocoImage entry = read_coco_image(part(image.entry), image.id, "input");
       for (std::size_t k = image.first_annotation; k < index.images[i + 1].first_annotation; ++k) {
-        add_coco_annotation(part(index.annotations[k]), image.id, size, index, schema, "input",
-                            annotation);
+        add_coco_annotation(part(index.annotations[k]), image.id, entry.size, index, schema,
+                            "input", annotation);
       }
+      if (!index.categories.empty())
+        add_ignored_regions(entry, entry.size, index, "input", annotation);
     } catch (const std::runtime_error&) {
     }
     check_annotation(annotation, schema);

@@ -15,8 +15,16 @@ FLOORS = [
     ["stages/base/charts", "stages/base/processor", "stages/base/processor_clones.h"],
     ["stages/base/hdf5", "stages/base/images"],
     ["stages/base/archives", "stages/base/videos"],
-    ["stages/recordings"],
-    ["stages/frames", "stages/labels", "stages/events", "stages/generator", "stages/training",
+    ["stages/recordings/order"],
+    ["stages/recordings/readers"],
+    ["stages/recordings/writers"],
+    ["stages/frames/dataset"],
+    ["stages/frames/listing", "stages/frames/decoding"],
+    ["stages/frames/naming", "stages/frames/kitti", "stages/frames/mpii", "stages/frames/human36m"],
+    ["stages/frames/own_labels"],
+    ["stages/frames/sequences"],
+    ["stages/frames/events"],
+    ["stages/frames/sources", "stages/labels", "stages/events", "stages/generator", "stages/training",
      "stages/shards", "stages/synthetic", "stages/exports"],
     ["pipeline/runtime"],
     ["pipeline/planning"],
@@ -30,13 +38,15 @@ FLOORS = [
     ["pipeline/commands", "pipeline/library"],
     ["pipeline/main.cc", "pipeline/without_torch.cc", "pipeline/without_videos.cc"],
 ]
-# Headers of a heavy library that several rooms share: sources and headers in detail/ may include them, public headers not.
+# Headers of a heavy library that rooms share: sources and headers in detail/ may include them, public headers not.
 HEAVY_HEADERS = {
     "manifests/documents/json_text.h", "manifests/documents/strict_json.h", "pipeline/command_line/usage.h",
-    "stages/base/archives/array_json.h", "stages/base/hdf5/hdf5.h", "stages/base/hdf5/hdf5_output_file.h",
+    "stages/base/archives/array_json.h", "stages/base/archives/mat_json.h", "stages/base/hdf5/hdf5.h",
+    "stages/base/hdf5/hdf5_output_file.h",
 }
 HEAVY_LIBRARIES = re.compile(r"(?:nlohmann|opencv2|oneapi|tbb|fmt|CLI|libav\w+|flatbuffers|torch|c10)/|"
-                             r"hdf5\.h|matio\.h|pugixml\.hpp|zip\.h|yaml-cpp/|jpeglib\.h|png\.h|tiff\w*\.h|H5public\.h")
+                             r"hdf5\.h|matio\.h|pugixml\.hpp|zip\.h|yaml-cpp/|jpeglib\.h|png\.h|tiff\w*\.h|H5public\.h|"
+                             r"utf8proc\.h")
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
 
 namespace eventgan::testing {
 

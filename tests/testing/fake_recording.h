@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan::testing {
 

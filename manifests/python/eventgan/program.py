@@ -296,7 +296,7 @@ class _Shown:
         if kind != "progress" or not self._tqdm:
             return
         phase = event.get("phase")
-        if not self._bar or phase != self._phase:
+        if self._bar is None or phase != self._phase:
             self.close()
             unit = next((key[:-len("_per_s")] for key in event if key.endswith("_per_s") and key != "mb_per_s"), "")
             self._bar, self._phase = self._tqdm(total=event["total"], desc=phase, unit=" " + unit,
@@ -305,6 +305,6 @@ class _Shown:
         self._bar.update(event["done"] - self._bar.n)
 
     def close(self) -> None:
-        if self._bar:
+        if self._bar is not None:
             self._bar.close()
             self._bar = None

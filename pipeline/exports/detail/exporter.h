@@ -115,6 +115,10 @@ std::vector<const ExportShard*> of_split(const ExportInput& input,
 void write_image_pair(const OutgoingSample& sample, const std::string& folder, double full_scale,
                       ExportFolder::Step& step);
 
+/// Writes FOLDER/NAME.png, the volume as an image (polarity_image_png).
+void write_polarity_image(const OutgoingSample& sample, const std::string& folder,
+                          double full_scale, ExportFolder::Step& step);
+
 /// Counts a sample that has values above the full scale.
 void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut& left_out);
 

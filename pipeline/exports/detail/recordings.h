@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "pipeline/exports/detail/exporter.h"
-#include "stages/recordings/event_columns_writer.h"
+#include "stages/recordings/writers/event_columns_writer.h"
 
 namespace eventgan {
 

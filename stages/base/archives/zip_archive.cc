@@ -4,6 +4,7 @@
 #include <zip.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <memory>
 #include <stdexcept>
 #include <string_view>
@@ -64,9 +65,12 @@ struct ZipArchive::State {
     }
     int code = 0;
     const int descriptor = ::dup(bytes.descriptor());  // libzip's, unless it fails
+    if (descriptor < 0) require_open_files_left(errno, path);
     archive.reset(zip_fdopen(descriptor, 0, &code));
     if (!archive) {
+      const int error = errno;  // of another descriptor that libzip makes
       ::close(descriptor);
+      if (code == ZIP_ER_OPEN) require_open_files_left(error, path);
       throw std::runtime_error("expected a zip file, got \"" + text_of(code) + "\", in " + path);
     }
     const zip_int64_t count = zip_get_num_entries(archive.get(), 0);

@@ -11,8 +11,8 @@
 namespace eventgan {
 
 /// Read access to a zip file of at most 65536 members (PyTorch checkpoints, .npz), so that its list
-/// of members takes less than 32 MiB. Throws std::runtime_error naming the file and the member. Not
-/// thread safe.
+/// of members takes less than 32 MiB. Throws std::runtime_error naming the file and the member;
+/// LimitReached as InputFile does. Not thread safe.
 class ZipArchive {
  public:
   explicit ZipArchive(const std::filesystem::path& file);

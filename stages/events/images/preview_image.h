@@ -76,6 +76,12 @@ ColourFrame draw_tile(const PreviewContent& content, int width);
 /// Tiles in rows of `columns` in their order: a contact sheet. At least one tile.
 ColourFrame draw_sheet(std::span<const ColourFrame> tiles, int columns);
 
+/// A volume [2 bins, y, x] as an image that any loader opens, of its size, as the bytes of a PNG:
+/// with P and N the sums of a pixel's positive and negative bins over `full_scale`, red is P, green
+/// 0.5 + (P - N) / 2 and blue N, each within 0..1 times 255, rounded. Thread safe.
+std::string polarity_image_png(std::span<const float> volume, const VolumeShape& shape,
+                               double full_scale);
+
 /// The average-timestamp image of a volume [2 bins, y, x] alone, coloured as above and of the
 /// volume's size, as the bytes of a PNG. Throws std::runtime_error if it cannot be encoded. Thread
 /// safe.

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <stdexcept>
+#include <utility>
 
 #include "stages/events/simulation/affine_motion.h"
 #include "stages/events/simulation/sensor.h"
@@ -42,6 +43,30 @@ std::vector<Event> simulate_interval(const Interval& interval, const SensorSpec&
   std::vector<Event> events;
   feed_interval(sensor, interval, 0, duration_s, events);
   return events;
+}
+
+namespace {
+
+class FadeInterval final : public Interval {
+ public:
+  FadeInterval(GreyImage previous, GreyImage next)
+      : previous_(std::move(previous)), next_(std::move(next)) {}
+  ImageSize size() const override { return previous_.size; }
+  int steps() const override { return 1; }
+  std::vector<float> render(int step) const override {
+    return linear_intensity(step == 0 ? previous_ : next_);
+  }
+  FlowDisplacement flow() const override { return {}; }
+
+ private:
+  GreyImage previous_;
+  GreyImage next_;
+};
+
+}  // namespace
+
+std::unique_ptr<Interval> fade_between(GreyImage previous, GreyImage next) {
+  return std::make_unique<FadeInterval>(std::move(previous), std::move(next));
 }
 
 std::vector<Event> simulate_affine(const GreyImage& image, double max_displacement_px,

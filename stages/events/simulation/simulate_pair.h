@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "manifests/values/counter_random.h"
@@ -21,6 +22,10 @@ void feed_interval(Sensor& sensor, const Interval& interval, double from_s, doub
 /// below.
 std::vector<Event> simulate_interval(const Interval& interval, const SensorSpec& sensor,
                                      double duration_s, CounterRandom random);
+
+/// Two frames and no image between them: the sensor itself takes the log intensity to move on a
+/// line from one to the next. It has no flow.
+std::unique_ptr<Interval> fade_between(GreyImage previous, GreyImage next);
 
 /// How the events of a pair are ordered: by time, then y, x, polarity (negative first), or pixel by
 /// pixel in C order and each pixel's by time, which takes no sorting.

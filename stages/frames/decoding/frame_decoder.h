@@ -14,7 +14,7 @@
 #include "manifests/values/frames.h"
 #include "manifests/values/job.h"
 #include "stages/base/images/image_file.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/video_frames.h"
 
 namespace eventgan {

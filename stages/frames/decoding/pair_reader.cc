@@ -82,9 +82,9 @@ PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_und
     : base_(std::move(base)),
       spec_(std::move(spec)),
       tells_between_(tells_between),
-      images_(std::make_unique<SharedResults<SharedFrame>>(2 * pairs_under_way + kLongestGap +
-                                                           kMargin)),
-      last_still_(std::make_unique<SharedResults<SharedImage>>(1)),
+      images_(std::make_unique<RecentlyUsed<std::string, SharedFrame>>(2 * pairs_under_way +
+                                                                       kLongestGap + kMargin)),
+      last_still_(std::make_unique<RecentlyUsed<std::string, SharedImage>>(1)),
       files_(std::make_unique<FilesAhead>()),
       stills_(base_, pairs_under_way + kMargin),
       videos_(std::make_unique<OpenVideos<SharedFrame>>(

@@ -18,9 +18,9 @@
 #include "manifests/values/job.h"
 #include "manifests/values/labels.h"
 #include "manifests/values/placement.h"
+#include "manifests/values/recently_used.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/decoding/prepared_frame.h"
-#include "stages/frames/decoding/shared_results.h"
 #include "stages/frames/decoding/video_frames.h"
 
 namespace eventgan {
@@ -100,8 +100,8 @@ class PairReader {
   std::filesystem::path base_;
   ImageSpec spec_;
   bool tells_between_;
-  std::unique_ptr<SharedResults<SharedFrame>> images_;
-  std::unique_ptr<SharedResults<SharedImage>> last_still_;
+  std::unique_ptr<RecentlyUsed<std::string, SharedFrame>> images_;
+  std::unique_ptr<RecentlyUsed<std::string, SharedImage>> last_still_;
   std::unique_ptr<FilesAhead> files_;
   FrameDecoder stills_;
   std::unique_ptr<OpenVideos<SharedFrame>> videos_;

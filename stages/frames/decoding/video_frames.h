@@ -7,13 +7,14 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
-#include <list>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "manifests/values/recently_used.h"
 #include "stages/base/images/image_file.h"
 #include "stages/base/videos/video_file.h"
 
@@ -102,43 +103,21 @@ class OpenVideos {
                                   const std::array<std::int64_t, kCount>& positions,
                                   std::int64_t stride = 1) {
     const std::lock_guard lock(mutex_);
-    VideoWindow<Kept>& video = open(path, stride);
+    const auto video = videos_.get({path, stride}, [&] {
+      return std::make_shared<VideoWindow<Kept>>(path, kept_frames_, keep_, stride);
+    });
     std::array<Kept, kCount> frames;
     std::ranges::transform(positions, frames.begin(),
-                           [&](std::int64_t position) { return video.frame(position); });
+                           [&](std::int64_t position) { return video->frame(position); });
     return frames;
   }
 
  private:
-  static constexpr std::size_t kMostOpen = 2;
-
-  struct OpenVideo {
-    OpenVideo(const std::filesystem::path& video_path, int kept_frames, const Keep& keep,
-              std::int64_t frame_stride)
-        : path(video_path),
-          stride(frame_stride),
-          window(video_path, kept_frames, keep, frame_stride) {}
-    std::filesystem::path path;
-    std::int64_t stride;
-    VideoWindow<Kept> window;
-  };
-
-  VideoWindow<Kept>& open(const std::filesystem::path& path, std::int64_t stride) {
-    const auto video = std::ranges::find_if(
-        videos_, [&](const OpenVideo& one) { return one.path == path && one.stride == stride; });
-    if (video != videos_.end()) {
-      videos_.splice(videos_.begin(), videos_, video);
-    } else {
-      videos_.emplace_front(path, kept_frames_, keep_, stride);
-      if (videos_.size() > kMostOpen) videos_.pop_back();
-    }
-    return videos_.front().window;
-  }
-
   int kept_frames_;
   Keep keep_;
   std::mutex mutex_;
-  std::list<OpenVideo> videos_;  ///< most recently used first
+  RecentlyUsed<std::pair<std::filesystem::path, std::int64_t>, std::shared_ptr<VideoWindow<Kept>>>
+      videos_{2};  ///< by path and stride
 };
 
 }  // namespace eventgan

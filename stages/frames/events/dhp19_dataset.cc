@@ -7,9 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
-#include <list>
 #include <map>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
@@ -20,15 +18,15 @@
 
 #include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/recently_used.h"
+#include "stages/base/archives/mat_file.h"
+#include "stages/base/archives/mat_json.h"
 #include "stages/base/archives/numpy_arrays.h"
-#include "stages/frames/dataset_kinds.h"
-#include "stages/frames/human36m/detail/pose_table.h"
+#include "stages/frames/dataset/full_rank.h"
+#include "stages/frames/human36m/derived_frame.h"
 #include "stages/frames/human36m/human36m_dataset.h"
-#include "stages/frames/kitti/detail/calibration_file.h"
-#include "stages/frames/mpii/detail/mat_file.h"
-#include "stages/frames/mpii/detail/mat_json.h"
-#include "stages/frames/source_folders.h"
-#include "stages/recordings/dhp19_events.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/recordings/readers/dhp19_events.h"
 
 namespace eventgan {
 namespace {
@@ -242,7 +240,6 @@ class Dhp19Dataset final : public Dataset {
 
   /// What is open of a recording.
   struct Opened {
-    std::string name;
     Dhp19Events events;
     Poses poses;
   };
@@ -335,20 +332,11 @@ class Dhp19Dataset final : public Dataset {
 
   /// A recording's file and poses; those used last stay open.
   std::shared_ptr<const Opened> open(const std::string& name) const {
-    constexpr std::size_t kMostOpen = 4;
-    const std::lock_guard lock(mutex_);
-    const auto kept =
-        std::ranges::find(opened_, name, [](const auto& entry) { return entry->name; });
-    if (kept != opened_.end()) {
-      opened_.splice(opened_.begin(), opened_, kept);
-    } else {
+    return opened_.get(name, [&] {
       const Dhp19Files& recorded = recordings_.at(name);
-      opened_.push_front(
-          std::make_shared<const Opened>(Opened{name, Dhp19Events(root_.on_disk(recorded.events)),
-                                                read_poses(root_.on_disk(recorded.poses))}));
-      if (opened_.size() > kMostOpen) opened_.pop_back();
-    }
-    return opened_.front();
+      return std::make_shared<const Opened>(Opened{Dhp19Events(root_.on_disk(recorded.events)),
+                                                   read_poses(root_.on_disk(recorded.poses))});
+    });
   }
 
   SourceRoot root_;
@@ -359,8 +347,7 @@ class Dhp19Dataset final : public Dataset {
   std::vector<LabelledFrame> labelled_;
   std::vector<std::string> annotation_files_;  ///< as FrameRef::path is written
   std::vector<std::string> notes_;
-  mutable std::mutex mutex_;
-  mutable std::list<std::shared_ptr<const Opened>> opened_;
+  mutable RecentlyUsed<std::string, std::shared_ptr<const Opened>> opened_{4};
 };
 
 }  // namespace

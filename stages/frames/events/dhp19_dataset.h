@@ -4,7 +4,8 @@
 #include <memory>
 
 #include "manifests/values/job.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
+#include "stages/frames/dataset/dataset_reader.h"
 
 namespace eventgan {
 
@@ -32,5 +33,7 @@ namespace eventgan {
 /// recording cannot be opened or has no poses.
 std::unique_ptr<Dataset> open_dhp19_dataset(const SourceSpec& spec,
                                             const std::filesystem::path& base);
+
+extern const DatasetReader kDhp19Reader;
 
 }  // namespace eventgan

@@ -10,13 +10,13 @@
 
 #include "manifests/values/datasets.h"
 #include "manifests/values/recording_formats.h"
-#include "stages/frames/dataset_kinds.h"
+#include "stages/frames/dataset/dataset_reader.h"
 #include "stages/frames/events/recording_dataset.h"
 #include "stages/frames/events/recording_labels.h"
+#include "stages/frames/listing/image_folder.h"
+#include "stages/frames/listing/source_folders.h"
 #include "stages/frames/sequences/frames_dataset.h"
-#include "stages/frames/sequences/image_folder.h"
-#include "stages/frames/source_folders.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 namespace {

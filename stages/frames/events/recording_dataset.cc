@@ -22,7 +22,7 @@
 #include "manifests/values/faults.h"
 #include "stages/frames/events/recording_folder.h"
 #include "stages/frames/events/recording_labels.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 namespace {

@@ -4,7 +4,8 @@
 #include <memory>
 
 #include "manifests/values/job.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
+#include "stages/frames/dataset/dataset_reader.h"
 
 namespace eventgan {
 
@@ -40,5 +41,7 @@ namespace eventgan {
 /// cannot be read; UsageError if `annotations` does not fit.
 std::unique_ptr<Dataset> open_recording_dataset(const SourceSpec& spec,
                                                 const std::filesystem::path& base);
+
+extern const DatasetReader kRecordingReader;
 
 }  // namespace eventgan

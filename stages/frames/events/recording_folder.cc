@@ -14,9 +14,9 @@
 #include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
 #include "stages/frames/events/recording_labels.h"
-#include "stages/frames/own_labels/detail/yolo_text.h"
-#include "stages/frames/source_folders.h"
-#include "stages/recordings/recording.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/own_labels/yolo_text.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 namespace {

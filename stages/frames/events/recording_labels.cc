@@ -18,10 +18,10 @@
 #include "manifests/files/csv_records.h"
 #include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text_lines.h"
 #include "stages/base/archives/array_json.h"
 #include "stages/base/archives/numpy_arrays.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/label_name.h"
+#include "stages/frames/dataset/label_name.h"
 
 namespace eventgan {
 namespace {

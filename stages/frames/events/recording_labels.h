@@ -8,7 +8,7 @@
 
 #include "manifests/values/frames.h"
 #include "manifests/values/labels.h"
-#include "stages/frames/own_labels/detail/yolo_text.h"
+#include "stages/frames/own_labels/yolo_text.h"
 
 namespace eventgan {
 

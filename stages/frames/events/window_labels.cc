@@ -5,7 +5,8 @@
 #include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
 #include "stages/frames/events/recording_labels.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
+#include "stages/frames/naming/found_frames.h"
+#include "stages/frames/own_labels/yolo_text.h"
 
 namespace eventgan {
 

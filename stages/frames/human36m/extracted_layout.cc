@@ -18,8 +18,9 @@
 #include "manifests/values/text.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/archives/zip_archive.h"
+#include "stages/frames/human36m/derived_frame.h"
 #include "stages/frames/human36m/detail/human36m_dataset.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 namespace {

@@ -8,10 +8,9 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/dataset_kinds.h"
 #include "stages/frames/human36m/detail/human36m_dataset.h"
-#include "stages/frames/numbered_sequence.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/numbered_sequence.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 

@@ -4,7 +4,8 @@
 #include <memory>
 
 #include "manifests/values/job.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
+#include "stages/frames/dataset/dataset_reader.h"
 
 namespace eventgan {
 
@@ -57,5 +58,7 @@ std::unique_ptr<Dataset> open_human36m_dataset(const SourceSpec& spec,
 /// What the name of a sequence tells: SUBJECT, separator, ACTION, last separator, CAMERA, with "/"
 /// or "_" and "." as separators.
 FrameOrigin human36m_origin(const std::string& sequence);
+
+extern const DatasetReader kHuman36mReader;
 
 }  // namespace eventgan

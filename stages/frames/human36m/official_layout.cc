@@ -17,11 +17,12 @@
 #include "manifests/values/faults.h"
 #include "stages/base/archives/array_json.h"
 #include "stages/base/archives/cdf_matrix.h"
+#include "stages/frames/decoding/video_clip.h"
+#include "stages/frames/human36m/derived_frame.h"
 #include "stages/frames/human36m/detail/camera_book.h"
 #include "stages/frames/human36m/detail/human36m_dataset.h"
 #include "stages/frames/human36m/detail/pose_table.h"
-#include "stages/frames/sequences/video_clip.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 namespace {

@@ -8,12 +8,13 @@
 #include <utility>
 
 #include "manifests/values/text.h"
+#include "manifests/values/text_lines.h"
 #include "stages/base/images/image_file.h"
 #include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/kitti_raw_dataset.h"
 #include "stages/frames/kitti/raw_drive.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 namespace {

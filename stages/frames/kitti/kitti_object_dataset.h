@@ -8,9 +8,10 @@
 #include <vector>
 
 #include "manifests/values/job.h"
-#include "stages/frames/dataset.h"
-#include "stages/frames/numbered_sequence.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/dataset/dataset.h"
+#include "stages/frames/dataset/dataset_reader.h"
+#include "stages/frames/listing/numbered_sequence.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 
@@ -63,5 +64,7 @@ class ObjectImages {
 /// Throws UsageError if `raw_root` is given without `devkit`.
 std::unique_ptr<Dataset> open_kitti_object_dataset(const SourceSpec& spec,
                                                    const std::filesystem::path& base);
+
+extern const DatasetReader kKittiObjectReader;
 
 }  // namespace eventgan

@@ -7,10 +7,11 @@
 #include <utility>
 
 #include "manifests/values/text.h"
+#include "manifests/values/text_lines.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/raw_drive.h"
 #include "stages/frames/kitti/tracklets.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 namespace {

@@ -4,7 +4,8 @@
 #include <memory>
 
 #include "manifests/values/job.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
+#include "stages/frames/dataset/dataset_reader.h"
 
 namespace eventgan {
 
@@ -20,5 +21,7 @@ std::unique_ptr<Dataset> open_kitti_raw_dataset(const SourceSpec& spec,
 
 /// Whether KITTI raw lies there, by its folders' names.
 bool is_kitti_raw(const std::filesystem::path& root);
+
+extern const DatasetReader kKittiRawReader;
 
 }  // namespace eventgan

@@ -10,11 +10,12 @@
 #include <utility>
 
 #include "manifests/values/text.h"
+#include "manifests/values/text_lines.h"
 #include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/raw_drive.h"
-#include "stages/frames/numbered_sequence.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/numbered_sequence.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 namespace {}  // namespace
@@ -25,7 +26,7 @@ TrackingLabels::TrackingLabels(std::string text, std::string path)
     const auto columns = split_columns(line.bytes);
     if (columns.empty()) continue;
     const auto frame = parse_whole(columns[0]);
-    if (frame && *frame >= 0 && *frame <= kMaxKittiFrame) {
+    if (frame && *frame >= 0 && *frame <= kMaxFrameNumber) {
       lines_[*frame].push_back({static_cast<std::size_t>(line.bytes.data() - text_.data()),
                                 line.bytes.size(), line.number});
     } else if (!fault_) {

@@ -12,7 +12,8 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
 #include "manifests/values/labels.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
+#include "stages/frames/dataset/dataset_reader.h"
 
 namespace eventgan {
 
@@ -52,5 +53,7 @@ class TrackingLabels {
 /// "label_02/0001.txt#12".
 std::unique_ptr<Dataset> open_kitti_tracking_dataset(const SourceSpec& spec,
                                                      const std::filesystem::path& base);
+
+extern const DatasetReader kKittiTrackingReader;
 
 }  // namespace eventgan

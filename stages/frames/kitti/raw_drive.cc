@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/kitti/kitti_label.h"
+#include "manifests/values/text_lines.h"
 
 namespace eventgan {
 namespace {

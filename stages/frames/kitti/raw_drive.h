@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/dataset_kinds.h"
-#include "stages/frames/numbered_sequence.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/dataset/dataset_reader.h"
+#include "stages/frames/listing/numbered_sequence.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 

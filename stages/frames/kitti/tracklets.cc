@@ -15,8 +15,10 @@
 
 #include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text_lines.h"
 #include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"
+#include "stages/frames/listing/numbered_sequence.h"
 
 namespace eventgan {
 namespace {
@@ -134,8 +136,8 @@ Tracklets::Tracklets(const std::string& xml, std::string path)
   for (const pugi::xml_node& tracklet : tracklets.children("item")) {
     try {
       auto frame = number<std::int64_t>(tracklet, "first_frame");
-      if (frame < 0 || frame > kMaxKittiFrame) {
-        throw BadField("expected a first_frame from 0 to " + std::to_string(kMaxKittiFrame) +
+      if (frame < 0 || frame > kMaxFrameNumber) {
+        throw BadField("expected a first_frame from 0 to " + std::to_string(kMaxFrameNumber) +
                        ", got " + std::to_string(frame));
       }
       check_count(tracklet.child("poses"), "poses");

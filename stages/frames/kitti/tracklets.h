@@ -11,7 +11,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/frames.h"
 #include "manifests/values/labels.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 

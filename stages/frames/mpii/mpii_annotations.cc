@@ -8,8 +8,8 @@
 
 #include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
-#include "stages/frames/mpii/detail/mat_file.h"
-#include "stages/frames/mpii/detail/mat_json.h"
+#include "stages/base/archives/mat_file.h"
+#include "stages/base/archives/mat_json.h"
 
 namespace eventgan {
 

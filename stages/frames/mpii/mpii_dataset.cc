@@ -10,9 +10,9 @@
 
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
+#include "stages/frames/listing/source_folders.h"
 #include "stages/frames/mpii/detail/mpii_annotations.h"
 #include "stages/frames/mpii/mpii_frames.h"
-#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 namespace {

@@ -4,7 +4,8 @@
 #include <memory>
 
 #include "manifests/values/job.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
+#include "stages/frames/dataset/dataset_reader.h"
 
 namespace eventgan {
 
@@ -26,5 +27,7 @@ namespace eventgan {
 /// InputError if a .mat file or the root is missing or damaged, or two images have one name.
 std::unique_ptr<Dataset> open_mpii_dataset(const SourceSpec& spec,
                                            const std::filesystem::path& base);
+
+extern const DatasetReader kMpiiReader;
 
 }  // namespace eventgan

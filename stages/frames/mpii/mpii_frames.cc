@@ -14,7 +14,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "stages/base/images/image_file.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
 namespace {

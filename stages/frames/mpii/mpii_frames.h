@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "manifests/values/job.h"
-#include "stages/frames/dataset_kinds.h"
-#include "stages/frames/numbered_sequence.h"
+#include "stages/frames/dataset/dataset_reader.h"
+#include "stages/frames/listing/numbered_sequence.h"
 
 namespace eventgan {
 

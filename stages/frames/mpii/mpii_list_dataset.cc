@@ -20,10 +20,10 @@
 #include "manifests/values/text.h"
 #include "stages/base/archives/array_json.h"
 #include "stages/base/archives/hdf5_arrays.h"
+#include "stages/frames/listing/source_folders.h"
 #include "stages/frames/mpii/detail/mpii_annotations.h"
 #include "stages/frames/mpii/detail/mpii_list_dataset.h"
 #include "stages/frames/mpii/mpii_frames.h"
-#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 namespace {

@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "manifests/values/job.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
+#include "stages/frames/dataset/dataset_reader.h"
 
 namespace eventgan {
 
@@ -34,5 +35,7 @@ std::unique_ptr<Dataset> open_mpii_list_dataset(const SourceSpec& spec,
 /// The JSON lists and tables of people in ROOT and ROOT/annot, by name. Reads the .json and .h5
 /// files there to find out, unless they are more than twenty or above 64 MiB.
 std::vector<std::filesystem::path> find_mpii_lists(const std::filesystem::path& root);
+
+extern const DatasetReader kMpiiListReader;
 
 }  // namespace eventgan

@@ -1,6 +1,8 @@
 #include "stages/frames/own_labels/detail/coco_entry.h"
 
 #include <algorithm>
+#include <array>
+#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -12,7 +14,7 @@
 #include "manifests/documents/strict_json.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/outlines.h"
-#include "stages/frames/kitti/kitti_label.h"
+#include "manifests/values/text_lines.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
 
 namespace eventgan {
@@ -50,6 +52,7 @@ class CocoEntry {
   }
 
   const std::string& place() const { return place_; }
+  const nlohmann::json& document() const { return document_; }
   StrictObject object() { return StrictValue(document_, faults_).object(); }
   void check() const {
     if (!faults_.empty()) throw BadLabel(faults_.text("; "));
@@ -148,44 +151,162 @@ bool read_flag(const StrictValue& value) {
   return value.is_boolean() ? value.boolean() : value.integer(0, 1) == 1;
 }
 
-/// Whether a joint of the annotation is annotated.
-bool read_keypoints(StrictObject& object, std::size_t joints, bool has_names, Person& person) {
+/// The object's number in its sequence: of CocoVID, TAO and PoseTrack, of BDD100K, of CVAT. -1 if
+/// there is none, or another value.
+std::int64_t read_track(const nlohmann::json& annotation) {
+  const auto member = [](const nlohmann::json& object, const char* key) {
+    const auto found = object.is_object() ? object.find(key) : object.end();
+    return object.is_object() && found != object.end() ? *found : nlohmann::json();
+  };
+  for (const nlohmann::json& track :
+       {member(annotation, "track_id"), member(annotation, "instance_id"),
+        member(member(annotation, "attributes"), "track_id")}) {
+    if (track.is_number_integer() && track >= 0) return track;
+  }
+  return Box().track_id;
+}
+
+/// COCO-WholeBody's joints beside the 17 of the body, in the order of its 133.
+struct BodyPart {
+  const char *key, *valid;
+  std::size_t joints;
+};
+constexpr std::array<BodyPart, 4> kBodyParts{{{"foot_kpts", "foot_valid", 6},
+                                              {"face_kpts", "face_valid", 68},
+                                              {"lefthand_kpts", "lefthand_valid", 21},
+                                              {"righthand_kpts", "righthand_valid", 21}}};
+constexpr std::size_t kPartJoints = 116;
+
+/// Of the face's 68 landmarks (iBUG's, as in 300-W) the one on its other side; itself in the
+/// middle.
+int mirrored_landmark(int i) {
+  struct Row {
+    int last, sum;
+  };
+  constexpr std::array<Row, 12> kRows{{{16, 16},
+                                       {26, 43},
+                                       {30, 0},
+                                       {35, 66},
+                                       {39, 81},
+                                       {41, 87},
+                                       {45, 81},
+                                       {47, 87},
+                                       {54, 102},
+                                       {59, 114},
+                                       {64, 124},
+                                       {67, 132}}};
+  const auto row = std::ranges::find_if(kRows, [&](const Row& of) { return i <= of.last; });
+  return row->sum == 0 ? i : row->sum - i;
+}
+
+/// Names that tell the sides: a landmark of the left has the number of the right one.
+std::vector<std::string> part_joint_names() {
+  std::vector<std::string> names{"left_big_toe",  "left_small_toe",  "left_heel",
+                                 "right_big_toe", "right_small_toe", "right_heel"};
+  for (int i = 0; i < 68; ++i) {
+    const int other = mirrored_landmark(i);
+    names.push_back((i < other ? "right_" : (i > other ? "left_" : "")) + std::string("face_") +
+                    std::to_string(std::min(i, other)));
+  }
+  for (const char* hand : {"left_hand_", "right_hand_"}) {
+    for (int i = 0; i < 21; ++i) names.push_back(hand + std::to_string(i));
+  }
+  return names;
+}
+
+Joint joint_at(const StrictValue& x, const StrictValue& y, int visible) {
+  constexpr double kHalf = 0.5;  // edges to pixels' centres
+  return {{x.number(-kFarthest_px, kFarthest_px) - kHalf,
+           y.number(-kFarthest_px, kFarthest_px) - kHalf},
+          visible};
+}
+
+void read_part(StrictObject& object, const BodyPart& part, Person& person) {
+  const auto list = find_given(object, part.key);
+  const auto valid = find_given(object, part.valid);
+  const std::vector<StrictValue> numbers =
+      list && !(valid && !read_flag(*valid)) ? list->elements() : std::vector<StrictValue>();
+  if (!numbers.empty() && numbers.size() != 3 * part.joints) {
+    list->fault("x, y, v of each of " + std::to_string(part.joints) + " joints");
+    return;
+  }
+  for (std::size_t i = 0; i < part.joints; ++i) {
+    Joint& joint = person.joints.emplace_back(Joint{kMissingPoint, 0});
+    if (numbers.empty()) continue;
+    const double seen = numbers[3 * i + 2].number(0, 2);  // a detector's is a share
+    if (seen == 0) continue;
+    joint = joint_at(numbers[3 * i], numbers[3 * i + 1], seen == 2 ? 1 : (seen == 1 ? 0 : -1));
+  }
+}
+
+/// Whether a joint of the annotation is annotated. `joints`: of the body, of which there may be no
+/// names.
+bool read_keypoints(StrictObject& object, std::size_t joints, bool has_names, bool has_parts,
+                    Person& person) {
   const auto keypoints = find_given(object, "keypoints");
-  if (!keypoints) return false;
-  const std::vector<StrictValue> numbers = keypoints->elements();
-  if (numbers.empty()) return false;  // of classes without joints
-  if (numbers.size() != 3 * joints) {
+  const std::vector<StrictValue> numbers =
+      keypoints ? keypoints->elements() : std::vector<StrictValue>();
+  if (numbers.empty() && !has_parts) return false;  // of classes without joints
+  if (!numbers.empty() && numbers.size() != 3 * joints) {
     if (!has_names) return false;
     keypoints->fault("x, y, v of each of " + std::to_string(joints) + " joints");
     return false;
   }
-  constexpr double kHalf = 0.5;  // edges to pixels' centres
-  bool any = false;
   for (std::size_t i = 0; i < joints; ++i) {
-    Joint joint{kMissingPoint, 0};
-    const Point at{numbers[3 * i].number(-kFarthest_px, kFarthest_px) - kHalf,
-                   numbers[3 * i + 1].number(-kFarthest_px, kFarthest_px) - kHalf};
+    Joint& joint = person.joints.emplace_back(Joint{kMissingPoint, 0});
+    if (numbers.empty()) continue;
     const int visible = numbers[3 * i + 2].integer(0, 2);
-    if (visible > 0) {
-      joint = {at, visible == 2 ? 1 : 0};
-      any = true;
-    }
-    person.joints.push_back(joint);
+    const Joint annotated = joint_at(numbers[3 * i], numbers[3 * i + 1], visible == 2 ? 1 : 0);
+    if (visible > 0) joint = annotated;
   }
-  return any;  // num_keypoints counts otherwise in some datasets
+  for (const BodyPart& part : kBodyParts) {
+    if (has_parts) read_part(object, part, person);
+  }
+  const auto is_annotated = [](const Joint& joint) { return joint.at != kMissingPoint; };
+  return std::ranges::any_of(person.joints, is_annotated);  // num_keypoints counts otherwise
 }
 
 }  // namespace
 
-ImageSize read_coco_image(const std::string& text, std::int64_t id, const std::string& path) {
+CocoImage read_coco_image(const std::string& text, std::int64_t id, const std::string& path) {
   constexpr int kLargest = 1'000'000;
   CocoEntry entry(text, path, "image");
   StrictObject object = entry.object();
-  const ImageSize size{object.at("height").integer(1, kLargest),
-                       object.at("width").integer(1, kLargest)};
+  CocoImage image{
+      {object.at("height").integer(1, kLargest), object.at("width").integer(1, kLargest)}};
   object.at("id").integer(id, id);  // another: the file has changed
+  if (const auto lists_x = find_given(object, "ignore_regions_x")) {
+    const StrictValue lists_y = object.at("ignore_regions_y");
+    const std::vector<StrictValue> all_x = lists_x->elements(), all_y = lists_y.elements();
+    for (std::size_t i = 0; i < std::max(all_x.size(), all_y.size()); ++i) {
+      const auto x = i < all_x.size() ? all_x[i].elements() : std::vector<StrictValue>();
+      const auto y = i < all_y.size() ? all_y[i].elements() : std::vector<StrictValue>();
+      if (x.size() != y.size()) {
+        lists_y.fault("as many numbers as ignore_regions_x has", "others");
+        break;
+      }
+      auto& corners = image.ignored.emplace_back();
+      for (std::size_t k = 0; k < x.size(); ++k) {
+        corners.push_back(
+            {x[k].number(-kFarthest_px, kFarthest_px), y[k].number(-kFarthest_px, kFarthest_px)});
+      }
+    }
+  }
   entry.check();
-  return size;
+  return image;
+}
+
+void add_ignored_regions(const CocoImage& entry, ImageSize image, const CocoIndex& index,
+                         const std::string& place, Annotation& annotation) {
+  const auto with_joints = std::ranges::find_if(
+      index.categories, [](const auto& category) { return !category.keypoints.empty(); });
+  const auto of = with_joints == index.categories.end() ? index.categories.begin() : with_joints;
+  for (const std::vector<Point>& corners : entry.ignored) {
+    Box box{.class_id = static_cast<int>(of - index.categories.begin()), .ignore = true};
+    box.outline = outline_of_parts({corners});
+    box.xyxy = bounds(box.outline);
+    add_box(box, image, place, annotation);
+  }
 }
 
 LabelSchema coco_schema(const CocoIndex& index, const std::string& path) {
@@ -197,6 +318,9 @@ LabelSchema coco_schema(const CocoIndex& index, const std::string& path) {
     if (schema.joint_names == category.keypoints) continue;
     throw InputError("expected one list of keypoints, got two, of \"" + category.name +
                      "\" another, in " + path);
+  }
+  if (index.has_body_parts && !schema.joint_names.empty()) {
+    std::ranges::move(part_joint_names(), std::back_inserter(schema.joint_names));
   }
   return schema;
 }
@@ -228,15 +352,25 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
   if (!is_told && !box.outline.empty()) sides.reset();
   box.xyxy = !sides && !box.outline.empty() ? bounds(box.outline)
                                             : read_bbox(sides ? *sides : object.at("bbox"));
-  if (const auto crowd = find_given(object, "iscrowd")) box.ignore = read_flag(*crowd);
+  for (const char* const key : {"iscrowd", "ignore"}) {
+    if (const auto flag = find_given(object, key)) box.ignore |= read_flag(*flag);
+  }
+  box.track_id = read_track(entry.document());
   if (const auto area = find_given(object, "area")) area->number(0, kFarthest_px * kFarthest_px);
   Person person;
-  const bool is_person = read_keypoints(object, schema.joint_names.size(), has_names, person);
+  const std::size_t joints = schema.joint_names.size();
+  const bool has_parts = index.has_body_parts && joints > kPartJoints;
+  const bool is_person =
+      read_keypoints(object, joints - (has_parts ? kPartJoints : 0), has_names, has_parts, person);
+  const auto head = is_person ? find_given(object, "bbox_head") : std::nullopt;  // PoseTrack's
+  std::optional<Rectangle> head_box;
+  if (head && !(head->is_array() && head->elements().empty())) head_box = read_bbox(*head);
   entry.check();
   if (!add_box(box, image, entry.place(), annotation)) return;
   note_parts_left_out(segmentation.without_area, segmentation.parts, entry.place(), annotation);
   if (is_person) {
     person.box = box.xyxy;
+    person.head_box = head_box;
     annotation.persons.push_back(std::move(person));
   }
 }

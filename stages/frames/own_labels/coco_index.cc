@@ -4,6 +4,7 @@
 #include <array>
 #include <functional>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -14,10 +15,10 @@
 #include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/label_name.h"
-#include "stages/frames/own_labels/detail/counted_bytes.h"
-#include "stages/frames/source_folders.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/dataset/label_name.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/naming/counted_bytes.h"
 
 namespace eventgan {
 namespace {
@@ -29,6 +30,10 @@ struct EntryFields {
   std::array<double, 4> box{};
   std::size_t box_sides = 0;
   bool is_crowd = false;
+  bool is_labelled = true;
+  std::optional<std::int64_t> category;
+  std::size_t joint_numbers = 0;  // x, y, v of each joint
+  bool has_joints = false;        // an annotated one
   std::optional<std::string> file_name, name;
   std::vector<std::string> keypoints;
 };
@@ -51,10 +56,13 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
   std::vector<Annotation> annotations;
   std::vector<Box> boxes;          // of the first annotations
   std::set<std::int64_t> classes;  // the categories of annotations
+  /// By category and by how many numbers there are: annotations with joints.
+  std::map<std::int64_t, std::map<std::size_t, std::size_t>> joints;
 
   bool null() override { return take_value("null"); }
   bool boolean(bool value) override {
     note_crowd(value);
+    if (depth_ == kInEntry && is_image() && key_ == "is_labeled") fields_.is_labelled = value;
     return take_value("true or false");
   }
   bool number_integer(std::int64_t value) override { return take_integer(value); }
@@ -93,6 +101,8 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
         refuse("the key \"" + value + "\" once", "it twice");
       }
     } else if (depth_ == kInEntry) {
+      index.has_body_parts |= is_annotation() && (value == "foot_kpts" || value == "face_kpts" ||
+                                                  value == "lefthand_kpts");
       key_ = std::move(value);
     }
     return true;
@@ -120,6 +130,7 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
     if (depth_ == 0) refuse("an object", "a list");
     if (depth_ == 2 && in_section()) refuse_value("a list");
     in_box_ = depth_ == kInEntry && is_annotation() && key_ == "bbox";
+    in_joints_ = depth_ == kInEntry && is_annotation() && key_ == "keypoints";
     in_keypoints_ = depth_ == kInEntry && is_category() && key_ == "keypoints";
     if (in_keypoints_ && !fields_.keypoints.empty()) refuse("the key \"keypoints\" once", "twice");
     check_not_wanted("a list");
@@ -129,7 +140,7 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
 
   bool end_array() override {
     --depth_;
-    if (depth_ == kInEntry) in_keypoints_ = in_box_ = false;
+    if (depth_ == kInEntry) in_keypoints_ = in_box_ = in_joints_ = false;
     return true;
   }
 
@@ -189,8 +200,9 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
     return true;
   }
 
-  /// Of a box's sides and an image's.
+  /// Of a box's sides, an image's, and joints.
   void take_number(double value) {
+    if (in_joints_) fields_.has_joints |= fields_.joint_numbers++ % 3 == 2 && value > 0;
     if (in_box_ && depth_ == kInEntry + 1 && fields_.box_sides < fields_.box.size()) {
       fields_.box[fields_.box_sides++] = value;
     } else if (depth_ == kInEntry && is_image() && (key_ == "width" || key_ == "height")) {
@@ -207,6 +219,7 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
     note_crowd(value == 1);
     if (depth_ == kInEntry && is_annotation() && key_ == "category_id") {
       if (classes.empty() || value != last_class_) classes.insert(last_class_ = value);
+      fields_.category = value;
       return true;
     }
     if (depth_ == kInEntry && (is_image() || is_category()) && key_ == "id") {
@@ -240,6 +253,9 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
       need(fields_.image_id, "image_id");
       annotations.push_back({*fields_.image_id, range});
       index.crowds += fields_.is_crowd;
+      if (fields_.has_joints && fields_.category) {
+        ++joints[*fields_.category][fields_.joint_numbers];
+      }
       constexpr std::size_t kMostBoxes = 1000;
       const auto& [left, top, width, height] = fields_.box;
       if (fields_.box_sides == fields_.box.size() && boxes.size() < kMostBoxes) {
@@ -255,7 +271,8 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
         return given >= 1 && given <= kLargest ? static_cast<int>(given) : 0;
       };
       index.images.push_back({*fields_.id, range, *std::move(fields_.file_name),
-                              ImageSize{side(fields_.size[1]), side(fields_.size[0])}});
+                              ImageSize{side(fields_.size[1]), side(fields_.size[0])},
+                              fields_.is_labelled});
     } else {
       need(fields_.name, "name");
       index.categories.push_back(
@@ -269,7 +286,7 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
   std::size_t section_ = kSections.size();
   std::array<bool, kSections.size()> has_section_{};
   std::string key_;  // the entry's last
-  bool in_keypoints_ = false, in_box_ = false;
+  bool in_keypoints_ = false, in_box_ = false, in_joints_ = false;
   std::int64_t last_class_ = 0;
   std::uint64_t begin_ = 0;
   EntryFields fields_;
@@ -317,6 +334,31 @@ void check_categories(CocoIndex& index, const std::set<std::int64_t>& used,
       if (is_label_name(joint) && joints.insert(joint).second) continue;
       refuse_any({escape_controls(joint)}, "each keypoint with a name of its own", "another",
                  written);
+    }
+  }
+}
+
+/// Numbers the joints of categories that have no names of them, or counts what is left out.
+void number_joints(CocoIndex& index, const decltype(CocoReader::joints)& joints) {
+  constexpr std::size_t kMostJoints = 1000;
+  std::vector<CocoIndex::Category*> without;
+  std::size_t named = 0;  // numbers of those that have names
+  std::set<std::size_t> lengths;
+  for (CocoIndex::Category& category : index.categories) {
+    named = std::max(named, 3 * category.keypoints.size());
+    const auto found = joints.find(category.id);
+    if (!category.keypoints.empty() || found == joints.end()) continue;
+    without.push_back(&category);
+    for (const auto& [length, count] : found->second) lengths.insert(length);
+  }
+  const std::size_t only = lengths.size() == 1 ? *lengths.begin() : 0;
+  const bool can_number = named == 0 && only % 3 == 0 && only <= 3 * kMostJoints;
+  for (CocoIndex::Category* const category : without) {
+    for (std::size_t i = 0; can_number && i < only / 3; ++i) {
+      category->keypoints.push_back(std::to_string(i));
+    }
+    for (const auto& [length, count] : joints.at(category->id)) {
+      if (category->keypoints.empty() && length != named) index.joints_left_out += count;
     }
   }
 }
@@ -382,6 +424,7 @@ CocoIndex index_coco(const InputFile& file, const std::string& written) {
   reader.check_whole();
   CocoIndex index = std::move(reader.index);
   check_categories(index, reader.classes, written);
+  number_joints(index, reader.joints);
   join(reader.annotations, reader.boxes, index, written);
   return index;
 }

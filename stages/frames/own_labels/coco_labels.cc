@@ -8,10 +8,12 @@
 #include <unordered_map>
 #include <utility>
 
+#include "manifests/values/text.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/naming/found_frames.h"
 #include "stages/frames/own_labels/detail/coco_entry.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
-#include "stages/frames/own_labels/own_labels.h"
+#include "stages/frames/own_labels/label_readers.h"
 
 namespace eventgan {
 namespace {
@@ -30,6 +32,7 @@ class CocoLabels : public OwnLabels {
     }
     find_images();
     note_without_label(written_);
+    note_joints();
     warn_of_corners();
     warn_of_crowds();
   }
@@ -37,7 +40,8 @@ class CocoLabels : public OwnLabels {
   Outcome<Annotation> annotation(const std::string& label_key) const override try {
     const CocoIndex::Image& image = find(label_key);
     std::string text = read(image.entry);
-    Outcome<ImageSize> size = image_size(label_key, read_coco_image(text, image.id, written_));
+    const CocoImage entry = read_coco_image(text, image.id, written_);
+    Outcome<ImageSize> size = image_size(label_key, entry.size);
     if (is_fault(size)) return size.fault();
     Annotation annotation;
     annotation.original = "{\"image\": " + text + ", \"annotations\": [";
@@ -48,6 +52,10 @@ class CocoLabels : public OwnLabels {
       add_coco_annotation(text, image.id, *size, index_, schema_, written_, annotation);
     }
     annotation.original += "]}";
+    if (!index_.categories.empty()) {
+      add_ignored_regions(entry, *size, index_, label_place(label_key), annotation);
+    }
+    forget_shared_tracks(annotation.boxes);
     return annotation;
   } catch (const std::runtime_error& error) {
     return SampleFault{error.what()};
@@ -64,9 +72,19 @@ class CocoLabels : public OwnLabels {
     for (std::size_t i = 0; i < index_.image_count(); ++i) {
       CocoIndex::Image& image = index_.images[i];
       place_of_id_.emplace(image.id, i);
+      const bool has_none = image.first_annotation == index_.images[i + 1].first_annotation;
+      if (!image.is_labelled && has_none) continue;  // nobody looked for objects
       named.push_back({std::exchange(image.file_name, {}), std::to_string(image.id)});
     }
     give_named(named, written_);
+  }
+
+  void note_joints() {
+    if (index_.joints_left_out == 0) return;
+    notes_.push_back(fmt::format(
+        "keypoints of {} left out, since their category names none and they differ in number, in "
+        "{}",
+        count_text(static_cast<std::int64_t>(index_.joints_left_out), "annotation"), written_));
   }
 
   /// Some tools write corners where COCO has a width and a height.

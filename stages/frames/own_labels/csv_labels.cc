@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <set>
 #include <utility>
@@ -13,10 +14,12 @@
 
 #include "manifests/documents/json_text.h"
 #include "manifests/files/csv_records.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/label_name.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
+#include "manifests/values/text.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/dataset/label_name.h"
+#include "stages/frames/naming/found_frames.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
+#include "stages/frames/own_labels/label_readers.h"
 
 namespace eventgan {
 namespace {
@@ -36,8 +39,9 @@ constexpr std::array<CsvColumn, kColumnCount> kColumns = {{
     {"top", {"top", "y1", "ymin", "y", "bboxtop", "bbtop", "boxtop", "bboxy"}},
     {"right", {"right", "x2", "xmax", "bboxright", "boxright"}},
     {"bottom", {"bottom", "y2", "ymax", "bboxbottom", "boxbottom"}},
-    {"width", {"width", "w", "bboxwidth", "bbwidth", "boxwidth", "bboxw"}},
-    {"height", {"height", "h", "bboxheight", "bbheight", "boxheight", "bboxh"}},
+    // The plain words last: beside a pair of the box's own they are the image's.
+    {"width", {"w", "bboxwidth", "bbwidth", "boxwidth", "bboxw", "width"}},
+    {"height", {"h", "bboxheight", "bbheight", "boxheight", "bboxh", "height"}},
     {"track", {"track", "trackid", "objectid", "tracknumber", "instanceid"}},
 }};
 /// Of a detector's results, which are no labels.
@@ -100,6 +104,11 @@ Outcome<CsvColumns> columns_of(const CsvRecord& header) {
   }
   columns.has_sides =
       !columns.has(kRight) && !columns.has(kBottom) && columns.has(kWidth) && columns.has(kHeight);
+  if (columns.has_sides) {  // of which one may be the image's
+    const std::string_view width = header.fields[*columns.places[kWidth]];
+    const std::string_view height = header.fields[*columns.places[kHeight]];
+    if (rank_in(kWidth, width) != rank_in(kHeight, height)) return refuse(std::string(width));
+  }
   for (std::size_t i = 0; i <= kBottom; ++i) {
     if (columns.has(i) || (i >= kRight && columns.has_sides)) continue;
     if (!columns.unused.empty()) return refuse(columns.unused.front());
@@ -157,7 +166,8 @@ NamedBox box_of(const Row& row, bool has_sides, char separator) {
 class ImageRows {
  public:
   /// Beside the rows before it. Throws BadLabel.
-  void add(const Row& row, bool has_sides, char separator) {
+  void add(const Row& row, bool has_sides, char separator, const CsvRecord& record,
+           const std::string& place) {
     const auto is_empty = [](std::string_view field) { return field.empty(); };
     const bool is_alone = std::all_of(row.begin() + kClass, row.begin() + kWidth, is_empty) &&
                           row[kTrack].empty() &&
@@ -168,6 +178,11 @@ class ImageRows {
     is_without_boxes_ = is_alone;
     if (is_alone) return;
     NamedBox box = box_of(row, has_sides, separator);
+    if (!lines_.insert(std::hash<std::string_view>()(trimmed(record.bytes))).second) {
+      box.again_at = place;
+      labels_.boxes.push_back(std::move(box));
+      return;
+    }
     const std::int64_t track = box.box.track_id;
     if (track >= 0 && !tracks_.insert(track).second) {
       throw BadLabel("each track once in an image", std::to_string(track) + " twice");
@@ -181,6 +196,7 @@ class ImageRows {
   ImageLabels labels_;
   bool is_without_boxes_ = false;
   std::set<std::int64_t> tracks_;
+  std::set<std::size_t> lines_;  // hashes, since there may be millions
 };
 
 }  // namespace
@@ -205,7 +221,8 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
   }
   const auto& places = columns->places;
   const bool has_sides = columns->has_sides;
-  double largest = 0;
+  double largest = 0, smallest = 0;
+  bool any_fraction = false;
   std::size_t boxes = 0;
   std::map<std::string, Outcome<ImageRows>> images;
   while (const std::optional<CsvRecord> record = next()) {
@@ -231,17 +248,23 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
         throw BadLabel("expected text, got a NUL in it");
       }
       rows.labels().original.append(record->bytes);
-      rows.add(row, has_sides, separator);
+      rows.add(row, has_sides, separator, *record, place);
       if (rows.labels().boxes.empty()) continue;
       const Rectangle& box = rows.labels().boxes.back().box.xyxy;
       largest = std::max({largest, box.right, box.bottom});
+      smallest = std::min({smallest, box.left, box.top});
+      for (const double edge : {box.left, box.top, box.right, box.bottom}) {
+        any_fraction = any_fraction || edge != std::floor(edge);
+      }
       ++boxes;
     } catch (const BadLabel& bad) {
       image = bad.in(place);
     }
   }
   constexpr std::size_t kFewest = 3;
-  if (boxes >= kFewest && largest <= 1) {
+  constexpr double kTolerance = 0.01;  // of shares, as Ultralytics has it
+  const bool are_shares = any_fraction && smallest >= -kTolerance && largest <= 1 + kTolerance;
+  if (are_shares || (boxes >= kFewest && largest <= 1)) {
     throw InputError("expected edges in pixels, got shares of the image, 0..1, in " + path);
   }
   std::map<std::string, Outcome<ImageLabels>> labels;
@@ -311,7 +334,7 @@ std::optional<std::filesystem::path> find_csv(const FoundFrames& frames,
       }
       if (count_among(frames, images) == 0) continue;
       if (is_fault(columns)) {
-        remarks.push_back("a table with other columns left out: " + file.string());
+        remarks.push_back("a table left out, " + columns.fault().reason + ": " + file.string());
       } else if (found) {
         remarks.push_back("another table of labels left out: " + file.string());
       } else {

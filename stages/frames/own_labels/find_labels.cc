@@ -1,9 +1,8 @@
-#include "stages/frames/own_labels/detail/find_labels.h"
+#include "stages/frames/own_labels/find_labels.h"
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <functional>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -13,165 +12,15 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/files/input_file.h"
-#include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/frames/own_labels/own_labels.h"
-#include "stages/frames/sequences/frames_dataset.h"
-#include "stages/frames/sequences/image_folder.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/dataset/dataset_reader.h"
+#include "stages/frames/listing/image_folder.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/naming/found_frames.h"
+#include "stages/frames/own_labels/label_readers.h"
 
 namespace eventgan {
 namespace fs = std::filesystem;
-
-namespace {
-
-/// What folders of images are called where their labels lie beside them, in small letters.
-constexpr std::array<std::string_view, 4> kImageFolders = {"images", "jpegimages", "img1", "imgs"};
-
-bool is_image_folder(const std::string& name) {
-  return std::ranges::find(kImageFolders, in_small_letters(name)) != kImageFolders.end();
-}
-
-}  // namespace
-
-std::vector<fs::path> names_with(const FolderListing& listing, std::string_view extension) {
-  std::vector<fs::path> names;
-  for (const fs::path name : listing.files) {
-    const bool is_hidden = name.string().starts_with('.');
-    if (!is_hidden && lower_extension(name) == extension) names.push_back(name);
-  }
-  return names;
-}
-
-const std::vector<fs::path>& WholeFiles::in(const fs::path& folder, std::string_view extension) {
-  const auto [entry, is_new] = listed_.try_emplace(folder);
-  const FolderListing listing = is_new ? look_into(folder) : FolderListing();
-  for (const std::string_view known : {".json", ".csv"}) {
-    for (const fs::path& name : names_with(listing, known)) {
-      entry->second[known].push_back(folder / name);
-    }
-  }
-  return entry->second[extension];
-}
-
-const JsonGlimpse& WholeFiles::json(const fs::path& file) {
-  const auto [entry, is_new] = json_.try_emplace(file);
-  if (is_new) entry->second = look_at_json(file);
-  return entry->second;
-}
-
-fs::path WholeFiles::folder(const fs::path& above, std::string_view name) {
-  const auto [entry, is_new] = folders_.try_emplace(above);
-  if (is_new) {
-    for (const std::string& folder : look_into(above).folders) {
-      entry->second.emplace(in_small_letters(folder), folder);
-      entry->second[folder] = folder;
-    }
-  }
-  const auto exact = entry->second.find(std::string(name));
-  const auto found = exact != entry->second.end()
-                         ? exact
-                         : entry->second.find(in_small_letters(std::string(name)));
-  return found == entry->second.end() ? fs::path() : above / found->second;
-}
-
-std::string beginning_of(const fs::path& file) {
-  constexpr std::string_view kMark = "\xEF\xBB\xBF";
-  std::string text(1 << 16, '\0');
-  std::string reason;
-  const auto opened = InputFile::open(file, reason);
-  text.resize(opened ? opened->read_some(0, text) : 0);
-  if (text.starts_with(kMark)) text.erase(0, kMark.size());
-  return text;
-}
-
-const std::vector<std::string>& image_names_of(const FoundFrames& frames) {
-  if (frames.image_names) return *frames.image_names;
-  frames.image_names = std::make_shared<std::vector<std::string>>();
-  if (frames.is_video) return *frames.image_names;
-  const auto add = [&](const fs::path& below) {
-    const ImageFolder listed = list_image_folder(frames.root / below);
-    for (const auto& [number, name] : listed.frames.frames()) {
-      frames.image_names->push_back((below / name).generic_string());
-    }
-  };
-  if (frames.folders.empty()) add("");
-  for (const fs::path folder : frames.folders) {
-    add(folder);
-    if (has_folder(frames.root / folder / "img1")) add(folder / "img1");
-  }
-  return *frames.image_names;
-}
-
-namespace {
-
-FrameNames& names_of(const FoundFrames& frames) {
-  if (frames.names) return *frames.names;
-  const std::vector<std::string>& names = image_names_of(frames);
-  const std::vector<std::string_view> views(names.begin(), names.end());
-  frames.names = std::make_shared<FrameNames>(views, frames.root, /*is_video=*/false);
-  return *frames.names;
-}
-
-/// Of a video the names of its frames tell which one it is.
-bool is_of_video(const FoundFrames& frames, const std::string& name) {
-  const fs::path path(video_frame_name(name));
-  if (frames.stems.contains(path.parent_path().filename().string())) return true;
-  const NumberInName number = find_number(fs::path(name).stem().string());
-  const std::string& before = number.before;
-  if (number.digits.empty() || !number.after.empty()) return false;
-  const bool may_be_any = before.empty() || before.starts_with("frame");
-  return (may_be_any && frames.stems.size() == 1) ||
-         (!before.empty() && frames.stems.contains(before.substr(0, before.size() - 1)));
-}
-
-}  // namespace
-
-std::size_t count_among(const FoundFrames& frames, const std::vector<std::string>& names) {
-  if (frames.is_video) {
-    return static_cast<std::size_t>(std::ranges::count_if(
-        names, [&](const std::string& name) { return is_of_video(frames, name); }));
-  }
-  FrameNames& known = names_of(frames);
-  std::size_t count = 0;
-  for (const std::string& name : names)
-    count += known.find_exactly(name).frame != FrameNames::kNone;
-  constexpr std::size_t kMost = 1000;
-  const std::size_t step = std::max<std::size_t>(1, names.size() / kMost);
-  for (std::size_t i = 0; count == 0 && i < names.size(); i += step) {
-    count += known.find(names[i]).frame != FrameNames::kNone;
-  }
-  return count;
-}
-
-std::vector<fs::path> folders_around(const FoundFrames& frames) {
-  const fs::path above = frames.root.parent_path();
-  std::vector<fs::path> folders = {frames.root, above};
-  for (const fs::path& folder : {frames.root, above}) {
-    if (fs::path found = frames.files->folder(folder, "annotations"); !found.empty()) {
-      folders.push_back(std::move(found));
-    }
-  }
-  if (is_image_folder(above.filename().string())) {  // images/train2017
-    folders.push_back(above.parent_path());
-    if (fs::path found = frames.files->folder(above.parent_path(), "annotations"); !found.empty()) {
-      folders.push_back(std::move(found));
-    }
-  }
-  return folders;
-}
-
-/// A year may follow.
-std::string_view split_of(std::string name) {
-  static const std::map<std::string_view, std::string_view> kSplits = {
-      {"train", "train"}, {"training", "train"}, {"val", "val"},
-      {"valid", "val"},   {"validation", "val"}, {"eval", "val"},
-      {"dev", "val"},     {"test", "test"},      {"testing", "test"}};
-  name.erase(name.find_last_not_of("0123456789") + 1);
-  const auto split = kSplits.find(in_small_letters(std::move(name)));
-  return split == kSplits.end() ? "" : split->second;
-}
 
 namespace {
 
@@ -324,7 +173,8 @@ void note_overlaps(const FoundFrames& frames, const std::string& file,
   const auto word = [](const FoundSource& source) {
     return source.split.empty() ? "train" : std::string(source.split);
   };
-  std::map<std::string, const FoundSource*> listed;  // by an image's name without its extension
+  std::map<std::string, std::string_view> listed;  // the splits of images, by their paths
+  std::set<std::string> names;                     // and these without their first folders
   std::size_t twice = 0;
   for (const FoundSource& source : sources) {
     for (const FoundSource& other : sources) {
@@ -334,11 +184,14 @@ void note_overlaps(const FoundFrames& frames, const std::string& file,
       remarks.push_back("warning: images of " + word(other) + " are in split " + word(source) +
                         ", too, as " + file + " says");
     }
-    for (const fs::path image :
+    for (const fs::path line :
          source.ids ? images_of_list(*source.ids) : std::vector<std::string>()) {
-      const auto [entry, is_new] =
-          listed.emplace(image.lexically_normal().stem().string(), &source);
-      twice += !is_new && entry->second->split != source.split;
+      const std::string image = line.lexically_normal().generic_string();
+      const auto [entry, is_new] = listed.emplace(image, source.split);
+      twice += !is_new && entry->second != source.split;
+      for (std::size_t at = 0; at != image.npos; at = image.find('/', at + 1)) {
+        names.insert(image.substr(at == 0 ? 0 : at + 1));
+      }
     }
   }
   if (twice > 0) {
@@ -346,9 +199,8 @@ void note_overlaps(const FoundFrames& frames, const std::string& file,
                       " in lists of two splits, as " + file + " says");
   }
   if (listed.empty()) return;
-  const std::vector<std::string>& names = image_names_of(frames);
   const auto in_none = std::ranges::count_if(
-      names, [&](const fs::path& name) { return !listed.contains(name.stem().string()); });
+      image_names_of(frames), [&](const std::string& image) { return !names.contains(image); });
   if (in_none > 0) {
     remarks.push_back("warning: " +
                       count_text(in_none, "image", " left out: in no list of " + file));

@@ -20,8 +20,13 @@ Outcome<Annotation> numbered(ImageLabels labels, const std::vector<std::string>&
                          escape_controls(named.class_name) + "\", in " + place};
     }
     named.box.class_id = static_cast<int>(name - class_names.begin());
-    add_box(named.box, image, place, annotation);
+    if (named.again_at.empty()) {
+      add_box(named.box, image, place, annotation);
+    } else {
+      leave_out_again(named.again_at, annotation);
+    }
   }
+  forget_shared_tracks(annotation.boxes);
   return annotation;
 }
 
@@ -50,13 +55,25 @@ Outcome<Annotation> ReadLabels::annotation(const std::string& label_key) const {
   return numbered(labels, schema_.class_names, *size, label_place(label_key));
 }
 
+namespace {
+
+void leave_out(const std::string& reason, Annotation& annotation) {
+  annotation.left_out_at.push_back(annotation.boxes.size() + annotation.left_out.size());
+  annotation.left_out.push_back(reason);
+}
+
+}  // namespace
+
+void leave_out_again(const std::string& place, Annotation& annotation) {
+  leave_out("expected each line once, got it again, in " + place, annotation);
+}
+
 bool add_box(const Box& box, ImageSize image, const std::string& place, Annotation& annotation) {
   if (overlaps(box.xyxy, image)) {
     annotation.boxes.push_back(box);
     return true;
   }
-  annotation.left_out_at.push_back(annotation.boxes.size() + annotation.left_out.size());
-  annotation.left_out.push_back(outside_text(box.xyxy, image) + ", in " + place);
+  leave_out(outside_text(box.xyxy, image) + ", in " + place, annotation);
   return false;
 }
 
@@ -66,6 +83,18 @@ void note_parts_left_out(std::size_t count, std::size_t of_parts, const std::str
   annotation.outlines_mended.push_back(
       fmt::format("expected parts of an outline that have an area, got {} of {} without, in {}",
                   count, of_parts, place));
+}
+
+bool forget_shared_tracks(std::vector<Box>& boxes) {
+  std::map<std::int64_t, int> times;
+  for (const Box& box : boxes) ++times[box.track_id];
+  bool any = false;
+  for (Box& box : boxes) {
+    if (box.track_id < 0 || times[box.track_id] == 1) continue;
+    box.track_id = Box().track_id;
+    any = true;
+  }
+  return any;
 }
 
 bool overlaps(const Rectangle& box, ImageSize image) {

@@ -11,10 +11,11 @@
 #include "manifests/documents/json_text.h"
 #include "manifests/files/sha256.h"
 #include "manifests/values/outlines.h"
-#include "stages/frames/index_mask.h"
-#include "stages/frames/own_labels/detail/file_per_image.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
+#include "stages/frames/decoding/index_mask.h"
+#include "stages/frames/naming/file_per_image.h"
+#include "stages/frames/naming/found_frames.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
+#include "stages/frames/own_labels/label_readers.h"
 
 namespace eventgan {
 namespace {

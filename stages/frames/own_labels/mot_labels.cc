@@ -12,13 +12,15 @@
 #include <vector>
 
 #include "manifests/files/csv_records.h"
+#include "manifests/files/sha256.h"
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/numbered_sequence.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/listing/numbered_sequence.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/naming/found_frames.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
-#include "stages/frames/own_labels/detail/yolo_text.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/own_labels/label_readers.h"
+#include "stages/frames/own_labels/yolo_text.h"
 
 namespace eventgan {
 namespace {
@@ -165,7 +167,7 @@ MotSequence parse_mot_sequence(std::string_view text, const std::string& path) {
   };
   MotSequence sequence;
   sequence.frames_per_second = value("frameRate", 1e-6, 1e6);
-  if (const auto length = value("seqLength", 1, kMaxKittiFrame)) {
+  if (const auto length = value("seqLength", 1, kMaxFrameNumber)) {
     sequence.length = static_cast<std::int64_t>(*length);
   }
   const auto height = value("imHeight", 1, kFarthest_px), width = value("imWidth", 1, kFarthest_px);
@@ -201,7 +203,7 @@ std::map<std::int64_t, Outcome<ImageLabels>> parse_mot_labels(std::string_view t
     const std::string place = place_in_file(path, line->line);
     if (!line->fault.empty()) throw InputError(line->fault + ", in " + place);
     const auto frame = parse_whole(line->fields[kFrame]);
-    if (!frame || *frame < 1 || *frame > kMaxKittiFrame) {
+    if (!frame || *frame < 1 || *frame > kMaxFrameNumber) {
       throw InputError("expected a frame number from 1, got " + in_quotes(line->fields[0]) +
                        ", in " + place);
     }
@@ -385,7 +387,7 @@ class MotLabels : public ReadLabels {
                        source().root.written(source().frames[frames.begin()->second].name));
     }
     const std::string text = root_.read_or_throw(file);
-    const auto [first, is_new] = of_text_.emplace(std::hash<std::string>()(text), sequence);
+    const auto [first, is_new] = of_text_.emplace(sha256_hex(text), sequence);
     if (!is_new && !text.empty()) copies_.push_back(sequence + " (of " + first->second + ")");
     auto by_number = parse_mot_labels(text, form_of(file, text), path);
     if (from_0) require_all(frames, info, by_number.empty() ? 0 : by_number.rbegin()->first, path);
@@ -417,7 +419,7 @@ class MotLabels : public ReadLabels {
   ClassList classes_;
   Remarks remarks_;
   std::map<std::string, double> rates_;
-  std::map<std::size_t, std::string> of_text_;  ///< the first sequence of a table, by its hash
+  std::map<std::string, std::string> of_text_;  ///< the first sequence of a table, by its SHA-256
   std::vector<std::string> with_names_, of_visdrone_, copies_;
 };
 

@@ -10,10 +10,10 @@
 
 #include "manifests/files/input_file.h"
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
-#include "stages/frames/own_labels/detail/yolo_text.h"
-#include "stages/frames/sequences/image_folder.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/listing/image_folder.h"
+#include "stages/frames/own_labels/find_labels.h"
+#include "stages/frames/own_labels/yolo_text.h"
 
 namespace eventgan {
 namespace {

@@ -14,11 +14,13 @@
 #include "manifests/files/csv_records.h"
 #include "manifests/files/own_file.h"
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
-#include "stages/frames/sequences/frames_dataset.h"
-#include "stages/frames/sequences/image_folder.h"
-#include "stages/frames/source_folders.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/listing/image_folder.h"
+#include "stages/frames/listing/numbered_sequence.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/naming/found_frames.h"
+#include "stages/frames/own_labels/find_labels.h"
+#include "stages/frames/own_labels/yolo_text.h"
 
 namespace eventgan {
 namespace {

@@ -11,11 +11,12 @@
 #include <unordered_map>
 #include <utility>
 
-#include "stages/frames/index_mask.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/label_name.h"
-#include "stages/frames/own_labels/detail/file_per_image.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/dataset/label_name.h"
+#include "stages/frames/decoding/index_mask.h"
+#include "stages/frames/naming/file_per_image.h"
+#include "stages/frames/naming/found_frames.h"
+#include "stages/frames/own_labels/label_readers.h"
 
 namespace eventgan {
 namespace {
@@ -99,6 +100,14 @@ void read_object(const pugi::xml_node& object, int edges_from, ImageLabels& labe
   read.box.truncation = static_cast<float>(flag(object, "truncated", labels));
   const double occluded = flag(object, "occluded", labels);
   read.box.occlusion = occluded == 0 || occluded == 1 ? static_cast<int>(occluded) : -1;
+  if (const pugi::xml_node track = at_most_one(object, "trackid")) {  // of ImageNet VID
+    const auto number = parse_whole(text_of(track));
+    if (number && *number >= 0) {
+      read.box.track_id = *number;
+    } else {
+      labels.remarks.push_back("<trackid> that is no whole number from 0 left out");
+    }
+  }
   labels.boxes.push_back(std::move(read));
 }
 

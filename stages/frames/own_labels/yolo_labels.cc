@@ -9,11 +9,12 @@
 #include <vector>
 
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/own_labels/detail/file_per_image.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
-#include "stages/frames/own_labels/detail/yolo_text.h"
-#include "stages/frames/sequences/image_folder.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/listing/image_folder.h"
+#include "stages/frames/naming/file_per_image.h"
+#include "stages/frames/naming/found_frames.h"
+#include "stages/frames/own_labels/label_readers.h"
+#include "stages/frames/own_labels/yolo_text.h"
 
 namespace eventgan {
 
@@ -51,6 +52,7 @@ class YoloLabels : public FilePerImage {
   YoloLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
       : FilePerImage(spec, base, std::move(labelled), kYoloFiles) {
     read_classes();
+    if (!classes_.has_shape) refuse_doubt();
     for (std::size_t i = 0; i < schema_.class_names.size(); ++i) {
       meanings_["class " + std::to_string(i)] = schema_.class_names[i];
     }
@@ -99,6 +101,21 @@ class YoloLabels : public FilePerImage {
     notes_.push_back("classes are named by their numbers, 0.." + std::to_string(highest) +
                      ", since no data.yaml or classes.txt with names is in " + root().written("") +
                      " or the folder above it");
+  }
+
+  /// Joints read as corners would be wrong, and nobody would find out.
+  void refuse_doubt() const {
+    PoseEvidence evidence;
+    for (const FrameLabel& label : labels()) {
+      if (label.key.empty()) continue;
+      const Outcome<std::string> text = root().read(label.key);
+      if (!is_fault(text)) evidence.add(*text);
+      if (evidence.is_enough()) break;
+    }
+    const std::string doubt = evidence.doubt();
+    if (doubt.empty()) return;
+    throw InputError("expected " + doubt + ", got no kpt_shape in a data.yaml, in " +
+                     root().written("") + " and the folder above it");
   }
 
   YoloSchema classes_;

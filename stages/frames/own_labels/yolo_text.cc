@@ -1,9 +1,12 @@
-#include "stages/frames/own_labels/detail/yolo_text.h"
+#include "stages/frames/own_labels/yolo_text.h"
 
+#include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
@@ -14,11 +17,11 @@
 #include "manifests/documents/json_text.h"
 #include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
-#include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/label_name.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
+#include "manifests/values/text_lines.h"
+#include "stages/frames/dataset/label_name.h"
+#include "stages/frames/listing/image_folder.h"
+#include "stages/frames/naming/found_frames.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
-#include "stages/frames/sequences/image_folder.h"
 
 namespace eventgan {
 namespace {
@@ -108,6 +111,8 @@ class YoloYaml {
     if (!shape.IsSequence() || shape.size() != 2) refuse("kpt_shape: [J, 2 or 3]", "another");
     const int count = read_number("kpt_shape", shape[0]);
     const int numbers = read_number("kpt_shape", shape[1]);
+    schema.has_shape = true;
+    if (count == 0 && numbers == 0) return;  // as Ultralytics has it where there is no kpt_shape
     if (count < 1 || count > kMostJoints || numbers < 2 || numbers > 3) {
       refuse("kpt_shape: [1.." + std::to_string(kMostJoints) + ", 2 or 3]",
              "[" + std::to_string(count) + ", " + std::to_string(numbers) + "]");
@@ -165,7 +170,9 @@ class YoloLine {
     const std::size_t expected = 5 + joints * numbers;
     const bool is_outline = joints == 0 && columns_.size() >= 7 && columns_.size() % 2 == 1;
     if (columns_.size() != expected && !is_outline) {
-      throw BadLabel("expected " + std::to_string(expected) + " columns, got " +
+      const bool may_have_joints = joints == 0 && columns_.size() > 5 && columns_.size() % 3 == 2;
+      throw BadLabel("expected " + std::to_string(expected) + " columns" +
+                     (may_have_joints ? ", or kpt_shape in data.yaml" : "") + ", got " +
                      std::to_string(columns_.size()));
     }
     Box box;
@@ -319,13 +326,79 @@ YoloSchema numbered_yolo_classes(int highest) {
   return schema;
 }
 
+namespace {
+
+/// Whether columns 1 to 4 are a box of the image, and the others joints in it.
+bool fits_pose(const std::vector<double>& columns, std::size_t numbers) {
+  constexpr double kSlack = 0.05;  // of the image, and of the box
+  const double x = columns[1], y = columns[2], width = columns[3], height = columns[4];
+  const auto is_within = [](double centre, double side) {
+    return side > 0 && centre - side / 2 >= -kSlack && centre + side / 2 <= 1 + kSlack;
+  };
+  if (!is_within(x, width) || !is_within(y, height)) return false;
+  for (std::size_t i = 5; i < columns.size(); i += numbers) {
+    if (numbers == 3 && columns[i + 2] != 0 && columns[i + 2] != 1 && columns[i + 2] != 2) {
+      return false;
+    }
+    if ((numbers == 3 && columns[i + 2] == 0) || (columns[i] == 0 && columns[i + 1] == 0)) continue;
+    if (std::abs(columns[i] - x) > (0.5 + kSlack) * width ||
+        std::abs(columns[i + 1] - y) > (0.5 + kSlack) * height) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+void PoseEvidence::add(std::string_view text) {
+  const int before = lines_;
+  for (const TextLine& line : split_lines(text)) {
+    const std::vector<std::string_view> tokens = split_columns(line.bytes);
+    lines_ += !tokens.empty();
+    if (tokens.size() <= 5) continue;
+    ++longer_;
+    are_outlines_ = are_outlines_ || (columns_ > 0 && tokens.size() != columns_);
+    columns_ = tokens.size();
+    std::vector<double> columns;
+    for (const std::string_view token : tokens) {
+      columns.push_back(parse_number<double>(token).value_or(-1));
+    }
+    for (const std::size_t numbers : {2, 3}) {
+      if ((columns_ - 5) % numbers == 0) fitting_[numbers - 2] += fits_pose(columns, numbers);
+    }
+  }
+  texts_ += lines_ > before;
+}
+
+std::string PoseEvidence::doubt() const {
+  std::vector<std::string> readings;
+  for (const std::size_t numbers : {2, 3}) {
+    if (are_outlines_ || 2 * fitting_[numbers - 2] <= lines_) continue;
+    const auto joints = static_cast<std::int64_t>((columns_ - 5) / numbers);
+    readings.push_back(fmt::format("kpt_shape: [{}, {}] of boxes with {} of x y{}", joints, numbers,
+                                   count_text(joints, "joint"), numbers == 3 ? " v" : ""));
+  }
+  if (readings.empty()) return {};
+  if (columns_ % 2 == 1) {
+    readings.push_back(fmt::format("kpt_shape: [0, 0] of outlines with {} corners", columns_ / 2));
+  }
+  return fmt::format("{}, since {} of {} columns may be either", fmt::join(readings, ", or "),
+                     count_text(longer_, "line"), columns_);
+}
+
 Outcome<Annotation> parse_yolo_text(std::string text, const YoloSchema& schema, ImageSize image,
                                     const std::string& path) {
   Annotation annotation;
+  std::set<std::string_view> known;
   for (const TextLine& line : split_lines(text)) {
     const auto columns = split_columns(line.bytes);
     if (columns.empty()) continue;
     const std::string place = place_in_file(path, line.number);
+    if (!known.insert(trimmed(line.bytes)).second) {
+      leave_out_again(place, annotation);
+      continue;
+    }
     try {
       YoloLine(columns, schema, image).read(place, annotation);
     } catch (const BadLabel& bad) {

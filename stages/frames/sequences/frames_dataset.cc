@@ -7,10 +7,9 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/dataset_kinds.h"
-#include "stages/frames/own_labels/detail/find_labels.h"
-#include "stages/frames/sequences/image_folder.h"
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/image_folder.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/own_labels/find_labels.h"
 
 namespace eventgan {
 

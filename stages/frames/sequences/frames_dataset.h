@@ -1,16 +1,15 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 
 #include "manifests/values/job.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
+#include "stages/frames/dataset/dataset_reader.h"
 
 namespace eventgan {
 
@@ -28,9 +27,9 @@ namespace eventgan {
 /// of the labels (seqinfo.ini); else the time that its name is, or the video's own
 /// (VideoClip::time_s), since the first; else NaN.
 ///
-/// With SourceSpec::labels (stages/frames/own_labels/own_labels.h) the frames that have a label are
-/// the samples, and all others serve as paired frames. A frame that the labels name and ROOT does
-/// not have is a sample, too, whose frames are missing; its FrameRef::index is -1.
+/// With SourceSpec::labels (stages/frames/own_labels/label_readers.h) the frames that have a label
+/// are the samples, and all others serve as paired frames. A frame that the labels name and ROOT
+/// does not have is a sample, too, whose frames are missing; its FrameRef::index is -1.
 ///
 /// Without, each frame is a sample. A label is any JSON then: NAME.json (the extension in small or
 /// capital letters) beside an image, unchanged byte for byte; for a video NAME.json beside it, an
@@ -66,17 +65,11 @@ using VideoLabels = std::map<std::int64_t, std::string>;
 std::optional<VideoLabels> read_video_labels(const std::filesystem::path& file,
                                              const std::string& video);
 
-/// Of videos of one name in a folder, that of the earliest counts.
-inline constexpr auto kVideoExtensions =
-    std::to_array<std::string_view>({".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v", ".mpg",
-                                     ".mpeg", ".ts", ".mts", ".wmv", ".flv", ".gif"});
-
-/// True for a name with one of these, in small or capital letters.
-bool is_video_name(const std::filesystem::path& file);
-
 /// open_frames_dataset for a video or a folder of them. Without SourceSpec::labels the label_key is
 /// "NAME/12"; "NAME/" if frame 12 has no label.
 std::unique_ptr<Dataset> open_videos_dataset(const SourceSpec& spec,
                                              const std::filesystem::path& base);
+
+extern const DatasetReader kFramesReader;
 
 }  // namespace eventgan

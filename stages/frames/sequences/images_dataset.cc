@@ -15,11 +15,11 @@
 #include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/frames/own_labels/detail/absent_frames.h"
-#include "stages/frames/own_labels/own_labels.h"
+#include "stages/frames/listing/image_folder.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/naming/absent_frames.h"
+#include "stages/frames/own_labels/label_readers.h"
 #include "stages/frames/sequences/frames_dataset.h"
-#include "stages/frames/sequences/image_folder.h"
-#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 namespace {

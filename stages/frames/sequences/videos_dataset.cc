@@ -18,12 +18,12 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "stages/frames/decoding/frame_decoder.h"
-#include "stages/frames/own_labels/detail/absent_frames.h"
-#include "stages/frames/own_labels/own_labels.h"
+#include "stages/frames/decoding/video_clip.h"
+#include "stages/frames/listing/image_folder.h"
+#include "stages/frames/listing/source_folders.h"
+#include "stages/frames/naming/absent_frames.h"
+#include "stages/frames/own_labels/label_readers.h"
 #include "stages/frames/sequences/frames_dataset.h"
-#include "stages/frames/sequences/image_folder.h"
-#include "stages/frames/sequences/video_clip.h"
-#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 
@@ -272,11 +272,24 @@ class VideosDataset final : public Dataset {
     }
   }
 
+  /// Whether frames that come unevenly last as long as announced: their number is an estimate then.
+  static bool is_played_out(const VideoClip& video) {
+    const std::vector<double>& times_s = video.uneven_times_s;
+    if (times_s.empty() || !video.frames_per_second) return false;
+    double longest_s = 0;
+    for (std::size_t i = 1; i < times_s.size(); ++i) {
+      longest_s = std::max(longest_s, times_s[i] - times_s[i - 1]);
+    }
+    const double announced_s =
+        static_cast<double>(video.announced_count) / *video.frames_per_second;
+    return times_s.back() + longest_s >= 0.99 * announced_s;
+  }
+
   void note_clip(const LabelledClip& clip) {
     const VideoClip& video = clip.video;
     // A file cut short plays without complaint as far as it goes.
     const std::int64_t missing = video.announced_count - video.frame_count;
-    if (missing > std::max<std::int64_t>(1, video.announced_count / 100)) {
+    if (missing > std::max<std::int64_t>(1, video.announced_count / 100) && !is_played_out(video)) {
       notes_.push_back("only " + std::to_string(video.frame_count) + " of about " +
                        std::to_string(video.announced_count) +
                        " announced frames can be decoded: the file may be cut short, in " +
@@ -304,8 +317,6 @@ class VideosDataset final : public Dataset {
 };
 
 }  // namespace
-
-bool is_video_name(const fs::path& file) { return video_rank(file) < kVideoExtensions.size(); }
 
 std::unique_ptr<Dataset> open_videos_dataset(const SourceSpec& spec, const fs::path& base) {
   return std::make_unique<VideosDataset>(spec, base);

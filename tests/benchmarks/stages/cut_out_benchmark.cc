@@ -14,8 +14,9 @@
 
 #include "manifests/values/outlines.h"
 #include "stages/base/images/image_file.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/cut_out.h"
+#include "stages/frames/sources/open_dataset.h"
 #include "tests/testing/shared_data.h"
 
 namespace eventgan {

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -16,12 +15,10 @@ namespace {
 
 using nlohmann::json;
 
-/// EVENTGAN_WRITE_MADE_FILES=1 in the environment writes what is compared.
 void expect_in_tree(const std::string& file, const std::string& made) {
   const std::filesystem::path path =
       std::filesystem::path(EVENTGAN_SOURCE_DIR) / "manifests" / file;
-  if (std::getenv("EVENTGAN_WRITE_MADE_FILES") != nullptr) testing::write_file(path, made);
-  EXPECT_TRUE(testing::read_file(path) == made)
+  EXPECT_TRUE(testing::is_as_made(path, made))
       << path << " is not what the tables of fields give; EVENTGAN_WRITE_MADE_FILES=1 writes it";
 }
 

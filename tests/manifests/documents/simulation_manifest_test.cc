@@ -119,7 +119,7 @@ TEST(SimulationManifest, HasTheDefaultsOfItsHeader) {
   EXPECT_EQ(manifest.file, SimulatedFile::kHdf5);
   const SimulationSource& clip = manifest.sources.at(0);
   EXPECT_EQ(clip.name, "clip");
-  EXPECT_EQ(clip.method, SimulationMethod::kClip);
+  EXPECT_EQ(clip.method.motion, SimulationMethod::kClip);
   EXPECT_EQ(clip.frames_per_second, std::nullopt);
   EXPECT_EQ(clip.first_frame, 0);
   EXPECT_EQ(clip.frame_count, 0);
@@ -142,7 +142,8 @@ TEST(SimulationManifest, HoldsEveryValueGiven) {
   const SimulationSource& source = manifest.sources.at(0);
   EXPECT_EQ(source.path, "p");
   EXPECT_EQ(source.name, "q");
-  EXPECT_EQ(source.method, SimulationMethod::kAffine);
+  EXPECT_EQ(source.method.simulator, GeneratorKind::kEsim);
+  EXPECT_TRUE(source.method.moves_one_frame());
   EXPECT_EQ(source.frames_per_second, 29.97);
   EXPECT_EQ(source.first_frame, 3);
   EXPECT_EQ(source.frame_count, 4);

@@ -14,6 +14,8 @@ namespace {
 
 using namespace std::string_literals;
 using ::testing::HasSubstr;
+using testing::TemporaryFolder;
+using testing::write_file;
 
 const std::string kHdf5 = "\x89HDF\r\n\x1a\n";
 
@@ -30,7 +32,7 @@ class OwnFiles : public ::testing::TestWithParam<OwnFileCase> {
 
 TEST_P(OwnFiles, AreToldFromAPersonsByTheirContent) {
   const auto& [kind, name, own, foreign] = GetParam();
-  const auto file = folder_.path() / name;
+  const auto file = folder_ / name;
   EXPECT_TRUE(is_replaceable(file, kind)) << "nothing is there";
   write_file(file, own);
   EXPECT_TRUE(is_replaceable(file, kind)) << own;
@@ -80,7 +82,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(OwnFile, AMarkMayLieAnywhere) {
   const TemporaryFolder folder;
-  const auto file = folder.path() / "a.h5";
+  const auto file = folder / "a.h5";
   // Across the end of a block of 1 MiB, in which the file is read, and far behind it.
   for (const std::size_t place :
        {std::size_t{8}, (std::size_t{1} << 20) - 5, std::size_t{5} << 20}) {
@@ -95,14 +97,14 @@ TEST(OwnFile, AMarkMayLieAnywhere) {
 
 TEST(OwnFile, NothingIsLostInAnEmptyFile) {
   const TemporaryFolder folder;
-  write_file(folder.path() / "plan.json", "");
-  EXPECT_TRUE(is_replaceable(folder.path() / "plan.json", OwnFile::kPlan));
+  write_file(folder / "plan.json", "");
+  EXPECT_TRUE(is_replaceable(folder / "plan.json", OwnFile::kPlan));
 }
 
 TEST(OwnFile, AFolderIsNobodysToReplace) {
   const TemporaryFolder folder;
-  std::filesystem::create_directory(folder.path() / "plan.json");
-  EXPECT_FALSE(is_replaceable(folder.path() / "plan.json", OwnFile::kPlan));
+  std::filesystem::create_directory(folder / "plan.json");
+  EXPECT_FALSE(is_replaceable(folder / "plan.json", OwnFile::kPlan));
 }
 
 }  // namespace

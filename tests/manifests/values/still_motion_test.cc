@@ -171,10 +171,12 @@ TEST_F(SettleMotion, WhatTheImageHasNoPixelOfDoesNotMove) {
   const Box between{.class_id = 0, .xyxy = {7.6, 2, 8.4, 3}};
   Box outline_outside = outlined();
   for (Point& corner : outline_outside.outline.rings[0]) corner.x += 12;
+  Box sliver = outlined();  // which passes between the pixels' centres
+  sliver.outline = {{{{2, 2}, {8, 5}, {8, 5.05}}}};
   Box reaches_in = outside;
   reaches_in.xyxy.right = 1;
   for (int i = 0; i < 50; ++i) {
-    for (const Box& box : {outside, between, outline_outside}) {
+    for (const Box& box : {outside, between, outline_outside, sliver}) {
       const FramePair pair = settled(i, {box}, image);
       EXPECT_FALSE(rests(pair.motion));
       EXPECT_TRUE(pair.objects.empty());
@@ -316,6 +318,19 @@ TEST(Carriers, AreNotWhatSomebodyStandsBefore) {
   EXPECT_TRUE(goes_with_the_bus({200, 180, 321, 299})) << "not narrow";
   const Box rider = outlined(1, {120, 20, 260, 300}), bicycle = outlined(2, {110, 160, 270, 310});
   EXPECT_THAT(carriers({bicycle, rider}), ElementsAre(1, 1));
+}
+
+TEST(ClipPoses, WhatHoldsNoPixelDoesNotMove) {
+  Box sliver = outlined(0, {20, 20, 80, 50});
+  sliver.outline = {{{{20, 20}, {80, 50}, {80, 50.05}}}};
+  for (const std::uint64_t seed : {1u, 2u, 3u, 4u}) {
+    const auto alone = poses_of({sliver}, seed);
+    EXPECT_TRUE(alone.back().objects.empty());
+    EXPECT_NE(alone.back().image, ImageMotion()) << "there would be no events";
+    const auto beside = poses_of({sliver, outlined(0, {100, 100, 200, 300})}, seed);
+    EXPECT_FALSE(beside.back().objects.at(0));
+    EXPECT_TRUE(beside.back().objects.at(1));
+  }
 }
 
 TEST(ClipPoses, WhatLooksSmallMovesSlowly) {

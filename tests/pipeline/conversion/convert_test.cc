@@ -208,7 +208,7 @@ TEST_F(Convert, LeavesAWholeFolderUntouched) {
   EXPECT_EQ(written(), before);
   EXPECT_THAT(told, ::testing::IsEmpty());
 
-  testing::write_file(out("run.json"), "{}");
+  testing::write_file(out("run.json"), R"({"manifest_folder": "not absolute"})");
   run(listening);
   EXPECT_THAT(told, ::testing::ElementsAre(::testing::HasSubstr("run.json: the manifest is now")));
   EXPECT_EQ(recorded_manifest_folder(folder_ / "out"), manifest_.directory);
@@ -268,8 +268,9 @@ TEST_F(Convert, RefusesAPlanThatSomeoneAltered) {
   testing::write_file(folder_ / "out" / "plan.json", text);
   EXPECT_THAT([&] { run(); },
               ::testing::ThrowsMessage<UsageError>(::testing::HasSubstr("altered")));
-  testing::write_file(folder_ / "out" / "plan.json", "{");
-  EXPECT_THROW(run(), std::runtime_error);
+  testing::write_file(folder_ / "out" / "plan.json", text.substr(0, 60));
+  EXPECT_THAT([&] { run(); }, ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr(
+                                  "expected a whole plan, got a damaged one")));
   EXPECT_EQ(run("out", 2, /*overwrite=*/true).written, 11);
 }
 

@@ -186,7 +186,8 @@ TEST(Finalize, AfterACrashBetweenTheTwoFilesItPutsThemRight) {
   const ConvertedFolder folder;
   finalize(folder.path(), {});
   const std::string whole = description(folder) + view(folder);
-  testing::write_file(folder.path() / "dataset.json", "of another view");
+  testing::write_file(folder.path() / "dataset.json",
+                      R"({"format": "eventgan-dataset", "of": "another view"})");
   finalize(folder.path(), {});
   EXPECT_EQ(description(folder) + view(folder), whole);
   std::filesystem::remove(folder.path() / "dataset.h5");

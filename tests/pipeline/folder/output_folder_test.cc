@@ -209,6 +209,12 @@ TEST(ReadFrozenPlan, SaysWhenThereIsNoneOrADamagedOne) {
   EXPECT_THAT([&] { read_frozen_plan(folder.path()); }, says_why);
   EXPECT_THAT([&] { read_frozen_outline(folder.path()); }, says_why);
   fs::remove(folder / "plan.json");
+  fs::create_symlink("/proc/self/mem", folder / "plan.json");  // whose first byte cannot be read
+  const auto fails = ThrowsMessage<std::runtime_error>(
+      AllOf(HasSubstr("'Input/output error', in"), HasSubstr("plan.json"), Not(HasSubstr("--"))));
+  EXPECT_THAT([&] { read_frozen_plan(folder.path()); }, fails);
+  EXPECT_THAT([&] { read_frozen_outline(folder.path()); }, fails);
+  fs::remove(folder / "plan.json");
   write_file(folder / "plan.json", "{");
   EXPECT_THROW(read_frozen_plan(folder.path()), std::runtime_error);
   EXPECT_THROW(read_frozen_outline(folder.path()), std::runtime_error);
@@ -281,7 +287,7 @@ TEST(DiscardOutput, OfADamagedPlanLeavesTheShardsItCannotName) {
   EXPECT_THAT(names_in(folder.path()), ElementsAre(kShard));
 }
 
-TEST(OutdateDataset, RemovesWhatTellsOfTheShardOrCannotBeRead) {
+TEST(OutdateDataset, RemovesWhatNamesTheShardOrIsDamagedAndNothingOfAPerson) {
   const TemporaryFolder folder;
   const auto removes = [&](const std::string& text) {
     for (const char* name : {"dataset.h5", kShard}) write_file(folder / name, "x");
@@ -293,13 +299,19 @@ TEST(OutdateDataset, RemovesWhatTellsOfTheShardOrCannotBeRead) {
     return removed;
   };
   const std::string shard = kShard;
-  EXPECT_TRUE(removes(R"({"shards": [{"name": "a.h5"}, {"name": ")" + shard + R"("}]})"));
-  EXPECT_FALSE(removes(R"({"shards": [{"name": "a.h5"}], "missing": [")" + shard + R"("]})"));
-  EXPECT_FALSE(removes(R"({"shards": []})"));
-  for (const char* damaged : {"", "{", "[]", "{}", R"({"shards": 3})", R"({"shards": [3]})",
-                              R"({"shards": [{"size": 3}]})"}) {
-    EXPECT_TRUE(removes(damaged)) << damaged;
+  const std::string own = R"({"format": "eventgan-dataset", )";
+  EXPECT_TRUE(removes(own + R"("shards": [{"name": "a.h5"}, {"name": ")" + shard + R"("}]})"));
+  EXPECT_FALSE(removes(own + R"("shards": [{"name": "a.h5"}], "missing": [")" + shard + R"("]})"));
+  EXPECT_FALSE(removes(own + R"("shards": []})"));
+  EXPECT_TRUE(removes(""));
+  for (const char* damaged :
+       {"", R"("a": 1})", R"("shards": 3})", R"("shards": [3]})", R"("shards": [{"size": 3}]})"}) {
+    EXPECT_TRUE(removes(own + damaged)) << damaged;
   }
+  for (const char* foreign : {"{", "[]", "{}", R"({"shards": 3})", R"({"images": []})"}) {
+    EXPECT_FALSE(removes(foreign)) << foreign;
+  }
+  fs::remove(folder / "dataset.json");
   EXPECT_FALSE(outdate_dataset(folder.path(), kShard));  // there is none
 }
 

@@ -3,12 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <optional>
 #include <stdexcept>
 
 #include "manifests/values/events.h"
+#include "manifests/values/words.h"
 
 namespace eventgan {
 namespace {
@@ -43,6 +45,23 @@ std::vector<float> volume_of(const Generator& generator, std::vector<float> prev
 
 double sum(const std::vector<float>& volume) {
   return std::accumulate(volume.begin(), volume.end(), 0.0);
+}
+
+TEST(Simulators, ARowMakesOneKnownToEveryCommand) {
+  for (const GeneratorRow& row : kGenerators) {
+    SCOPED_TRACE(row.word);
+    const bool is_in_simulate =
+        std::ranges::count(kSimulationMethodWords,
+                           SimulationMethod{SimulationMethod::kSimulator, row.value},
+                           &Word<SimulationMethod>::value) == 1;
+    EXPECT_EQ(is_in_simulate, row.has_sensor_settings);
+    if (!row.has_sensor_settings) {
+      EXPECT_THROW(simulator(row.value), std::invalid_argument);
+      continue;
+    }
+    EXPECT_EQ(simulator(row.value).kind, row.value);
+    EXPECT_EQ(simulator(row.value).between == nullptr, row.moves_one_frame);
+  }
 }
 
 TEST(SimulatedGenerator, DifferenceCountsThresholdsPassed) {

@@ -231,7 +231,7 @@ TEST_F(Calls, OneThatFailsStopsTheOthers) {
   std::vector<float> made(expected_.size());
   std::int64_t next = 0;
   EXPECT_EQ(generate(made, &next, kCount), EVENTGAN_USAGE);
-  EXPECT_NE(std::string(eventgan_error()).find("got -1.000000 at row 1, column 2 of following"),
+  EXPECT_NE(std::string(eventgan_error()).find("got -1 at row 1, column 2 of following"),
             std::string::npos)
       << eventgan_error();
   EXPECT_EQ(next, kCount);

@@ -3,18 +3,25 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/placement.h"
 #include "pipeline/conversion/convert.h"
 #include "pipeline/preview/preview_reader.h"
+#include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/decoding/prepared_frame.h"
+#include "stages/frames/sources/open_dataset.h"
+#include "stages/shards/shard_reader.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/image_file.h"
 #include "tests/testing/small_job.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
@@ -198,6 +205,64 @@ TEST(PreviewOfClips, MakesTheFramesOfAStillAgain) {
   const PreviewContent without = PreviewReader(folder.path(), warnings).content(shard, 0);
   EXPECT_TRUE(without.next_bgr.empty());
   EXPECT_EQ(warnings.size(), 1u);
+}
+
+// Corners on whole numbers, as labelling tools write them: an edge goes through pixels' centres,
+// and in float32 of the volume it lies beside them.
+TEST(PreviewOfStills, ObjectsMoveByTheLabelsOwnOutlines) {
+  const testing::TemporaryFolder folder;
+  constexpr ImageSize kStill{133, 69};
+  constexpr int kStills = 12;
+  std::vector<int> levels;
+  for (int i = 0; i < 133 * 69; ++i) levels.push_back((i % 69 / 2 * 37 + i / 69 / 2 * 53) % 251);
+  std::string images, annotations;
+  for (int i = 0; i < kStills; ++i) {
+    const std::string number = std::to_string(i);
+    testing::write_index_image(folder / "photos" / (number + ".png"), kStill, levels);
+    images += (i ? ", " : "") + std::string(R"({"id": )") + number + R"(, "file_name": ")" +
+              number + R"(.png", "width": 69, "height": 133})";
+    const int x = 13 + i, y = 40 + 3 * i;  // corners of a triangle
+    const std::string left = std::to_string(x), top = std::to_string(y);
+    annotations += (i ? ", " : "") + std::string(R"({"image_id": )") + number +
+                   R"(, "category_id": 1, "bbox": [)" + left + ", " + top +
+                   R"(, 21, 33], "segmentation": [[)" + left + ", " + top + ", " +
+                   std::to_string(x + 21) + ", " + std::to_string(y + 7) + ", " +
+                   std::to_string(x + 9) + ", " + std::to_string(y + 33) + "]]}";
+  }
+  testing::write_file(folder / "labels.json",
+                      R"({"images": [)" + images + R"(], "annotations": [)" + annotations +
+                          R"(], "categories": [{"id": 1, "name": "car"}]})");
+  const JobManifest job = parse_job_manifest(R"({
+    "format": "eventgan-manifest", "version": 1, "name": "job", "seed": 3,
+    "sources": [{ "dataset": "frames", "root": "photos",
+                  "labels": { "format": "coco", "path": "labels.json" },
+                  "pairs": { "from": "stills",
+                             "motion": { "translation_px": [2, 3], "objects": {} } } }],
+    "image": {}, "generator": { "weights": "untrained:1" }, "output": { "directory": "out" } })",
+                                             folder.path(), "manifest.json");
+  ConversionOptions options;
+  options.output = folder / "out";
+  convert(job, testing::FakeGenerator(), "weights", options);
+  const std::filesystem::path shard = folder / "out/job-train-00000-of-00001.h5";
+  const auto dataset = open_dataset(job.sources[0], folder.path());
+  const ShardReader shards(shard);
+  std::vector<std::string> warnings;
+  PreviewReader reader(folder.path(), warnings);
+  for (int slot = 0; slot < kStills; ++slot) {
+    const ShardSample sample = shards.sample(slot);
+    const auto labelled =
+        std::ranges::find(dataset->labelled_frames(), sample.sample_id, &LabelledFrame::sample_id);
+    const auto colour =
+        FrameDecoder(folder.path(), 1).decode(labelled->frame, 1, ImageOrientation::kUpright, {});
+    const std::vector<Box> boxes = dataset->annotation(labelled->label_key)->boxes;
+    const bool is_first = sample.pair.label_position == 1;
+    const PreviewContent content = reader.content(shard, slot);
+    EXPECT_EQ(is_first ? content.previous_bgr : content.next_bgr,
+              place_colour(move_still(*colour, sample.pair, boxes),
+                           place(kStill, job.image, sample.pair)))
+        << sample.sample_id;
+  }
+  EXPECT_THAT(warnings, ::testing::IsEmpty());
 }
 
 TEST(PreviewOfClips, ASourceThatIsGoneLeavesTheOthers) {

@@ -10,7 +10,7 @@
 
 #include "manifests/values/faults.h"
 #include "pipeline/realism/realism_report.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
@@ -19,6 +19,7 @@ namespace eventgan {
 namespace {
 
 using ::testing::ContainsRegex;
+using ::testing::ElementsAre;
 using testing::FakeRecording;
 using ::testing::HasSubstr;
 using testing::moving_bar_recording;
@@ -26,9 +27,14 @@ using ::testing::Not;
 
 RealismOptions models_only() {
   RealismOptions options;
-  options.methods = {RealismMethod::kDifference, RealismMethod::kEsim};
+  options.methods = {GeneratorKind::kDifference, GeneratorKind::kEsim};
   options.threads = 2;
   return options;
+}
+
+TEST(RealismMethods, AreAllThatMakeVolumesOfFrames) {
+  using enum GeneratorKind;
+  EXPECT_THAT(realism_methods(), ElementsAre(kNetwork, kDifference, kEsim));
 }
 
 TEST(MeasureRealism, ComparesTheModelsWithFittedThresholds) {
@@ -60,7 +66,7 @@ TEST(MeasureRealism, TakesTheThresholdItIsTold) {
 
 TEST(MeasureRealism, TellsANetworkNoThresholdThatItHasNotLearnt) {
   RealismOptions options = models_only();
-  options.methods = {RealismMethod::kNetwork};
+  options.methods = {GeneratorKind::kNetwork};
   options.weights = "shipped:sensor";
   const FakeRecording recording = moving_bar_recording({12, 16}, 3);
   options.network_threshold = {0.9};
@@ -82,7 +88,7 @@ TEST(MeasureRealism, TellsANetworkNoThresholdThatItHasNotLearnt) {
 TEST(MeasureRealism, SameSeedSameReport) {
   const FakeRecording recording = moving_bar_recording({24, 32}, 4);
   RealismOptions options = models_only();
-  options.methods = {RealismMethod::kEsim};
+  options.methods = {GeneratorKind::kEsim};
   const auto scores = [&](std::uint64_t seed, int threads) {
     options.seed = seed;
     options.threads = threads;
@@ -110,7 +116,7 @@ TEST(MeasureRealism, RefusesOptionsThatCannotBe) {
   none.methods = {};
   EXPECT_THROW(measure_realism(recording, none), UsageError);
   RealismOptions twice = models_only();
-  twice.methods = {RealismMethod::kEsim, RealismMethod::kEsim};
+  twice.methods = {GeneratorKind::kEsim, GeneratorKind::kEsim};
   EXPECT_THROW(measure_realism(recording, twice), UsageError);
   for (const double threshold : {0.0, -1.0, 6.0, std::numeric_limits<double>::quiet_NaN()}) {
     RealismOptions options = models_only();

@@ -156,8 +156,8 @@ IntervalFrames bar_frames() {
 }
 
 TEST(DifferenceScene, HasEventsWhereTheFramesDiffer) {
-  const auto method =
-      make_simulated_method(difference_scene(), realism_sensor({0.2}, 0.02), true, 3, 1);
+  const auto method = make_simulated_method(simulated_scene(GeneratorKind::kDifference),
+                                            realism_sensor({0.2}, 0.02), true, 3, 1);
   const IntervalFrames frames = bar_frames();
   const std::vector<float> volume = method->volume(frames, 0);
   const std::size_t plane = frames.previous.pixels.size();
@@ -186,14 +186,15 @@ TEST(RunningDifferenceScene, HasWhatAddsUpFromFramesBefore) {
 
 TEST(EsimScene, DrawsDifferAndComeBack) {
   const IntervalFrames frames = bar_frames();
-  const auto method =
-      make_simulated_method(esim_scene(5, 2), realism_sensor({0.2}, 0.02), false, 3, 1);
+  const auto method = make_simulated_method(simulated_scene(GeneratorKind::kEsim, 5, 2),
+                                            realism_sensor({0.2}, 0.02), false, 3, 1);
   EXPECT_EQ(method->draws(), 2);
   const std::vector<float> first = method->volume(frames, 0);
   EXPECT_EQ(method->volume(frames, 0), first);
   EXPECT_NE(method->volume(frames, 1), first);
   EXPECT_GT(std::accumulate(first.begin(), first.end(), 0.0f), 0.0f);
-  EXPECT_NE(make_simulated_method(esim_scene(5, 2), realism_sensor({0.2}, 0.02), false, 3, 2)
+  EXPECT_NE(make_simulated_method(simulated_scene(GeneratorKind::kEsim, 5, 2),
+                                  realism_sensor({0.2}, 0.02), false, 3, 2)
                 ->volume(frames, 0),
             first);
   EXPECT_THAT(method->settings(), HasSubstr("mean of 2 motions"));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdlib>
 #include <filesystem>
@@ -43,6 +44,24 @@ TEST(ForEachIndex, PassesAnExceptionOn) {
                                 if (i == 7) throw std::runtime_error("seven");
                               }),
                std::runtime_error);
+}
+
+TEST(ForEachIndex, HasItsThreadsWithinACallOfOneThread) {
+  constexpr int kThreads = 4;
+  std::atomic<int> together = 0;
+  for_each_index(1, 1, [&](std::size_t) {
+    const auto begin = std::chrono::steady_clock::now();
+    std::atomic<int> arrived = 0;  // each waits for all, whom fewer threads would never bring
+    for_each_index(kThreads, kThreads, [&](std::size_t) {
+      ++arrived;
+      while (arrived < kThreads &&
+             std::chrono::steady_clock::now() - begin < std::chrono::seconds(20)) {
+        std::this_thread::yield();
+      }
+      if (arrived == kThreads) ++together;
+    });
+  });
+  EXPECT_EQ(together, kThreads);
 }
 
 /// Works until its thread has used a millisecond more.

@@ -7,6 +7,7 @@
 
 #include "manifests/values/faults.h"
 #include "pipeline/simulation/scene.h"
+#include "stages/events/simulation/simulate_pair.h"
 #include "tests/pipeline/simulation/moving_clip.h"
 #include "tests/stages/frames/decoding/test_video.h"
 #include "tests/testing/image_file.h"
@@ -178,7 +179,7 @@ class ClipSceneTest : public ::testing::Test {
 };
 
 TEST_F(ClipSceneTest, GoesThroughTheFrames) {
-  ClipScene scene(*clip_, ClipMotion::kFade);
+  ClipScene scene(*clip_, fade_between);
   EXPECT_FALSE(scene.has_flow());
   EXPECT_EQ(scene.frame(), clip_->frame(0));
   const auto first = scene.advance();
@@ -192,7 +193,7 @@ TEST_F(ClipSceneTest, GoesThroughTheFrames) {
 }
 
 TEST_F(ClipSceneTest, SeesTheSquareMove) {
-  ClipScene scene(*clip_, ClipMotion::kFlow);
+  ClipScene scene(*clip_);
   EXPECT_TRUE(scene.has_flow());
   const auto interval = scene.advance();
   const FlowDisplacement flow = interval->flow();

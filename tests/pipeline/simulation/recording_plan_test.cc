@@ -46,7 +46,7 @@ TEST(RecordingSettings, AreReadBackFromARecording) {
     EXPECT_EQ(settings_on_disk(folder / ("a" + ending)), std::nullopt);
     const auto output = open_recording_output(folder / ("a" + ending), {2, 3}, settings);
     output->add_frame(GreyImage{{2, 3}, std::vector<std::uint8_t>(6)}, 0, nullptr);
-    output->commit();
+    output->commit({});
     EXPECT_EQ(settings_on_disk(folder / ("a" + ending)), settings);
     for (const char* other : {"", "no recording", "#!AER-DAT4.0\r\n", "% evt 3.0\n% end\n"}) {
       testing::write_file(folder / ("b" + ending), other);

@@ -13,7 +13,7 @@
 #include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
 #include "pipeline/simulation/scene.h"
-#include "stages/recordings/recording.h"
+#include "stages/recordings/readers/recording.h"
 #include "tests/pipeline/simulation/moving_clip.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

@@ -3,7 +3,7 @@
 #include <stdexcept>
 
 #include "manifests/documents/training_manifest.h"
-#include "stages/recordings/mvsec_writer.h"
+#include "stages/recordings/writers/mvsec_writer.h"
 #include "tests/testing/fake_recording.h"
 
 namespace eventgan::testing {

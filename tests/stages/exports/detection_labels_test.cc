@@ -30,8 +30,11 @@ TEST(YoloLine, NeverLeavesZeroToOne) {
 
 TEST(YoloDataYaml, NamesClassesChannelsAndLists) {
   EXPECT_EQ(yolo_data_yaml({"Car", "a \"b\""}, 18, {"train", "val"}),
-            "path: .\ntrain: train.txt\nval: val.txt\nnc: 2\nchannels: 18\n"
+            "train: train.txt\nval: val.txt\nnc: 2\nchannels: 18\n"
             "names: [\"Car\",\"a \\\"b\\\"\"]\n");
+  EXPECT_EQ(yolo_data_yaml({"Car"}, 3, {"test", "train"}),
+            "test: test.txt\ntrain: train.txt\nval: train.txt\nnc: 1\nchannels: 3\n"
+            "names: [\"Car\"]\n");
 }
 
 TEST(YoloPoseLine, HasEachJointOrZeros) {
@@ -63,7 +66,7 @@ TEST(FlipIndices, AreNoneWhereNamesDoNotTell) {
 
 TEST(YoloPoseYaml, HasTheShapeAndHowToMirror) {
   EXPECT_EQ(yolo_pose_yaml({"l_eye", "r_eye"}, 18, {"val"}),
-            "path: .\nval: val.txt\nnc: 1\nchannels: 18\nnames: [\"person\"]\nkpt_shape: [2, 3]\n"
+            "val: val.txt\nnc: 1\nchannels: 18\nnames: [\"person\"]\nkpt_shape: [2, 3]\n"
             "kpt_names: {0: [\"l_eye\",\"r_eye\"]}\nflip_idx: [1,0]\n");
   EXPECT_EQ(yolo_pose_yaml({"a"}, 18, {}).find("flip_idx"), std::string::npos);
 }

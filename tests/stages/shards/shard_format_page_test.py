@@ -14,11 +14,11 @@ TEXT = PAGE.read_text(encoding="utf-8").split("## The commit record")[0]
 
 
 def tables():
-    """Rows of the page's two tables, as lists of cells without backquotes, without headings."""
-    rows = [[cell.strip().strip("`") for cell in line.strip("|").split("|")]
-            for line in TEXT.splitlines() if line.startswith("| `/")]
-    datasets = [row for row in rows if row[1].startswith("[")]
-    attributes = [row for row in rows if not row[1].startswith("[")]
+    """(path, dtype, shape, meaning) of each dataset, and (object, attribute, dtype) of each attribute of the page."""
+    datasets = re.findall(r"(?m)^\| `(/\S+)` (\w+)\[(\S+)\] \| (.*) \|$", TEXT)
+    attributes = [(path, *re.match(r"`(\w+)`(?: (int32)\b)?", text).groups("str"))
+                  for path, texts in re.findall(r"(?ms)^- `(/\S*)`: (.*?)(?=\n-|\n\n)", TEXT)
+                  for text in re.split(r";\s+", texts)]
     return datasets, attributes
 
 
@@ -45,10 +45,10 @@ class ShardFormatPage(unittest.TestCase):
     def test_every_dataset_of_the_page_is_in_the_shard_as_described(self):
         # 5 samples, 2 bins, 6 x 8 pixels, 3 boxes, 3 persons, 3 joints, 2 x 2 tiles.
         sizes = {"N": 5, "N+1": 6, "2B": 4, "H": 6, "W": 8, "R": 3, "P": 3, "J": 3, "TR": 2, "TC": 2}
-        for path, shape, dtype, _ in self.datasets:
+        for path, dtype, shape, _ in self.datasets:
             with self.subTest(path=path):
                 dataset = self.file[path]
-                words = shape.strip("[]").split(", ")
+                words = shape.split(",")
                 self.assertEqual(dataset.shape, tuple(sizes.get(w) or int(w) for w in words))
                 self.assertEqual(dtype_name(dataset.dtype), dtype)
 
@@ -68,17 +68,13 @@ class ShardFormatPage(unittest.TestCase):
 
         look_at(self.file)
         self.file.visititems(lambda _, item: look_at(item))
-        self.assertEqual(found, {tuple(row[:3]) for row in self.attributes})
+        self.assertEqual(found, set(self.attributes))
 
     def test_features_of_the_page_are_the_shards_and_the_readers(self):
-        rows = re.findall(r"(?m)^\| `(\w+)` \| (.*) \|$", PAGE.read_text(encoding="utf-8").split("## Versions")[1])
-        features = [name for name, _ in rows]
+        columns = [re.match(r"\*(\w+)\*\. ", what) for _, _, _, what in self.datasets]
+        features = [*dict.fromkeys(column[1] for column in columns if column), "joint_aliases"]
         self.assertEqual(list(self.file.attrs["features"]), features)  # this shard has everything
         self.assertEqual(eventgan.open_shards.FEATURES, set(features))
-        told = {path for _, what in rows for path in re.findall(r"`(/[\w/]+)`", what)}
-        optional = {path for path, _, _, what in self.datasets
-                    if what.startswith(("optional", "1 = tile", "share of the sample"))}
-        self.assertEqual(told - {"/labels/poses"}, optional)
         with h5py.File(self.example.path("unlabelled"), "r") as plain:
             self.assertEqual(list(plain.attrs["features"]), ["times", "origin"])
 

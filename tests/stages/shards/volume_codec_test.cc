@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "stages/shards/codec/chunk_filters.h"
+#include "stages/shards/codec/quantization.h"
 #include "tests/testing/temporary_folder.h"
 
 namespace eventgan {

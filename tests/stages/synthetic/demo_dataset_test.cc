@@ -9,7 +9,7 @@
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
-#include "stages/frames/frame_selection.h"
+#include "stages/frames/sources/frame_selection.h"
 #include "stages/synthetic/layouts/layout_writers.h"
 #include "stages/synthetic/road_scene.h"
 #include "tests/testing/full_disk.h"

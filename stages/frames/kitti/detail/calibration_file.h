@@ -3,19 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "stages/frames/source_folders.h"
+#include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
-
-/// Whether a matrix [3][N], N >= 3, tells places apart: its numbers are finite (and at most 1e12),
-/// and its first three columns have full rank, to 1e-9 with each row's largest number as 1. One of
-/// zeros or of equal rows does not: it projects everything onto one point or line, or nowhere.
-bool has_full_rank(std::span<const double> matrix);
 
 /// One of KITTI's calibration files: lines "KEY: number number ...", in object and tracking
 /// calib/ID.txt, in raw calib_cam_to_cam.txt and calib_velo_to_cam.txt.

@@ -23,12 +23,13 @@ struct CocoIndex {
     ByteRange entry;  ///< from '{' to '}'
     std::string file_name;
     ImageSize size;                    ///< 0 where the entry has no sound one
+    bool is_labelled = true;           ///< PoseTrack's `is_labeled`
     std::size_t first_annotation = 0;  ///< in `annotations`; its last is before the next image's
   };
   struct Category {
     std::int64_t id = 0;
     std::string name;
-    std::vector<std::string> keypoints;
+    std::vector<std::string> keypoints;  ///< their names; 0, 1, ... where the file has none
   };
   std::vector<Image> images;           ///< in the file's order, and one without id behind them
   std::vector<ByteRange> annotations;  ///< by image, of each in the file's order
@@ -39,6 +40,9 @@ struct CocoIndex {
 
   std::size_t crowds = 0;  ///< annotations with `iscrowd` 1 or true
 
+  std::size_t joints_left_out = 0;  ///< annotations with joints that have no names
+  bool has_body_parts = false;      ///< COCO-WholeBody's foot_kpts, face_kpts, ... are there
+
   std::size_t image_count() const { return images.size() - 1; }
 };
 
@@ -48,6 +52,9 @@ struct CocoIndex {
 /// (images[].id and file_name, annotations[].image_id, categories[].id and name); if an image, a
 /// category or the name of a category with annotations is there twice, or an annotation is of no
 /// image: these all counted, and the first twenty named. 2.0 is taken for 2.
+///
+/// Joints are numbered where no category names any and all annotations have the same number of
+/// them. Others' that are not as many as the names are left out.
 CocoIndex index_coco(const InputFile& file, const std::string& written);
 
 }  // namespace eventgan

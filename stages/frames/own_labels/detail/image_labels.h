@@ -13,7 +13,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/frames.h"
 #include "manifests/values/labels.h"
-#include "stages/frames/own_labels/own_labels.h"
+#include "stages/frames/naming/own_labels.h"
 
 namespace eventgan {
 
@@ -30,7 +30,8 @@ struct BadLabel : std::runtime_error {
 /// A box and its class by name: which number that is shows once all files are read.
 struct NamedBox {
   std::string class_name;
-  Box box;  ///< class_id is 0
+  Box box;                    ///< class_id is 0
+  std::string again_at = {};  ///< of a line that is there already: its place
 };
 
 /// What a file says about one image.
@@ -91,9 +92,16 @@ class ReadLabels : public OwnLabels {
 /// `place` is where the box stands, for the reason.
 bool add_box(const Box& box, ImageSize image, const std::string& place, Annotation& annotation);
 
+/// Counts a box among those that are left out, for a line that is there already.
+void leave_out_again(const std::string& place, Annotation& annotation);
+
 /// Tells that parts of the outline of the box that was added last are left out, if any are.
 void note_parts_left_out(std::size_t count, std::size_t of_parts, const std::string& place,
                          Annotation& annotation);
+
+/// Takes the track from all boxes of an image whose track another one has, too: it is no object's
+/// number then. True if there are any.
+bool forget_shared_tracks(std::vector<Box>& boxes);
 
 /// Whether some of the box is within the image.
 bool overlaps(const Rectangle& box, ImageSize image);

@@ -21,7 +21,8 @@ namespace eventgan {
 ///   0;
 ///                a share between them: that
 ///   <occluded>   1: occlusion 1; 0: occlusion 0
-/// Anything else in these three is unknown, with a remark. What else there is, as <part>, <pose>,
+///   <trackid>    (ImageNet VID) a whole number from 0: the track, unless two objects have it
+/// Anything else in these is unknown, with a remark. What else there is, as <part>, <pose>,
 /// <segmented>, is kept in the original alone.
 ///
 /// A fault, as "expected X, got Y, in PATH (object 3)", where a name or an edge is missing, one of

@@ -4,16 +4,14 @@
 #include <cstddef>
 #include <dnnl.hpp>
 #include <functional>
-#include <future>
-#include <list>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "manifests/values/frames.h"
+#include "manifests/values/recently_used.h"
 #include "stages/generator/generator.h"
 #include "stages/generator/onednn/buffers.h"
 #include "stages/generator/onednn/detail/decoder_level.h"
@@ -135,18 +133,8 @@ class PlanCache {
   std::shared_ptr<const NetworkPlan> plan(ImageSize size);
 
  private:
-  static constexpr std::size_t kKeptPlans = 16;
-  using Planned = std::shared_future<std::shared_ptr<const NetworkPlan>>;
-  struct Entry {
-    ImageSize size;
-    Planned plan;
-  };
-
-  void forget(ImageSize size);
-
   NetworkLayers& layers_;
-  std::mutex mutex_;
-  std::list<Entry> latest_first_;
+  RecentlyUsed<std::array<int, 2>, std::shared_ptr<const NetworkPlan>> plans_{16};
 };
 
 }  // namespace eventgan

@@ -1,11 +1,15 @@
 #include "stages/base/archives/zip_archive.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <stdexcept>
 
+#include "manifests/values/faults.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -55,6 +59,38 @@ TEST_F(ZipArchiveTest, NamesTheMissingMember) {
   EXPECT_THAT([&] { archive.read("data.pkl"); },
               ThrowsMessage<std::runtime_error>(
                   AllOf(HasSubstr("some.zip"), HasSubstr("(member data.pkl)"))));
+}
+
+/// Lets the process open `count` more files while it lives.
+class FilesLeft {
+ public:
+  explicit FilesLeft(int count) {
+    ::getrlimit(RLIMIT_NOFILE, &before_);
+    const int next = ::open("/dev/null", O_RDONLY);  // all below are open
+    ::close(next);
+    const rlimit limit{static_cast<rlim_t>(next + count), before_.rlim_max};
+    ::setrlimit(RLIMIT_NOFILE, &limit);
+  }
+  ~FilesLeft() { ::setrlimit(RLIMIT_NOFILE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST_F(ZipArchiveTest, TooManyOpenFilesAreNoFaultOfTheFile) {
+  testing::write_zip(file_, {{"a", "x"}});
+  constexpr int kNeeded = 3;  // InputFile's, libzip's, and one that libzip makes of it
+  for (int count = 0; count <= kNeeded; ++count) {
+    const FilesLeft left(count);
+    const auto open = [&] { ZipArchive archive(file_); };
+    if (count == kNeeded) {
+      EXPECT_NO_THROW(open());
+    } else {
+      EXPECT_THAT(open, ThrowsMessage<LimitReached>(
+                            AllOf(HasSubstr("some.zip: Too many open files"), HasSubstr("ulimit"))))
+          << count;
+    }
+  }
 }
 
 TEST_F(ZipArchiveTest, RefusesWhatIsNoZipFile) {

@@ -1,12 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <atomic>
-#include <latch>
-#include <new>
-#include <random>
-#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -24,153 +19,6 @@ namespace {
 
 using ::testing::HasSubstr;
 using testing::TemporaryFolder;
-
-using SharedImages = SharedResults<SharedFrame>;
-
-/// An image of one pixel.
-SharedFrame image(int level) {
-  return std::make_shared<Outcome<PreparedFrame>>(
-      PreparedFrame{{static_cast<std::uint8_t>(level)}, {}});
-}
-
-int level_of(const SharedFrame& frame) { return (*frame)->grey.at(0); }
-
-/// Whether getting an image made it, rather than found it.
-bool was_made(SharedImages& images, const std::string& name) {
-  bool made = false;
-  images.get(name, [&] {
-    made = true;
-    return image(0);
-  });
-  return made;
-}
-
-TEST(SharedImages, MakesEachOnceWhileItIsKept) {
-  SharedImages images(2);
-  int made = 0;
-  for (int round = 0; round < 3; ++round) {
-    for (int level : {10, 20}) {
-      const auto make = [&] { return ++made, image(level); };
-      EXPECT_EQ(level_of(images.get(std::to_string(level), make)), level);
-    }
-  }
-  EXPECT_EQ(made, 2);
-}
-
-TEST(SharedImages, TheOneUnusedForLongestGoes) {
-  SharedImages images(3);
-  for (const char* name : {"a", "b", "c"}) EXPECT_TRUE(was_made(images, name));
-  EXPECT_FALSE(was_made(images, "a"));  // so b is the one unused for longest
-  EXPECT_TRUE(was_made(images, "d"));
-  for (const char* name : {"a", "c", "d"}) EXPECT_FALSE(was_made(images, name)) << name;
-  EXPECT_TRUE(was_made(images, "b"));
-}
-
-TEST(SharedImages, KeepsAtLeastOne) {
-  SharedImages images(0);
-  EXPECT_TRUE(was_made(images, "a"));
-  EXPECT_FALSE(was_made(images, "a"));
-  EXPECT_TRUE(was_made(images, "b"));
-  EXPECT_TRUE(was_made(images, "a"));
-}
-
-TEST(SharedImages, WhoHoldsAnImageKeepsItBeyondItsTime) {
-  SharedImages images(1);
-  const SharedFrame held = images.get("a", [] { return image(7); });
-  EXPECT_TRUE(was_made(images, "b"));
-  EXPECT_EQ(level_of(held), 7);
-}
-
-TEST(SharedImages, AFaultIsKeptLikeAnImage) {
-  SharedImages images(2);
-  int made = 0;
-  for (int round = 0; round < 3; ++round) {
-    const SharedFrame frame = images.get("a", [&] {
-      ++made;
-      return std::make_shared<Outcome<PreparedFrame>>(SampleFault{"bad"});
-    });
-    EXPECT_EQ(frame->fault().reason, "bad");
-  }
-  EXPECT_EQ(made, 1);
-}
-
-TEST(SharedImages, WhatMakeThrowsReachesEveryoneWhoAsks) {
-  SharedImages images(2);
-  EXPECT_THROW(images.get("a", []() -> SharedFrame { throw std::bad_alloc(); }), std::bad_alloc);
-  EXPECT_THROW(images.get("a", [] { return image(1); }), std::bad_alloc);
-  EXPECT_TRUE(was_made(images, "b"));
-}
-
-TEST(SharedImages, WhoComesWhileOneIsMadeWaitsForIt) {
-  SharedImages images(1);
-  std::latch started(1);
-  std::latch evicted(1);
-  std::atomic<int> made = 0;
-  std::thread maker([&] {
-    images.get("a", [&] {
-      started.count_down();
-      evicted.wait();
-      return ++made, image(5);
-    });
-  });
-  started.wait();
-  int waited_for = 0;
-  std::thread waiter(
-      [&] { waited_for = level_of(images.get("a", [&] { return ++made, image(6); })); });
-  // Another image is made meanwhile: no lock is held. It may push "a" out before the waiter
-  // comes, which then makes it itself.
-  EXPECT_TRUE(was_made(images, "b"));
-  evicted.count_down();
-  maker.join();
-  waiter.join();
-  EXPECT_EQ(waited_for, made == 1 ? 5 : 6);
-}
-
-TEST(SharedImages, ManyThreadsOnFewImagesMakeEachOnce) {
-  constexpr int kThreads = 8;
-  constexpr int kImages = 12;
-  SharedImages images(kImages);
-  std::vector<std::atomic<int>> made(kImages);
-  std::atomic<int> wrong = 0;
-  std::latch together(kThreads);
-  std::vector<std::thread> threads;
-  for (int thread = 0; thread < kThreads; ++thread) {
-    threads.emplace_back([&, thread] {
-      std::mt19937 random(static_cast<unsigned>(thread));
-      together.arrive_and_wait();
-      for (int turn = 0; turn < 500; ++turn) {
-        const int wanted = static_cast<int>(random() % kImages);
-        const SharedFrame frame = images.get(std::to_string(wanted), [&] {
-          ++made[wanted];
-          std::this_thread::yield();
-          return image(wanted);
-        });
-        wrong += level_of(frame) != wanted;
-      }
-    });
-  }
-  for (auto& thread : threads) thread.join();
-  EXPECT_EQ(wrong, 0);
-  for (const auto& count : made) EXPECT_EQ(count, 1);
-}
-
-TEST(SharedImages, ManyThreadsAndTooLittleRoomStillGetTheRightImages) {
-  SharedImages images(2);
-  std::atomic<int> wrong = 0;
-  std::vector<std::thread> threads;
-  for (int thread = 0; thread < 8; ++thread) {
-    threads.emplace_back([&, thread] {
-      std::mt19937 random(static_cast<unsigned>(thread));
-      for (int turn = 0; turn < 500; ++turn) {
-        const int wanted = static_cast<int>(random() % 6);
-        wrong +=
-            level_of(images.get(std::to_string(wanted), [&] { return image(wanted); })) != wanted;
-      }
-    });
-  }
-  for (auto& thread : threads) thread.join();
-  EXPECT_EQ(wrong, 0);
-}
 
 FramePair shared_pair(const std::string& previous, const std::string& next) {
   FramePair pair;
@@ -311,7 +159,7 @@ TEST(PairSharing, ManyThreadsGetTheInputsThatOneThreadGets) {
 }
 
 // Of a source that is turned upright and one that is not.
-TEST(SharedImages, OneFileIsTakenAsStoredAndUpright) {
+TEST(PairSharing, OneFileIsTakenAsStoredAndUpright) {
   const TemporaryFolder folder;
   const auto file = folder / "a.jpg";
   cv::imwrite(file.string(), testing::gradient_image({20, 36}));

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
@@ -36,8 +38,10 @@ inline std::string matroska_element(std::string_view id, const std::string& cont
 }
 
 /// Such a video as Matroska (RFC 9559) of JPEG images, frame i shown at times_ms[i], at most
-/// 32767 milliseconds after the first: OpenCV writes even times alone.
-inline void write_timed_video(const std::filesystem::path& path, const std::vector<int>& times_ms) {
+/// 32767 milliseconds after the first: OpenCV writes even times alone. It lasts a whole number of
+/// seconds, or as long as the file does not say.
+inline void write_timed_video(const std::filesystem::path& path, const std::vector<int>& times_ms,
+                              int duration_s = 0) {
   using namespace std::string_literals;
   const auto element = matroska_element;
   std::string cluster = element("\xE7", "\0"s);  // Timestamp
@@ -51,8 +55,14 @@ inline void write_timed_video(const std::filesystem::path& path, const std::vect
     block += '\x80';                                                     // a key frame
     cluster += element("\xA3", block.append(jpeg.begin(), jpeg.end()));  // SimpleBlock
   }
-  const std::string header = element("\x42\x82", "matroska");                  // DocType
-  const std::string info = element("\x2A\xD7\xB1", "\x0F\x42\x40"s);           // a tick is 10^6 ns
+  const std::string header = element("\x42\x82", "matroska");   // DocType
+  std::string info = element("\x2A\xD7\xB1", "\x0F\x42\x40"s);  // a tick is 10^6 ns
+  if (duration_s > 0) {
+    const auto bits = std::bit_cast<std::uint32_t>(1000.0f * static_cast<float>(duration_s));
+    std::string ticks;
+    for (int shift = 24; shift >= 0; shift -= 8) ticks += static_cast<char>(bits >> shift & 0xff);
+    info += element("\x44\x89", ticks);
+  }
   const std::string size = element("\xB0", "\x40") + element("\xBA", "\x30");  // 64 x 48
   const std::string track = element("\xD7", "\x01") + element("\x73\xC5", "\x01") +
                             element("\x83", "\x01") + element("\x86", "V_MJPEG") +

@@ -11,8 +11,9 @@
 #include <string>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/frame_selection.h"
-#include "tests/stages/frames/mpii/mat_writer.h"
+#include "stages/frames/sources/frame_selection.h"
+#include "stages/frames/sources/open_dataset.h"
+#include "tests/stages/base/archives/mat_writer.h"
 #include "tests/testing/hdf5_file.h"
 #include "tests/testing/npy_bytes.h"
 #include "tests/testing/temporary_folder.h"

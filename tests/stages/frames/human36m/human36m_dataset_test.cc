@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
+#include "stages/frames/human36m/derived_frame.h"
 #include "stages/frames/human36m/detail/camera_book.h"
 #include "stages/frames/human36m/detail/pose_table.h"
 #include "tests/stages/frames/human36m/human36m_fixture.h"

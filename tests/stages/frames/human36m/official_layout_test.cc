@@ -9,6 +9,7 @@
 #include "manifests/values/faults.h"
 #include "stages/frames/decoding/pair_reader.h"
 #include "stages/frames/human36m/human36m_dataset.h"
+#include "stages/frames/sources/open_dataset.h"
 #include "tests/stages/frames/decoding/test_video.h"
 #include "tests/stages/frames/human36m/human36m_fixture.h"
 #include "tests/testing/cdf_file.h"

@@ -5,12 +5,10 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <utility>
 
-#include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "tests/stages/frames/kitti/raw_fixture.h"
 #include "tests/testing/temporary_folder.h"
@@ -231,26 +229,6 @@ TEST(RawCalibration, AMatrixWithoutFullRankIsAnError) {
                "a matrix of full rank for R_rect_00");
   expect_error(kVeloToCam, size + rotation + "P_rect_02: 0 0 0 0 0 0 0 0 0 0 0 1\n",
                "a matrix of full rank for P_rect_02");
-}
-
-TEST(HasFullRank, WhateverTheUnitOfARow) {
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(has_full_rank(std::array<double, 9>{1e9, 0, 0, 0, 1e-9, 0, 0, 0, 1}));
-  // KITTI's P2, and a camera of 10000 px focal length that looks along (1, 1, 1).
-  EXPECT_TRUE(
-      has_full_rank(std::array{721.5, 0., 609.6, 44.9, 0., 721.5, 172.9, 0.2, 0., 0., 1., 0.}));
-  EXPECT_TRUE(has_full_rank(std::array<double, 9>{8000, 100, -7000, -4000, 9000, -3000, 1, 1, 1}));
-  EXPECT_FALSE(has_full_rank(std::array<double, 9>{1, 2, 3, 2, 4, 6, 0, 0, 1})) << "equal rows";
-  EXPECT_FALSE(has_full_rank(std::array<double, 9>{1, 2, 3, 4, 5, 6, 7, 8, 9}));
-  EXPECT_FALSE(has_full_rank(std::array<double, 9>{}));
-  std::array<double, 12> one{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-  for (const double bad : {kNan, std::numeric_limits<double>::infinity(), 1e308}) {
-    for (double& number : one) {
-      const double good = std::exchange(number, bad);
-      EXPECT_FALSE(has_full_rank(one)) << bad;
-      number = good;
-    }
-  }
 }
 
 constexpr double kPi = std::numbers::pi;

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/stages/frames/mpii/mat_writer.h"
+#include "tests/stages/base/archives/mat_writer.h"
 
 /// A small MPII download.
 namespace eventgan::testing::mat {

@@ -187,14 +187,117 @@ TEST_F(CocoLabels, KeypointsAreMeasuredFromTheImagesEdge) {
             R"(, "keypoints": [1.0, 2.5, 2.0, 0, 0, 0, 0, 0, 0.0], "num_keypoints": 2)"),
         person);
   EXPECT_EQ(annotation("7").persons.at(0).joints.at(0), (Joint{{0.5, 2}, 1}));
-  // Of a category without names of them they are no person.
-  write(image(7, "000001.png"),
-        box(1, 7, "[1, 2, 30, 20]", R"(, "keypoints": [1, 2, 2], "num_keypoints": 1)"));
-  EXPECT_EQ(annotation("7").boxes.size(), 1u);
-  EXPECT_THAT(annotation("7").persons, IsEmpty());
   write(image(7, "000001.png"), "",
         person + R"(, {"id": 4, "name": "dog", "keypoints": ["nose", "tail"]})");
   expect_refused("expected one list of keypoints, got two, of \"dog\" another, in instances.json");
+}
+
+TEST_F(CocoLabels, JointsWithoutNamesAreNumberedIfAllAreAsMany) {
+  const auto with = [&](const std::string& first, const std::string& second,
+                        const std::string& categories) {
+    write(image(7, "000001.png"),
+          box(1, 7, "[1, 2, 30, 20]", ", \"keypoints\": " + first) + "," +
+              box(2, 7, "[1, 2, 30, 20]", ", \"keypoints\": " + second),
+          categories);
+    return open();
+  };
+  const std::string face = R"({"id": 3, "name": "face", "keypoints": []})";
+  for (const std::string& category : {face, std::string(R"({"id": 3, "name": "face"})")}) {
+    EXPECT_THAT(with("[10, 12, 2, 11.5, 13, 1]", "[]", category)->label_schema().joint_names,
+                ElementsAre("0", "1"));
+    ASSERT_EQ(annotation("7").persons.size(), 1u);
+    EXPECT_THAT(annotation("7").persons[0].joints,
+                ElementsAre(Joint{{9.5, 11.5}, 1}, Joint{{11, 12.5}, 0}));
+  }
+  EXPECT_THAT(with("[0, 0, 0]", "[]", face)->label_schema().joint_names, IsEmpty());
+  const char* note =
+      "keypoints of 2 annotations left out, since their category names none and they differ in "
+      "number, in instances.json";
+  const auto differing = with("[1, 2, 2]", "[1, 2, 2, 3, 4, 2]", face);
+  EXPECT_THAT(differing->notes(), Contains(note));
+  EXPECT_THAT(differing->label_schema().joint_names, IsEmpty());
+  EXPECT_EQ(annotation("7").boxes.size(), 2u);
+  EXPECT_THAT(annotation("7").persons, IsEmpty());
+  // Beside a category that names one joint.
+  const auto beside = with("[1, 2, 2, 3, 4, 2]", "[1, 2, 2, 3, 4, 2]",
+                           face + R"(, {"id": 4, "name": "dog", "keypoints": ["nose"]})");
+  EXPECT_THAT(beside->notes(), Contains(note));
+  EXPECT_THAT(beside->label_schema().joint_names, ElementsAre("nose"));
+}
+
+TEST_F(CocoLabels, WholeBodysFeetFaceAndHandsAreJoints) {
+  const auto list = [](int joints, const std::string& first) {
+    std::string text = first;
+    for (int i = 1; i < joints; ++i) text += ", 0, 0, 0";
+    return "[" + text + "]";
+  };
+  const std::string parts = R"(, "foot_kpts": )" + list(6, "1, 2, 2") + R"(, "face_kpts": )" +
+                            list(68, "3, 4, 0.5") + R"(, "lefthand_kpts": )" + list(21, "5, 6, 1") +
+                            R"(, "righthand_kpts": )" + list(21, "7, 8, 2") +
+                            R"(, "righthand_valid": false)";
+  const std::string person = R"({"id": 3, "name": "person", "keypoints": ["nose", "eye"]})";
+  write(image(7, "000001.png"),
+        box(1, 7, "[1, 2, 30, 20]", R"(, "keypoints": [10, 12, 2, 0, 0, 0])" + parts) + "," +
+            box(2, 7, "[1, 2, 30, 20]", R"(, "keypoints": [10, 12, 2, 0, 0, 0])"),
+        person);
+  const std::vector<std::string> names = open()->label_schema().joint_names;
+  ASSERT_EQ(names.size(), 2u + 116u);
+  EXPECT_EQ(names[2], "left_big_toe");
+  // MMPose swaps face-0 and face-16, face-36 and face-45, face-41 and face-46; 8 is the chin.
+  for (const auto& [i, name] : {std::pair(0, "right_face_0"),
+                                {16, "left_face_0"},
+                                {8, "face_8"},
+                                {36, "right_face_36"},
+                                {45, "left_face_36"},
+                                {46, "left_face_41"},
+                                {30, "face_30"},
+                                {67, "left_face_65"}}) {
+    EXPECT_EQ(names[static_cast<std::size_t>(8 + i)], name);
+  }
+  EXPECT_EQ(names[8 + 68], "left_hand_0");
+  EXPECT_EQ(names.back(), "right_hand_20");
+  const Annotation read = annotation("7");
+  ASSERT_EQ(read.persons.size(), 2u) << read.original;
+  const std::vector<Joint>& joints = read.persons[0].joints;
+  ASSERT_EQ(joints.size(), names.size());
+  EXPECT_EQ(joints[0], (Joint{{9.5, 11.5}, 1}));
+  EXPECT_EQ(joints[2], (Joint{{0.5, 1.5}, 1}));
+  EXPECT_EQ(joints[8], (Joint{{2.5, 3.5}, -1})) << "a share of certainty";
+  EXPECT_EQ(joints[8 + 68], (Joint{{4.5, 5.5}, 0}));
+  EXPECT_EQ(joints[8 + 68 + 21], (Joint{kMissingPoint, 0})) << "it is not valid";
+  EXPECT_EQ(read.persons[1].joints.size(), names.size());
+  write(image(7, "000001.png"), box(1, 7, "[1, 2, 30, 20]", R"(, "face_kpts": [1, 2, 2])"), person);
+  EXPECT_THAT(fault(), HasSubstr("$.face_kpts: expected x, y, v of each of 68 joints"));
+}
+
+TEST_F(CocoLabels, PoseTracksUnlabelledFramesAreNoneAndItsRegionsAreIgnored) {
+  const std::string rest = R"(, "width": 40, "height": 30, "is_labeled": )";
+  const std::string regions = R"(, "ignore_regions_x": [[10, 20, 20, 10], [1, 2, 3]],
+                                  "ignore_regions_y": [[5, 5, 9, 9], [4, 4, 4]])";
+  const std::string labelled = R"({"id": 7, "file_name": "000001.png")" + rest + "true";
+  const std::string persons = R"({"id": 1, "name": "hat"},
+                                 {"id": 3, "name": "person", "keypoints": ["nose"]})";
+  const std::string one =
+      box(1, 7, "[1, 2, 30, 20]",
+          R"(, "keypoints": [9, 8, 2], "bbox_head": [3, 4, 5, 6], "track_id": 2)");
+  write(labelled + regions + "}," + R"({"id": 8, "file_name": "000002.png")" + rest + "false}", one,
+        persons);
+  const auto dataset = open();
+  ASSERT_EQ(dataset->labelled_frames().size(), 1u);
+  EXPECT_THAT(dataset->notes(), Contains(HasSubstr("no label for 2 of 3 frames")));
+  const Annotation read = annotation("7");
+  ASSERT_EQ(read.boxes.size(), 2u) << read.original;
+  EXPECT_FALSE(read.boxes[0].ignore);
+  EXPECT_EQ(read.boxes[1].class_id, 1);
+  EXPECT_TRUE(read.boxes[1].ignore);
+  EXPECT_EQ(read.boxes[1].xyxy, (Rectangle{10, 5, 20, 9}));
+  EXPECT_THAT(read.left_out, ElementsAre(HasSubstr("got 0 x 0, in instances.json#images/7")));
+  EXPECT_EQ(read.persons.at(0).head_box, (Rectangle{3, 4, 8, 10}));
+  // What has objects is labelled, whatever is said of it.
+  write(R"({"id": 7, "file_name": "000001.png")" + rest + "false}", one, persons);
+  EXPECT_EQ(open()->labelled_frames().size(), 1u);
+  write(labelled + R"(, "ignore_regions_x": [[1]], "ignore_regions_y": [[1, 2]]})", one, persons);
+  EXPECT_THAT(fault(), HasSubstr("$.ignore_regions_y: expected as many numbers as"));
 }
 
 TEST_F(CocoLabels, ABoxOutsideTheImageOrWithoutAreaIsLeftOut) {
@@ -251,11 +354,13 @@ TEST_F(CocoLabels, ImagesMayBeNamedAsToolsWriteThem) {
         "C:\\data\\000001.png", "other%2F000001.png", "000001", "/home/me/000001.png"}) {
     EXPECT_EQ(key_of(name), "000001") << name;
   }
-  // Accents in one letter or apart (NFC, NFD): of Latin, Vietnamese, Korean, Japanese letters.
+  // Accents in one letter or apart (NFC, NFD): of Latin, Vietnamese, Korean, Japanese, Greek
+  // letters.
   for (const auto& [disk, listed] : {std::pair("\u00e9t\u00e9.png", "e\u0301te\u0301.png"),
                                      {"e\u0323\u0302.png", "\u1ec7.png"},
                                      {"\uac70\u1112.png", "\u1100\u1165\u1112.png"},
-                                     {"\u30ac.png", "\u30ab\u3099.png"}}) {
+                                     {"\u30ac.png", "\u30ab\u3099.png"},
+                                     {"\u03ae.png", "\u03b7\u0301.png"}}) {
     testing::write_flat_image(folder_ / "images" / disk, kImage, 7);
     EXPECT_EQ(key_of(listed), std::filesystem::path(disk).stem().string());
   }
@@ -414,6 +519,25 @@ TEST_F(CocoLabels, ABadEntryIsAFaultOfItsImage) {
   EXPECT_THAT(fault("x"), HasSubstr("expected an image of the file, got none"));
 }
 
+TEST_F(CocoLabels, TracksAreCalledAsToolsCallThem) {
+  for (const auto& [more, track] : {std::pair(R"(, "track_id": 3)", 3),
+                                    {R"(, "instance_id": 4.0)", 4},
+                                    {R"(, "attributes": {"track_id": 0})", 0},
+                                    {R"(, "track_id": null, "instance_id": 5)", 5},
+                                    {R"(, "track_id": -1)", -1},
+                                    {R"(, "track_id": "7", "attributes": [1])", -1},
+                                    {", \"ids\": 2", -1}}) {
+    write(image(7, "000001.png"),
+          box(1, 7, "[1, 2, 3, 4]", more) + "," + box(2, 7, "[1, 2, 5, 6]", R"(, "track_id": 90)"));
+    EXPECT_EQ(annotation("7").boxes.at(0).track_id, track) << more;
+    EXPECT_EQ(annotation("7").boxes.at(1).track_id, 90);
+  }
+  write(image(7, "000001.png"), box(1, 7, "[1, 2, 3, 4]", R"(, "instance_id": 1)") + "," +
+                                    box(2, 7, "[1, 2, 5, 6]", R"(, "instance_id": 1)"));
+  EXPECT_EQ(annotation("7").boxes.at(0).track_id, -1) << "it is no object's number";
+  EXPECT_EQ(annotation("7").boxes.at(1).track_id, -1);
+}
+
 TEST_F(CocoLabels, CrowdsAreToldByANumberOrABoolean) {
   for (const auto& [crowd, ignore] : {std::pair("0", false),
                                       {"1", true},
@@ -424,6 +548,9 @@ TEST_F(CocoLabels, CrowdsAreToldByANumberOrABoolean) {
     write(image(7, "000001.png"),
           box(1, 7, "[1, 2, 3, 4]", std::string(", \"iscrowd\": ") + crowd));
     EXPECT_EQ(fault(), "no fault") << crowd;
+    EXPECT_EQ(annotation("7").boxes.at(0).ignore, ignore) << crowd;
+    write(image(7, "000001.png"),
+          box(1, 7, "[1, 2, 3, 4]", std::string(R"(, "iscrowd": 0, "ignore": )") + crowd));
     EXPECT_EQ(annotation("7").boxes.at(0).ignore, ignore) << crowd;
   }
   for (const char* crowd : {"\"true\"", "2", "0.5"}) {
@@ -440,6 +567,30 @@ TEST_F(CocoLabels, AnotherSizeOfTheImageIsAFault) {
             "images/000001.png");
   write(R"({"id": 7, "file_name": "000001.png", "width": 40})", "");
   EXPECT_THAT(fault(), HasSubstr("instances.json (image 7): $.height: expected"));
+}
+
+TEST_F(CocoLabels, WhatIsNoImageOfThatSizeOrFormatIsNamed) {
+  using namespace std::string_literals;
+  const auto file = folder_ / "images/turned.jpg";
+  testing::write_flat_image(file, kImage, 7);
+  const std::string exif = "MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"s;
+  std::string jpeg = testing::read_file(file);
+  jpeg.insert(2, "\xff\xe1\0\x22"s + "Exif\0\0"s + exif);
+  testing::write_file(file, jpeg);
+  write(image(7, "turned.jpg"), "");
+  EXPECT_EQ(fault(),
+            "expected an image of 40x30, as instances.json#images/7 says, got 30x40, turned "
+            "upright as its EXIF orientation says, in images/turned.jpg");
+  testing::write_file(folder_ / "images/a.heic", "x");
+  testing::write_file(folder_ / "images/b.avif", "x");
+  write(image(1, "000001.png") + "," + image(7, "a.heic") + "," + image(8, "b.jpg"), "");
+  const auto dataset = open();
+  for (const auto& [i, name] : {std::pair(1u, "a.heic"), {2u, "b.avif"}}) {
+    EXPECT_EQ(dataset->labelled_frames().at(i).fault,
+              "expected a frame, got a file of another format, which ImageMagick converts "
+              "(mogrify -format png), in images/" +
+                  std::string(name));
+  }
 }
 
 TEST_F(CocoLabels, AFileThatIsNoneIsRefused) {

@@ -51,6 +51,21 @@ TEST(CsvLabels, HaveARowABox) {
   EXPECT_EQ(empty.original, "sub/empty.png,,,,,,\r\n");
 }
 
+TEST(CsvLabels, ARowThatIsThereAlreadyIsLeftOut) {
+  const auto images = read_csv(
+      "a.png,car,1,2,3,4,5\na.png,bus,1,2,3,4,\r\na.png,car,1,2,3,4,5\nb.png,bus,1,2,3,4,\n"
+      "a.png,bus,1,2,3,4,\n");
+  ASSERT_FALSE(is_fault(images.at("a.png"))) << images.at("a.png").fault().reason;
+  const auto read = numbered(*images.at("a.png"), {"bus", "car"}, {30, 40}, "labels.csv#a.png");
+  ASSERT_THAT(read->boxes, SizeIs(2));
+  EXPECT_EQ(read->boxes[0].track_id, 5);
+  EXPECT_THAT(read->left_out,
+              ::testing::ElementsAre("expected each line once, got it again, in labels.csv:4",
+                                     "expected each line once, got it again, in labels.csv:6"));
+  EXPECT_THAT(read->left_out_at, ::testing::ElementsAre(2u, 3u));
+  EXPECT_THAT(images.at("b.png")->boxes, SizeIs(1));
+}
+
 TEST(CsvLabels, ColumnsComeInAnyOrderAndTrackMayBeAbsent) {
   const auto images = parse_csv_labels(
       "\xEF\xBB\xBF"
@@ -67,6 +82,8 @@ TEST(CsvLabels, ColumnsAreCalledAsToolsCallThem) {
         "image,class,x1,y1,x2,y2,track,note\na.png,car,1,2,4,6,,area=3\n",
         "frame;label;left;top;width;height\na.png;car;1;2;3;4\n",
         "image;label;x;y;w;h\na.png;car;1,0;2;3;4,0\n",
+        "filename,width,height,class,x,y,w,h\na.png,64,48,car,1,2,3,4\n",
+        "image,class,x,y,bbox_width,bbox_height,width,height\na.png,car,1,2,3,4,64,48\n",
         "image_name\tclass_name\tx_min\ty_min\tx_max\ty_max\na.png\tcar\t1\t2\t4\t6\n",
         ",\"image\",\"xmin\",\"ymin\",\"xmax\",\"ymax\",\"label\"\n0,\"a.png\",1,2,4,6,\"car\"\n",
         "frame,image,label,x1,y1,x2,y2\n12,a.png,car,1,2,4,6\n"}) {
@@ -139,10 +156,18 @@ TEST(CsvLabels, ARowThatDoesNotTellItsImageIsRefused) {
   refuses("", "expected a header line image,class,left,top,right,bottom, got none, in labels.csv");
   refuses("image,class,left,top,right\n", "expected a column bottom, got none, in labels.csv:1");
   refuses("image,class,left,top,right,bottom,score\n", "got \"score\", in labels.csv:1");
+  refuses("image,class,x,y,w,width,height\n", "got \"w\", in labels.csv:1");
   refuses("a.png,car,1,2,3,4\n", "got \"a.png\", in labels.csv:1");
   refuses("image,class,left,left,top,right,bottom\n", "got \"left\", in labels.csv:1");
   refuses(header + "a.png,car,0.1,0.2,0.3,0.4,\nb.png,car,0,0,1,1,\nc.png,car,0,0,0.5,0.5,\n",
           "expected edges in pixels, got shares of the image, 0..1, in labels.csv");
+  for (const char* rows : {"a.png,car,0,0.25,1,1,\n", "a.png,car,-0.004,0,1.0004,1,\n",
+                           "a.png,car,0,0,1,1,\nb.png,car,0,0,0.5,1,\n"}) {
+    refuses(header + rows,
+            "expected edges in pixels, got shares of the image, 0..1, in labels.csv");
+  }
+  refuses("image,class,x,y,w,h\na.png,car,0.5,0.25,0.5,0.75\n", "got shares of the image");
+  EXPECT_THAT(read_csv("a.png,car,0,0,1,1,\nb.png,car,0,0,1.5,1,\n"), SizeIs(2)) << "pixels";
   refuses(header + "a.png,car,1,2,3,4\n", "expected 7 fields, got 6, in labels.csv:2");
   refuses(header + "a.png,car,1,2,3,4,,\n", "expected 7 fields, got 8, in labels.csv:2");
   refuses(header + ",car,1,2,3,4,\n", "expected an image without control characters, got ''");

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "manifests/values/outlines.h"
-#include "stages/frames/own_labels/detail/yolo_text.h"
+#include "stages/frames/own_labels/yolo_text.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"

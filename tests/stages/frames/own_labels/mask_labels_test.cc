@@ -5,8 +5,8 @@
 
 #include "manifests/files/sha256.h"
 #include "manifests/values/outlines.h"
-#include "stages/frames/find_source.h"
 #include "stages/frames/sequences/frames_dataset.h"
+#include "stages/frames/sources/find_source.h"
 #include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

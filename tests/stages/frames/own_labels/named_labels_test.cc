@@ -162,6 +162,18 @@ TEST_F(NamedLabels, WhatVocHasBesideItsFormatIsANote) {
                           "20), in x/3.xml"));
 }
 
+TEST_F(NamedLabels, VocMayHaveTracks) {
+  for (const char* name : {"1", "2"}) image("i/" + std::string(name) + ".png");
+  text("x/1.xml", cat("5", "5", "9", "<trackid>0</trackid>"));
+  text("x/2.xml", cat("5", "5", "9", "<trackid>a</trackid>"));
+  const auto dataset = open(LabelFormat::kVoc, "i", "x");
+  EXPECT_EQ(read(*dataset, "1.xml").boxes.at(0).track_id, 0);
+  EXPECT_EQ(read(*dataset, "2.xml").boxes.at(0).track_id, -1);
+  EXPECT_THAT(dataset->notes(),
+              ::testing::Contains(
+                  "<trackid> that is no whole number from 0 left out: 1 time, first in x/2.xml"));
+}
+
 TEST_F(NamedLabels, NamesThatNoPlanCanHaveAreLeftOut) {
   image("i/a.png");
   image(
@@ -365,6 +377,17 @@ TEST_F(NamedLabels, CopiesOfASequenceAreToldOf) {
   EXPECT_THAT(dataset->notes()[0],
               ::testing::StartsWith("1 sequence with the labels of another, as MOT17 has each"));
   EXPECT_THAT(dataset->notes()[0], ::testing::EndsWith("): M-02-SDP (of M-02-DPM)"));
+}
+
+TEST_F(NamedLabels, TablesOfOneHashAreNoCopies) {
+  const std::string tables[] = {"1,1,1,1,2,2,1,1,Oi37xZjQntugbAdU\n",
+                                "1,1,1,1,2,2,1,1,HJQyXapZTV9qbGum\n"};
+  ASSERT_EQ(std::hash<std::string>()(tables[0]), std::hash<std::string>()(tables[1]));
+  for (const std::size_t i : {0, 1}) {
+    image("m/" + std::to_string(i) + "/img1/000001.png");
+    text("m/" + std::to_string(i) + "/gt/gt.txt", tables[i]);
+  }
+  EXPECT_THAT(open(LabelFormat::kMot, "m", "m")->notes(), ::testing::IsEmpty());
 }
 
 TEST_F(NamedLabels, MotsLengthAloneIsEnough) {

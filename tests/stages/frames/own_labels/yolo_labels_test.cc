@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "stages/frames/own_labels/detail/yolo_text.h"
+#include "stages/frames/own_labels/yolo_text.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
@@ -81,6 +81,15 @@ TEST(YoloText, ABadBoxDoesNotLoseTheOthers) {
   EXPECT_THAT(annotation.left_out[1], ::testing::EndsWith(", in a.txt:3"));
 }
 
+TEST(YoloText, ALineThatIsThereAlreadyIsLeftOut) {
+  const Annotation annotation =
+      read_yolo("0 0.5 0.5 0.25 0.2\n1 0.5 0.5 0.25 0.2\n\n0 0.5 0.5 0.25 0.2 \r\n0 .5 .5 .2 .2");
+  EXPECT_EQ(annotation.boxes.size(), 3u);
+  EXPECT_THAT(annotation.left_out,
+              ElementsAre("expected each line once, got it again, in a.txt:4"));
+  EXPECT_THAT(annotation.left_out_at, ElementsAre(2u));
+}
+
 TEST(YoloText, WhatProgramsPutAroundNumbersIsPassedOver) {
   const std::string text =
       "\xEF\xBB\xBF"
@@ -113,7 +122,8 @@ TEST(YoloText, AnythingElseIsAFaultOfItsLine) {
   EXPECT_EQ(fault_of("0 1e999 0.5 0.1 0.1"), "expected a number, got '1e999', in a.txt:1");
   EXPECT_EQ(fault_of("0 0.5 0.5 0.1"), "expected 5 columns, got 4, in a.txt:1");
   EXPECT_EQ(fault_of("0 0.5 0.5 0.1 0.1 0.9"), "expected 5 columns, got 6, in a.txt:1");
-  EXPECT_EQ(fault_of("0 0.1 0.1 0.2 0.1 0.2 0.2 0.3"), "expected 5 columns, got 8, in a.txt:1");
+  EXPECT_EQ(fault_of("0 0.1 0.1 0.2 0.1 0.2 0.2 0.3"),
+            "expected 5 columns, or kpt_shape in data.yaml, got 8, in a.txt:1");
   EXPECT_THAT(fault_of(std::string("0 0.5 0.5 0.1 0.1\0", 18)), HasSubstr("expected"));
 }
 
@@ -296,6 +306,54 @@ TEST_F(YoloLabels, ClassesAreInTheFolderAboveWhateverThePathIs) {
     EXPECT_THAT(dataset->annotation_files(), ::testing::Contains(layout.classes)) << layout.path;
     EXPECT_TRUE(std::filesystem::exists(folder_ / layout.manifest / layout.classes));
   }
+}
+
+TEST_F(YoloLabels, JointsWithoutKptShapeAreNotTakenForCorners) {
+  image("d/images/1.png");
+  image("d/images/2.png");
+  text("d/classes.txt", "plate");
+  const struct {
+    std::string first, second, why;  // "": outlines
+  } cases[] = {
+      // 4 joints of x y v; 2 joints of x y or an outline; one of a joint where 0 0 is none.
+      {"0 .5 .5 .3 .4 .35 .3 2 .65 .3 2 .65 .7 1 .35 .7 2",
+       "0 .4 .5 .2 .2 .3 .4 2 .5 .4 2 0 0 0 .3 .6 2",
+       "expected kpt_shape: [4, 3] of boxes with 4 joints of x y v, or kpt_shape: [0, 0] of "
+       "outlines with 8 corners, since 2 lines of 17 columns may be either, got no kpt_shape in a "
+       "data.yaml, in d/labels"},
+      {"0 .5 .5 .2 .3 .45 .4 .55 .6", "0 .5 .4 .2 .3 .45 .3 0 0",
+       "expected kpt_shape: [2, 2] of boxes with 2 joints of x y, or kpt_shape: [0, 0] of outlines "
+       "with 4 corners, since 2 lines of 9 columns may be either"},
+      {"0 .5 .5 .2 .3 .45 .4 2", "",
+       "expected kpt_shape: [1, 3] of boxes with 1 joint of x y v, since 1 line of 8 columns"},
+      // As many corners, and right or left of where centre and size would be a box around them.
+      {"0 .7 .7 .8 .7 .8 .8 .7 .8", "0 .8 .1 .9 .1 .9 .2 .8 .2", ""},
+      {"0 .5 .5 .05 .05 .5 .1 .9 .9", "0 .5 .5 .1 .1 .1 .5 .4 .9", ""},
+      // Other numbers of corners, and more boxes than outlines.
+      {"0 .5 .5 .2 .3 .45 .4 .55 .6", "0 .5 .5 .2 .3 .45 .4", ""},
+      {"0 .5 .5 .2 .3 .45 .4 .55 .6", "0 .5 .5 .2 .3", ""},
+  };
+  for (const auto& [first, second, why] : cases) {
+    SCOPED_TRACE(first);
+    text("d/labels/1.txt", first);
+    text("d/labels/2.txt", second);
+    const auto open_it = [&] { return open("d/images", "d/labels"); };
+    if (why.empty()) {
+      const auto read = open_it()->annotation("1.txt");
+      ASSERT_FALSE(is_fault(read)) << read.fault().reason;
+      EXPECT_FALSE(read->boxes.at(0).outline.empty());
+      continue;
+    }
+    EXPECT_THAT([&] { open_it(); }, ThrowsMessage<InputError>(HasSubstr(why)));
+  }
+  text("d/labels/1.txt", cases[1].first);
+  text("d/labels/2.txt", cases[1].second);
+  text("d/data.yaml", "names: [plate]\nkpt_shape: [2, 2]");
+  EXPECT_EQ(open("d/images", "d/labels")->annotation("1.txt")->boxes.at(0).xyxy,
+            (Rectangle{16, 10.5, 24, 19.5}));
+  text("d/data.yaml", "names: [plate]\nkpt_shape: [0, 0]");
+  EXPECT_EQ(open("d/images", "d/labels")->annotation("1.txt")->boxes.at(0).xyxy,
+            (Rectangle{8, 9, 22, 18}));
 }
 
 TEST_F(YoloLabels, WithoutTheClassesNamesTheseAreTheirNumbers) {
