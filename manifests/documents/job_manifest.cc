@@ -108,6 +108,24 @@ void list_labels(Fields& fields, LabelSpec& spec) {
             "tell, which a note says.");
 }
 
+/// "none" says that what looks like labels is meant to be passed over.
+struct LabelsOrNone {
+  static constexpr auto list = list_labels;
+  void read(const StrictValue& value, std::optional<LabelSpec>& member) const {
+    if (value.is_text()) {
+      value.text("\"none\", or an object", [](std::string_view text) { return text == "none"; });
+    } else {
+      objects(list).read(value, member.emplace());
+    }
+  }
+  Schema schema(const std::optional<LabelSpec>&) const {
+    return {{"anyOf", Schema::array({{{"const", "none"}}, objects(list).schema(LabelSpec())})}};
+  }
+  Schema json(const std::optional<LabelSpec>& member) const {
+    return member ? objects(list).json(*member) : Schema();
+  }
+};
+
 void list_columns(Fields& fields, EventFields& spec) {
   fields.find("t", spec.t, texts(),
               "Times. Of an array [N, 4] the number of the column, 0 to 3; by default 0.");
@@ -141,8 +159,10 @@ void list_recording(Fields::Only some, RecordingOptions& options) {
 /// Which labelled frames are taken.
 void list_selection(Fields& fields, SelectionSpec& spec) {
   Fields::Only some = fields.taken_by(kDatasets);
-  fields.find("ids", spec.ids, paths(),
-              "Takes only the labelled frames that this text file lists, a sample_id a line.");
+  fields.find(
+      "ids", spec.ids, paths(),
+      "Takes only the labelled frames that this text file lists, a line each: the sample_id, or "
+      "the path of the image.");
   some.find("subjects", spec.subjects, lists(texts(), 1),
             "takes only these subjects, such as S1. Default of dhp19: S1 to S12 for the split "
             "train, S13 to S17 for test, else all.");
@@ -195,8 +215,9 @@ void list_source(Fields& fields, SourceSpec& spec) {
                   "else": {"properties": {"every": false}}})");
   some.find("frames_per_second", spec.frames_per_second, numbers(1e-6, 1e6),
             "the frame rate. Default: a video's own times; none for images.");
-  some.find("labels", spec.labels, objects(list_labels),
-            "labels of your own for the images or videos (manifests/guides/own_data.md).");
+  some.find("labels", spec.labels, LabelsOrNone(),
+            "labels of your own for the images or videos (manifests/guides/own_data.md); \"none\" "
+            "says that there are none to read, as leaving the key out does.");
   Fields::Only of_frames = fields.only_for(
       words_where(kDatasets, [](const DatasetRow& row) { return !row.has_events; }));
   of_frames.find(

@@ -88,6 +88,13 @@ bool is_replaceable(const fs::path& file, OwnFile kind) {
   }
 }
 
+bool has_own_mark(std::string_view beginning) {
+  return std::ranges::any_of(kOwnFiles, [&](const OwnFileRow& row) {
+    const std::string_view mark = row.mark.empty() ? row.begins : row.mark;
+    return beginning.starts_with(row.begins) && beginning.find(mark) != beginning.npos;
+  });
+}
+
 void require_replaceable(const fs::path& file, OwnFile kind) {
   if (is_replaceable(file, kind)) return;
   throw UsageError("expected " + std::string(kOwnFiles[static_cast<std::size_t>(kind)].title) +

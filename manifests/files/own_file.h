@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string_view>
 
 namespace eventgan {
 
@@ -34,6 +35,10 @@ enum class OwnFile {
 /// program wrote as that kind. Of a damaged file what is left of it decides. Throws
 /// std::runtime_error if it cannot be read.
 bool is_replaceable(const std::filesystem::path& file, OwnFile kind);
+
+/// Whether a file with this beginning is one that the program wrote, of any kind, as far as that
+/// shows it.
+bool has_own_mark(std::string_view beginning);
 
 /// Throws UsageError "expected ..., or no file, got another file, in PATH" unless is_replaceable.
 /// Every command asks it of all that it is about to write, before it writes anything: no person's

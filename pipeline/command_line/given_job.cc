@@ -72,9 +72,8 @@ void require_labels_read(const std::vector<FoundSource>& sources) {
   for (const FoundSource& source : sources) {
     if (source.unread.empty()) continue;
     throw InputError(fmt::format(
-        "expected labels that can be read, or none, got: {} (eventgan init writes a manifest that "
-        "goes without labels)",
-        fmt::join(source.unread, "; ")));
+        "expected labels that can be read, or none, got: {} ({} goes on without labels)",
+        fmt::join(source.unread, "; "), kNoLabelsOption));
   }
 }
 
@@ -107,6 +106,7 @@ std::string GivenWishes::text() const {
     if (draft.camera == camera) text += " --camera " + word;
   }
   if (!draft.classes.empty()) text += fmt::format(" --classes {}", fmt::join(draft.classes, ","));
+  if (draft.no_labels) text += std::string(" ") + kNoLabelsOption;
   if (sensor) text += " --sensor " + *sensor;
   return text;
 }
@@ -121,6 +121,7 @@ void add_draft_options(CLI::App& command, DraftWishes& wishes) {
                   "Take only the boxes of these classes; others are left out and counted")
       ->delimiter(',')
       ->option_text("A,B,...");
+  command.add_flag(kNoLabelsOption, wishes.no_labels, kNoLabelsText);
 }
 
 void add_wishes_options(CLI::App& command, GivenWishes& wishes) {
@@ -150,6 +151,7 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
     return job;
   }
   std::vector<FoundSource> sources = find_sources(given);
+  if (wishes.draft.no_labels) go_without_labels(sources);
   FoundSource& found = sources.front();
   if (wishes.sensor) {
     found.sensor = parse_sensor(*wishes.sensor);

@@ -32,7 +32,7 @@ struct GivenWishes {
   std::string text() const;
 };
 
-/// --camera, --classes
+/// --camera, --classes, --no-labels
 void add_draft_options(CLI::App& command, DraftWishes& wishes);
 
 /// These and --sensor.

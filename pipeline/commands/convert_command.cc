@@ -19,6 +19,7 @@
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"
 #include "pipeline/runtime/trace.h"
+#include "stages/frames/sources/find_source.h"
 
 namespace eventgan {
 namespace {

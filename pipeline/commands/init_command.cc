@@ -64,7 +64,8 @@ int run(const InitArguments& arguments) {
   const fs::path out = arguments.out;
   if (!out.has_filename()) throw UsageError("--out: expected a file, got " + out.string());
   if (fs::exists(fs::symlink_status(out))) refuse_to_overwrite(arguments);
-  const std::vector<FoundSource> found = find_all(arguments.where);
+  std::vector<FoundSource> found = find_all(arguments.where);
+  if (arguments.wishes.no_labels) go_without_labels(found);
   const ManifestDraft draft =
       draft_manifest(found,
                      {fs::absolute(out).lexically_normal().parent_path(),

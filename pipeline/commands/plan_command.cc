@@ -20,6 +20,7 @@
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/threads.h"
+#include "stages/frames/sources/find_source.h"
 #include "stages/recordings/order/event_index.h"
 
 namespace eventgan {

@@ -148,6 +148,8 @@ class Draft {
     if (found.devkit) keys += key("devkit", *found.devkit);
     if (found.annotations) keys += key("annotations", *found.annotations);
     if (found.sequences) keys += key("sequences", *found.sequences);
+    if (found.has_no_labels) keys += "      \"labels\": \"none\",\n";
+    if (found.ids) keys += key("ids", *found.ids);
     if (found.labels) {
       keys += fmt::format("      \"labels\": {{ \"format\": \"{}\", \"path\": {} }},\n",
                           to_string(found.labels->format), written(found.labels->path));
@@ -298,9 +300,9 @@ void require_one_job(const std::vector<FoundSource>& sources) {
     }
     for (std::size_t before = 0; before < i; ++before) {
       std::error_code unknown;
-      if (sources[before].root != now.root &&
-          !fs::equivalent(sources[before].root, now.root, unknown))
-        continue;
+      const FoundSource& other = sources[before];
+      if (other.root != now.root && !fs::equivalent(other.root, now.root, unknown)) continue;
+      if (other.ids && now.ids && *other.ids != *now.ids) continue;
       throw UsageError("expected each folder or video once, got it twice: " + now.root.string());
     }
   }
@@ -357,6 +359,14 @@ ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const Draf
     }
     source.preset = alone.image.preset;
     look_at_source(alone.sources.front(), place.folder, source);
+    if (found.ids) {
+      source.findings.push_back("of these only what is listed in " + found.ids->string());
+      if (!source.is_stills) {
+        source.findings.emplace_back(
+            "warning: a list takes labelled frames alone: the other frame of a pair may be of "
+            "another split (\"from\": \"stills\" pairs each frame with itself)");
+      }
+    }
     if (sources.size() > 1) source.findings.insert(source.findings.begin(), found.root.string());
     made.has_samples &= source.has_samples;
     std::ranges::copy(source.findings, std::back_inserter(made.findings));

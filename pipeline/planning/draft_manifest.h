@@ -27,6 +27,7 @@ enum class CameraMotion { kRests, kMoves, kBoth };
 struct DraftWishes {
   std::optional<CameraMotion> camera = {};
   std::vector<std::string> classes = {};  ///< SourceSpec::classes of each source; empty: all
+  bool no_labels = false;                 ///< the sources went without them (go_without_labels)
 };
 
 /// StillsSpec::rests of photographs of labelled objects before such a camera.

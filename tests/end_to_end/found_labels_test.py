@@ -187,6 +187,33 @@ class FoundLabels(program.InFolder):
                 told, _ = run("convert", manifest, "--output", self.folder / "out", "--progress", "none")
                 self.assertIn("\nNO LABELS: no boxes and no persons with joints\n", told)
 
+    def test_going_without_labels_is_said(self):
+        self.images("images")
+        self.write("labels.bin.json", '[{"of": "frame_00.png", "at": [1, 2, 3, 4]}]')
+        names = f"{self.folder}/labels.bin.json names these images and is not read: no reader of its format"
+        self.assertIn(names, self.convert(expect=66)[1])
+        self.assertIn("(--no-labels goes on without labels)", self.convert(expect=66)[1])
+        manifest = self.folder / "job.json"
+        told, _ = run("init", self.folder, "--no-labels", "--out", manifest)
+        self.assertNotIn("warning", told)
+        self.assertIn('"labels": "none"', manifest.read_text())
+        told, err = run("convert", self.folder, "--no-labels", "--output", self.folder / "out", "--progress", "none")
+        self.assertIn("\nNO LABELS: no boxes and no persons with joints\n", told)
+        _, err = run("convert", manifest, "--no-labels", expect=64)
+        self.assertIn("--no-labels: expected a folder, video or recording, got a manifest, whose keys count", err)
+
+    def test_lists_make_splits(self):
+        self.images("images")
+        self.write("data.yaml", "train: autosplit_train.txt\nval: autosplit_val.txt\nnames: [car]\n")
+        for split, names in (("train", NAMES[:2]), ("val", NAMES[2:])):
+            self.write(f"autosplit_{split}.txt", "".join(f"./images/{name}\n" for name in names))
+        for name in NAMES:
+            self.write(f"labels/{name[:-4]}.txt", "0 0.5 0.5 0.25 0.5\n")
+        _, err = self.convert()
+        self.assertIn("warning: a list takes labelled frames alone", err)
+        with h5py.File(next((self.folder / "out").glob("*-val-*.h5"))) as file:
+            self.assertEqual([text(name) for name in file["pairs/sample_id"]], ["frame_02"])
+
     def test_images_alone_have_no_labels(self):
         self.images("images")
         self.write("captions.json", json.dumps([{"image": name, "caption": "a street"} for name in NAMES]))

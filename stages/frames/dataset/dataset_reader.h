@@ -31,14 +31,17 @@ struct FoundSource {
   std::filesystem::path root;
   std::string_view split = {};  ///< frames: "val" or "test" where its folder says so; empty: train
   std::optional<std::filesystem::path> raw_root, devkit, annotations, sequences;
-  std::optional<FoundLabels> labels;     ///< frames
+  std::optional<FoundLabels> labels;  ///< frames
+  bool has_no_labels = false;         ///< frames: somebody says so (go_without_labels)
+  /// Frames: a list of the split's images or sample ids, as SelectionSpec::ids.
+  std::optional<std::filesystem::path> ids = {};
   std::string_view more_keys = {};       ///< lines of a manifest's source
   EventFields columns;                   ///< recording: a table's, by what its columns are called
   std::optional<ImageSize> sensor = {};  ///< recording: of its sensor, where somebody tells it
   /// What is not there and what that costs, or is left out; a line each.
   std::vector<std::string> remarks;
-  /// Of frames without labels: files that look like their labels and are not read, why, and what to
-  /// do; a line each.
+  /// Of frames without labels: files that name them and are not read, what they look like, and what
+  /// to do; a line each.
   std::vector<std::string> unread;
 };
 

@@ -65,11 +65,10 @@ std::string beginning_of(const fs::path& file) {
   return text;
 }
 
-namespace {
-
-FrameNames& names_of(const FoundFrames& frames) {
-  if (frames.names) return *frames.names;
+const std::vector<std::string>& image_names_of(const FoundFrames& frames) {
+  if (frames.image_names) return *frames.image_names;
   frames.image_names = std::make_shared<std::vector<std::string>>();
+  if (frames.is_video) return *frames.image_names;
   const auto add = [&](const fs::path& below) {
     const ImageFolder listed = list_image_folder(frames.root / below);
     for (const auto& [number, name] : listed.frames.frames()) {
@@ -81,7 +80,15 @@ FrameNames& names_of(const FoundFrames& frames) {
     add(folder);
     if (has_folder(frames.root / folder / "img1")) add(folder / "img1");
   }
-  const std::vector<std::string_view> views(frames.image_names->begin(), frames.image_names->end());
+  return *frames.image_names;
+}
+
+namespace {
+
+FrameNames& names_of(const FoundFrames& frames) {
+  if (frames.names) return *frames.names;
+  const std::vector<std::string>& names = image_names_of(frames);
+  const std::vector<std::string_view> views(names.begin(), names.end());
   frames.names = std::make_shared<FrameNames>(views, frames.root, /*is_video=*/false);
   return *frames.names;
 }

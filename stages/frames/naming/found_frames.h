@@ -62,6 +62,9 @@ struct FoundFrames {
 /// The first bytes of a file, where a format shows; a byte order mark left out.
 std::string beginning_of(const std::filesystem::path& file);
 
+/// Names of all images below the root, listed once; none of videos.
+const std::vector<std::string>& image_names_of(const FoundFrames& frames);
+
 /// What folders of images are called where their labels lie beside them, in small letters.
 inline constexpr std::array<std::string_view, 4> kImageFolders = {"images", "jpegimages", "img1",
                                                                   "imgs"};

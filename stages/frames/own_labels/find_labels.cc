@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/values/text.h"
 #include "stages/frames/dataset/dataset_reader.h"
 #include "stages/frames/listing/image_folder.h"
 #include "stages/frames/listing/source_folders.h"
@@ -31,7 +32,8 @@ FoundFrames frames_in(const fs::path& root, WholeFiles& files) {
     frames.root = root.parent_path();
     return frames;
   }
-  if (look_into(root).files.empty() && look_into(root).folders.empty()) return frames;
+  const FolderListing seen = look_into(root);
+  if (seen.files.empty() && seen.folders.empty()) return frames;
   const ImageFolder listed = list_image_folder(root);
   for (const auto& [number, name] : listed.frames.frames()) {
     frames.stems.insert(fs::path(name).stem().string());
@@ -164,6 +166,98 @@ std::vector<FoundSource> find_splits(FoundSource& found, const fs::path& given, 
   return sources.size() < 2 ? std::vector<FoundSource>() : sources;
 }
 
+/// Tells of images that are in two of the sources or, of lists, in none.
+void note_overlaps(const FoundFrames& frames, const std::string& file,
+                   std::vector<FoundSource>& sources) {
+  std::vector<std::string>& remarks = sources.front().remarks;
+  const auto word = [](const FoundSource& source) {
+    return source.split.empty() ? "train" : std::string(source.split);
+  };
+  std::map<std::string, std::string_view> listed;  // the splits of images, by their paths
+  std::set<std::string> names;                     // and these without their first folders
+  std::size_t twice = 0;
+  for (const FoundSource& source : sources) {
+    for (const FoundSource& other : sources) {
+      if (source.split == other.split || !is_below(other.root, source.root)) continue;
+      if (source.root == other.root || !frames_in(source.root, *frames.files).stems.empty())
+        continue;
+      remarks.push_back("warning: images of " + word(other) + " are in split " + word(source) +
+                        ", too, as " + file + " says");
+    }
+    for (const fs::path line :
+         source.ids ? images_of_list(*source.ids) : std::vector<std::string>()) {
+      const std::string image = line.lexically_normal().generic_string();
+      const auto [entry, is_new] = listed.emplace(image, source.split);
+      twice += !is_new && entry->second != source.split;
+      for (std::size_t at = 0; at != image.npos; at = image.find('/', at + 1)) {
+        names.insert(image.substr(at == 0 ? 0 : at + 1));
+      }
+    }
+  }
+  if (twice > 0) {
+    remarks.push_back("warning: " + count_text(static_cast<std::int64_t>(twice), "image") +
+                      " in lists of two splits, as " + file + " says");
+  }
+  if (listed.empty()) return;
+  const auto in_none = std::ranges::count_if(
+      image_names_of(frames), [&](const std::string& image) { return !names.contains(image); });
+  if (in_none > 0) {
+    remarks.push_back("warning: " +
+                      count_text(in_none, "image", " left out: in no list of " + file));
+  }
+}
+
+/// A source for each folder or list that data.yaml, obj.data or autosplit_*.txt gives a split; none
+/// if they say no more than that all is train.
+std::vector<FoundSource> find_said_splits(FoundSource& found, const fs::path& given,
+                                          WholeFiles& files) {
+  std::vector<fs::path> folders = {found.labels->path, given};
+  if (is_image_folder(given.filename().string())) folders.push_back(given.parent_path());
+  folders.push_back(given / "data");
+  std::set<fs::path> known;
+  for (const fs::path& folder : folders) {
+    if (!known.insert(folder).second) continue;
+    std::string file;
+    std::vector<FoundSource> sources;
+    std::vector<std::string> remarks;
+    for (const auto& [split, place] : split_parts(folder, file)) {
+      FoundSource source = found;
+      if (!sources.empty() || has_folder(place)) source.remarks.clear();
+      source.split = split == "train" ? "" : split;
+      if (has_file(place)) {
+        source.ids = place;
+      } else {
+        const FoundFrames frames = frames_in(place, files);
+        const bool has_frames = !frames.stems.empty() || !frames.folders.empty();
+        if (!has_frames || !is_below(place, given)) continue;
+        source.root = place;
+        source.labels = find_any(frames, source.remarks);
+        if (!source.labels) continue;
+      }
+      const auto same = std::ranges::find_if(sources, [&](const FoundSource& other) {
+        return other.root == source.root && other.ids == source.ids;
+      });
+      if (same == sources.end()) {
+        sources.push_back(std::move(source));
+      } else if (same->split != source.split) {
+        remarks.push_back("warning: " + file + " gives " + place.string() +
+                          " two splits: it is in one, " +
+                          (same->split.empty() ? "train" : std::string(same->split)));
+      }
+    }
+    const bool is_given = sources.size() == 1 && sources[0].root == given && !sources[0].ids;
+    if (is_given || std::ranges::all_of(
+                        sources, [](const FoundSource& source) { return source.split.empty(); })) {
+      std::ranges::move(remarks, std::back_inserter(found.remarks));
+      continue;
+    }
+    std::ranges::move(remarks, std::back_inserter(sources.front().remarks));
+    note_overlaps(frames_in(found.root, files), file, sources);
+    return sources;
+  }
+  return {};
+}
+
 /// Tells of images that are no part of the sources that were chosen, or that are in one split with
 /// the first.
 void note_other_images(const std::vector<fs::path>& with_frames, const fs::path& given,
@@ -222,11 +316,15 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
   std::vector<fs::path> with_frames;
   const fs::path given = found.root;
   WholeFiles files;
+  std::vector<FoundFrames> places;
   const FoundFrames whole = frames_in(given, files);
   const bool is_empty = whole.stems.empty() && whole.folders.empty();
   for (const fs::path& place : places_in(found.root)) {
-    const FoundFrames frames = frames_in(place, files);
-    if (frames.stems.empty() && frames.folders.empty()) continue;
+    const FoundFrames& frames = places.emplace_back(frames_in(place, files));
+    if (frames.stems.empty() && frames.folders.empty()) {
+      places.pop_back();
+      continue;
+    }
     with_frames.push_back(place);
     if (is_empty && !first_place) first_place = place;
     std::vector<std::string> of_place;
@@ -244,13 +342,9 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
   if (root || first_place) found.root = root ? *root : *first_place;
   found.remarks.insert(found.remarks.end(), remarks.begin(), remarks.end());
   std::vector<FoundSource> sources;
-  if (found.labels) sources = find_splits(found, given, files, with_frames);
+  if (found.labels) sources = find_said_splits(found, given, files);
+  if (found.labels && sources.empty()) sources = find_splits(found, given, files, with_frames);
   if (sources.empty()) sources.push_back(std::move(found));
-  if (!sources.front().labels) {
-    std::vector<FoundFrames> places;
-    for (const fs::path& place : with_frames) places.push_back(frames_in(place, files));
-    sources.front().unread = unread_labels(places);
-  }
   for (const auto& other : others) {
     const auto& [place, labels] = other;
     const bool is_of_source = std::ranges::any_of(
@@ -260,6 +354,14 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
                                       " of " + place.string());
   }
   note_other_images(with_frames, given, files, sources);
+  UnreadLabels unread = unread_labels(places, given, sources);
+  sources.front().unread = std::move(unread.lines);
+  std::vector<std::string>& remarks_of_all = sources.front().remarks;
+  if (!unread.others.empty()) {
+    remarks_of_all.push_back(
+        counted(unread.others, "file", " with names of these images not read"));
+  }
+  if (!unread.limit.empty()) remarks_of_all.push_back(std::move(unread.limit));
   if (sources.size() == 1) note_lists(given, whole, sources.front());
   return sources;
 }

@@ -9,6 +9,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "stages/frames/listing/image_folder.h"
+#include "stages/frames/listing/numbered_sequence.h"
 #include "stages/frames/listing/source_folders.h"
 #include "stages/frames/sources/dataset_kinds.h"
 #include "stages/recordings/readers/recording.h"
@@ -173,6 +174,40 @@ std::optional<FileKind> kind_of_file(std::string_view text) {
   return kind_of_text(text);
 }
 
+/// Of images that lie deeper than they are looked for: where the first are, and the folder to give.
+std::string deeper_images(const fs::path& root) {
+  constexpr std::size_t kMostFolders = 10'000;
+  std::vector<fs::path> folders = {root};  // breadth first, as names are ordered
+  for (std::size_t i = 0; i < folders.size() && i < kMostFolders; ++i) {
+    const FolderListing listing = look_into(folders[i]);
+    const bool has_images = std::ranges::any_of(listing.files, [](const fs::path& name) {
+      return std::ranges::find(kImageExtensions, lower_extension(name)) != kImageExtensions.end();
+    });
+    if (!has_images) {
+      for (const std::string& name : listing.folders) {
+        if (!name.starts_with('.')) folders.push_back(folders[i] / name);
+      }
+      continue;
+    }
+    fs::path give = root;
+    const fs::path below = folders[i].lexically_relative(root);
+    for (auto part = below.begin(); part != below.end() && !look_at(give, {}, true); ++part) {
+      give /= *part;
+    }
+    if (give == root) return "";
+    fs::path part = root;  // what is a part of a dataset is little without it
+    for (int level = 0; level < 4; ++level, part = part.parent_path()) {
+      if (const auto whole = whole_of(part)) {
+        return "; this is only a part of " + std::string(whole->title()) +
+               ": run eventgan convert \"" + whole->root.string() + "\"";
+      }
+    }
+    return "; images lie in " + below.generic_string() + ": run eventgan convert \"" +
+           give.string() + "\"";
+  }
+  return "";
+}
+
 }  // namespace
 
 std::string fault_of_file(const fs::path& file) {
@@ -206,7 +241,7 @@ std::vector<FoundSource> find_sources(const fs::path& path, std::optional<Datase
     const auto other = dataset ? look_around(root, std::nullopt) : std::nullopt;
     throw InputError("expected " + (dataset ? std::string(to_string(*dataset)) : known_titles()) +
                      ", got " + std::string(other ? other->word() : "none of these") + ", in " +
-                     path.string());
+                     path.string() + (other || dataset ? "" : deeper_images(root)));
   }
   FoundSource found;
   found.dataset = place->dataset;
@@ -221,6 +256,19 @@ std::vector<FoundSource> find_sources(const fs::path& path, std::optional<Datase
   }
   if (is_own(place->dataset)) note_dataset_above(sources.front());
   return sources;
+}
+
+void go_without_labels(std::vector<FoundSource>& sources) {
+  for (FoundSource& source : sources) {
+    if (!is_own(source.dataset)) {
+      throw UsageError(std::string(kNoLabelsOption) +
+                       ": expected images or videos of your own, got " +
+                       std::string(to_string(source.dataset)) + ", in " + source.root.string());
+    }
+    source.labels.reset();
+    source.unread.clear();
+    source.has_no_labels = true;
+  }
 }
 
 bool may_be_source(const fs::path& path) {

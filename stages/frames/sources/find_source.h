@@ -25,10 +25,21 @@ std::string fault_of_file(const std::filesystem::path& file);
 /// one's own the root becomes the folder of images that they are of (FOLDER/images,
 /// FOLDER/JPEGImages, FOLDER/train2017), and `labels` is set; those that were found and do not
 /// count are remarks. Where train and val or test have folders of images with labels of their own
-/// (FOLDER/images/val, FOLDER/valid/images), each is a source; else there is one. Throws InputError
-/// if there is nothing at `path`, no such dataset, or more than one.
+/// (FOLDER/images/val, FOLDER/valid/images), each is a source, and so is each folder or list that
+/// data.yaml, obj.data or autosplit_*.txt gives a split; else there is one. Throws InputError if
+/// there is nothing at `path`, no such dataset, or more than one; it names the first folder with
+/// images that lies deeper than images are looked for.
 std::vector<FoundSource> find_sources(const std::filesystem::path& path,
                                       std::optional<DatasetKind> dataset = std::nullopt);
+
+/// The option by which a command goes on without labels.
+inline constexpr char kNoLabelsOption[] = "--no-labels";
+inline constexpr char kNoLabelsText[] =
+    "Take the images or videos without labels, whatever lies beside them";
+
+/// Takes the labels, and what looks like some, off these sources. Throws UsageError for a dataset
+/// that is nothing without its labels.
+void go_without_labels(std::vector<FoundSource>& sources);
 
 /// Whether find_sources may find something at `path`: a folder, or a file that is a dataset by its
 /// name, such as a video; also a video's name where nothing is.

@@ -9,6 +9,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "manifests/values/text_lines.h"
+#include "stages/frames/listing/numbered_sequence.h"
 #include "stages/frames/listing/source_folders.h"
 #include "stages/frames/sources/open_dataset.h"
 
@@ -24,6 +25,32 @@ std::set<std::string> read_ids(const SourceRoot& base, const std::string& path) 
     if (!id.empty()) ids.emplace(id);
   }
   return ids;
+}
+
+/// A list of images in place of ids: the sample of "data/obj/a0.jpg" is "data/obj/a0", "obj/a0" or
+/// "a0", the first that there is. Takes images without one off the list, and counts them.
+std::size_t name_samples(const std::vector<LabelledFrame>& frames, std::set<std::string>& ids) {
+  std::set<std::string> known, named;
+  for (const LabelledFrame& frame : frames) known.insert(frame.sample_id);
+  std::size_t without = 0;
+  for (const std::string& line : ids) {
+    const std::filesystem::path image = std::filesystem::path(line).lexically_normal();
+    if (known.contains(line) ||
+        std::ranges::find(kImageExtensions, in_small_letters(image.extension().string())) ==
+            kImageExtensions.end()) {
+      named.insert(line);
+      continue;
+    }
+    std::string id = (image.parent_path() / image.stem()).generic_string();
+    while (!known.contains(id) && id.find('/') != id.npos) id.erase(0, id.find('/') + 1);
+    if (known.contains(id)) {
+      named.insert(id);
+    } else {
+      ++without;
+    }
+  }
+  ids = std::move(named);
+  return without;
 }
 
 /// Keeps the frames whose word is among `named`, which must all occur, or all others.
@@ -58,9 +85,14 @@ FrameSelection select_frames(const std::vector<LabelledFrame>& frames, const Sou
   FrameSelection result{frames, {}};
   std::vector<LabelledFrame>& selected = result.frames;
   if (selection.ids) {
+    std::set<std::string> ids = read_ids(SourceRoot("", base), *selection.ids);
+    if (const std::size_t without = name_samples(selected, ids); without > 0) {
+      result.notes.push_back(count_text(static_cast<std::int64_t>(without), "image",
+                                        " without a label in " + *selection.ids));
+    }
     keep(
-        selected, read_ids(SourceRoot("", base), *selection.ids),
-        [](const LabelledFrame& frame) { return frame.sample_id; }, "sample ids", *selection.ids);
+        selected, ids, [](const LabelledFrame& frame) { return frame.sample_id; }, "sample ids",
+        *selection.ids);
   }
   const auto keep_origin = [&](const std::vector<std::string>& words,
                                std::string FrameOrigin::*part, const char* what,

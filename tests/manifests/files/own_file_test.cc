@@ -37,6 +37,8 @@ TEST_P(OwnFiles, AreToldFromAPersonsByTheirContent) {
   write_file(file, own);
   EXPECT_TRUE(is_replaceable(file, kind)) << own;
   EXPECT_NO_THROW(require_replaceable(file, kind));
+  EXPECT_TRUE(has_own_mark(own)) << own;
+  EXPECT_FALSE(has_own_mark(foreign)) << foreign;
   write_file(file, foreign);
   EXPECT_FALSE(is_replaceable(file, kind)) << foreign;
   try {

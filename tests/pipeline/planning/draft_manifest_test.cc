@@ -337,6 +337,30 @@ TEST_F(DraftManifest, RefusesWhatIsNoOneJob) {
   EXPECT_THAT([&] { draft({latin}); }, ThrowsMessage<UsageError>(HasSubstr("in UTF-8")));
 }
 
+TEST_F(DraftManifest, SplitsOfOneFolderHaveAListEach) {
+  FoundSource train = images("walk", {kOneSize, kOneSize, kOneSize}), val = train;
+  train.ids = folder_ / "train.txt";
+  testing::write_file(*train.ids, "walk/0.png\nwalk/1.png\n");
+  val.ids = folder_ / "val.txt";
+  val.split = "val";
+  testing::write_file(*val.ids, "walk/2.png\n");
+  const ManifestDraft made = draft({train, val});
+  const JobManifest job = read(made);
+  EXPECT_EQ(job.sources[0].selection.ids, "train.txt");
+  EXPECT_EQ(job.sources[1].selection.ids, "val.txt");
+  EXPECT_THAT(made.findings, Contains(HasSubstr("may be of another split")));
+  EXPECT_THAT([&] { draft({val, val}); }, ThrowsMessage<UsageError>(HasSubstr("got it twice")));
+  std::vector<FoundSource> without = {images("run", {kOneSize, kOneSize})};
+  without[0].labels = {LabelFormat::kCsv, folder_ / "boxes.csv"};
+  without[0].unread = {"boxes.json looks like labels"};
+  go_without_labels(without);
+  EXPECT_THAT(draft(without).text, HasSubstr("\"labels\": \"none\""));
+  EXPECT_FALSE(read(draft(without)).sources[0].labels);
+  without = {found(DatasetKind::kKittiObject, "kitti")};
+  EXPECT_THAT([&] { go_without_labels(without); },
+              ThrowsMessage<UsageError>(HasSubstr("--no-labels: expected images or videos")));
+}
+
 TEST_F(DraftManifest, IsNamedAfterWhatWasShown) {
   const auto name = [&](const std::vector<fs::path>& names) {
     std::vector<FoundSource> sources;

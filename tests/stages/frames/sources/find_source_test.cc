@@ -423,6 +423,61 @@ TEST_F(FindSource, WhatLooksLikeLabelsAndIsNotReadIsNamed) {
        {{"images/1.jpg", ""},
         {"a.json", R"({"images": [{"file_name": "gone.jpg"}], "annotations": [{"bbox": []}]})"}}},
       {"a table of", {{"1.jpg", ""}, {"a.csv", "1.jpg,1,2,3,4,car\n"}}},
+      {"a table of", {{"00000.ppm", ""}, {"gt.txt", "00000.ppm;774;411;815;446;11\n"}}},
+      {"a table of",
+       {{"train/b6ab.jpg", ""},
+        {"train.csv", "image_id,width,height,bbox,source\nb6ab,9,9,\"[1.0, 2, 3, 4]\",usask\n"}}},
+      {"Open Images'",
+       {{"train/0a1b.jpg", ""},
+        {"boxes.csv",
+         "ImageID,Source,LabelName,Confidence,XMin,XMax,YMin,YMax\n"
+         "0a1b,xclick,/m/0k4j,1,0.1,0.2,0.3,0.4\n"}}},
+      {"BDD100K's",
+       {{"images/100k/train/f-1.jpg", ""},
+        {"labels/det_20/det_train.json",
+         R"([{"name": "f-1.jpg"}, {"name": "f-2.jpg", "labels": [{"box2d": {"x1": 1}}]}])"}}},
+      {"Supervisely's",
+       {{"ds/img/im.jpg", ""},
+        {"ds/ann/im.jpg.json", R"({"tags": [], "size": {"height": 9}, "objects": []})"},
+        {"meta.json", R"({"classes": [], "tags": []})"}}},
+      {"DOTA's",
+       {{"train/images/P1.png", ""},
+        {"train/labelTxt-v1.0/P1.txt",
+         "imagesource:GoogleEarth\ngsd:0.1\n"
+         "1 1 5 1 5 5 1 5 plane 0\n"}}},
+      {"PoseTrack's",
+       {{"images/val/000342_mpii/000000.jpg", ""},
+        {"annotations/val/000342_mpii.json",
+         R"({"images": [{"file_name": "images/val/000342_mpii/000000.jpg"}],)"
+         R"( "annotations": [{"bbox": [1, 2, 3, 4], "keypoints": []}]})"}}},
+      {"UA-DETRAC's",
+       {{"MVI_20011/img00001.jpg", ""},
+        {"MVI_20011.xml", "<sequence name=\"MVI_20011\"><frame num=\"1\"><target_list/>"}}},
+      {"GOT-10k's or LaSOT's",
+       {{"GOT_1/00000001.jpg", ""}, {"GOT_1/groundtruth.txt", "1.0,2.0,3.0,4.0\n"}}},
+      {"UAVDT's", {{"M0101/img000001.jpg", ""}, {"M0101_gt_whole.txt", "1,1,1,2,3,4,1,1,1\n"}}},
+      {"CrowdHuman's",
+       {{"Images/273271,c9db.jpg", ""},
+        {"a.odgt", R"({"ID": "273271,c9db", "gtboxes": [{"fbox": [1, 2, 3, 4]}]})"}}},
+      {"LVIS's",
+       {{"images/000000397133.jpg", ""},
+        {"lvis.json",
+         R"({"images": [{"id": 1, "coco_url": "http://x/train2017/000000397133.jpg"}],)"
+         R"( "annotations": [{"bbox": [1, 2, 3, 4]}]})"}}},
+      {"YouTube-VIS's",
+       {{"JPEGImages/0a1/00000.jpg", ""},
+        {"instances.json",
+         R"({"videos": [{"file_names": ["0a1/00000.jpg"]}], "annotations": [{"bboxes": []}]})"}}},
+      {"nuImages'",
+       {{"samples/CAM/n003.jpg", ""},
+        {"v1.0-mini/object_ann.json", R"([{"token": "a", "category_token": "b", "bbox": [1]}])"}}},
+      {"AI Challenger's",
+       {{"images/70b1.jpg", ""},
+        {"a.json", R"([{"image_id": "70b1", "human_annotations": {"human1": [1, 2, 3, 4]}}])"}}},
+      {"SoccerNet's",
+       {{"img1/000001.jpg", ""},
+        {"Labels-GameState.json", R"({"images": [{"file_name": "000001.jpg"}],)"
+                                  R"( "annotations": [{"bbox_image": {"x": 1}}]})"}}},
       {"a table of",
        {{"1.jpg", ""}, {"a.csv", "image,class,left,top,right,bottom,score\n1.jpg,a,0,0,1,1,1\n"}}},
   };
@@ -446,6 +501,101 @@ TEST_F(FindSource, WhatLooksLikeLabelsAndIsNotReadIsNamed) {
   write("none/frames.csv", "image,width,height,sequence,index\n1.jpg,64,48,a,1\n");
   write("none/1.json", R"({"mine": [1, 2]})");
   EXPECT_THAT(find("none").unread, IsEmpty());
+}
+
+/// Whatever tool wrote it: by the images that it names, its own name, or its place.
+TEST_F(FindSource, WhatNamesTheImagesAndIsNotReadIsNamed) {
+  const std::string box = R"({"of": "clip/im1.jpg", "at": [1, 2, 3, 4]})";
+  const std::string numbers = testing::npy_doubles({1, 4}, {0, 0, 1, 1});
+  const std::pair<std::string, std::string> files[] = {
+      {"boxes.json", "{\"seen\": [" + box + "]}"},
+      {"boxes.jsonl", box},
+      {"more/labels.txt", "im1 4 5 9 9\n"},
+      {"joints.csv", "picture,head x,head y\nim1.jpg,4,5\n"},
+      {"boxes.xml", "<seen><of>im1.jpg</of></seen>"},
+      {"boxes.mat", std::string("MATLAB 5.0 \0i\0m\0001\0.\0j\0p\0g", 25)},
+      {"more/deep/er/im1.npy", numbers},
+      {"clip.npy", numbers},
+      {"clip.txt", "1 2 3 4\n"},
+      {"clip_boxes.csv", "frame,l,t,r,b\n1,4,5,9,9\n"},
+      {"../gt/clip/im1.txt", "car: 1 2 3 4\n"},
+      {"../all.json", box}};
+  int number = 0;
+  for (const auto& [file, text] : files) {
+    const std::string name = "named" + std::to_string(number++);
+    write(name + "/set/clip/im1.jpg");
+    write(name + "/set/" + file, text);
+    const fs::path place = at(name + "/set/" + file).lexically_normal();
+    EXPECT_THAT(find(name + "/set").unread,
+                ::testing::ElementsAre(AllOf(::testing::StartsWith(place.string()),
+                                             HasSubstr(" is not read: no reader of its format"))))
+        << file;
+    EXPECT_THAT(find(name + "/set").remarks, IsEmpty()) << file;
+    // With labels it is a remark.
+    write(name + "/set/b.csv", "image,class,left,top,right,bottom\nim1.jpg,a,0,0,1,1\n");
+    EXPECT_TRUE(find(name + "/set").labels) << file;
+    EXPECT_THAT(find(name + "/set").unread, IsEmpty()) << file;
+    EXPECT_THAT(
+        find(name + "/set").remarks,
+        ::testing::ElementsAre("1 file with names of these images not read: " + place.string()))
+        << file;
+  }
+}
+
+TEST_F(FindSource, WhatNamesTheImagesAndIsNoLabelStopsNothing) {
+  const std::pair<std::string, std::string> files[] = {
+      {"IMG_0001.jpg.json",
+       R"({"title": "IMG_0001.jpg", "photoTakenTime": {"t": 1}, "a": [1, 2, 3]})"},
+      {"exif.csv", "SourceFile,FNumber,ISO,Width\nIMG_0001.jpg,2.8,100,640\n"},
+      {"IMG_0001.txt", "ExifTool Version : 12.1\nISO : 100 200 300\n"},
+      {"README.txt", "IMG_0001.jpg 1 2 3 4\n"},
+      {"transforms.json",
+       R"({"frames": [{"file_path": "IMG_0001.jpg", "transform_matrix": [1, 2, 3, 4]}]})"},
+      {"calib/IMG_0001.txt", "7 0 6 0\n"},
+      {"set.txt", "IMG_0001.jpg\nIMG_0002.jpg\n"},
+      {"rgb.txt", "# color images\n1305031102.175304 rgb/IMG_0001.jpg\n"},
+      {"files.csv", "image,width,height,sequence,index\nIMG_0001.jpg,64,48,a,1\n"},
+      {"md5.txt", "d41d8cd98f00b204e9800998ecf8427e  IMG_0001.jpg\n"},
+      {"IMG_0001.json", R"({"mine": [1, 2, 3, 4]})"},
+      {"out/plan.json",
+       R"({"format": "eventgan-plan", "samples": [{"id": "IMG_0001", "n": [1, 2, 3, 4]}]})"},
+      {"other.json", R"({"of": "IMG_0003.jpg", "at": [1, 2, 3, 4]})"}};
+  for (const auto& [file, text] : files) write("quiet/" + file, text);
+  write("quiet/IMG_0001.jpg");
+  EXPECT_THAT(find("quiet").unread, IsEmpty());
+  EXPECT_THAT(find("quiet").remarks, IsEmpty());
+  write("quiet/captions.txt", "IMG_0001.jpg two dogs\n");
+  EXPECT_THAT(find("quiet").unread, IsEmpty());
+  EXPECT_THAT(find("quiet").remarks,
+              ::testing::ElementsAre("1 file with names of these images not read: " +
+                                     at("quiet/captions.txt").string()));
+  write("quiet/sets/other/images/IMG_0002.jpg");  // another dataset
+  write("quiet/sets/other/boxes.json", R"({"of": "IMG_0001.jpg", "at": [1, 2, 3, 4]})");
+  EXPECT_THAT(find("quiet").unread, IsEmpty());
+}
+
+TEST_F(FindSource, ImagesThatLieTooDeepAreNamed) {
+  write("deep/images/train/camA/day1/1.jpg");
+  write("deep/labels/train/camA/day1/1.txt", "0 .5 .5 .2 .2\n");
+  write("deep/data.yaml", "names: [car]\n");
+  EXPECT_THAT([&] { find("deep"); }, ThrowsMessage<InputError>(::testing::EndsWith(
+                                         "in " + at("deep").string() +
+                                         "; images lie in images/train/camA/day1: run eventgan "
+                                         "convert \"" +
+                                         at("deep/images/train").string() + "\"")));
+  EXPECT_EQ(find("deep/images/train").labels->format, LabelFormat::kYolo);
+  write("fetch/S1/Walking-1/annot.h5");
+  write("fetch/S1/Walking-1/imageSequence/54138969/img_000001.jpg");
+  EXPECT_THAT([&] { find("fetch/S1"); },
+              ThrowsMessage<InputError>(
+                  AllOf(HasSubstr("this is only a part of Human3.6M"),
+                        ::testing::EndsWith("eventgan convert \"" + at("fetch").string() + "\""))));
+  // ImageNet's videos: the labels' tree stands beside that of the images.
+  write("vid/Data/VID/train/set/clip/000000.JPEG");
+  write("vid/Annotations/VID/train/set/clip/000000.xml", "<annotation/>");
+  EXPECT_THAT([&] { find("vid"); }, ThrowsMessage<InputError>(HasSubstr("vid/Data/VID/train\"")));
+  EXPECT_THAT(find("vid/Data/VID/train").unread,
+              ::testing::ElementsAre(HasSubstr("looks like Pascal VOC's")));
 }
 
 TEST_F(FindSource, TextsBesideTheImagesAreTakenWhereTheReaderLooks) {
@@ -611,6 +761,82 @@ TEST_F(FindSource, SplitsWithLabelsOfTheirOwnAreSources) {
   EXPECT_EQ(splits("yolo"), (Splits{{"", "images", "."}}));
   // A folder that was asked for is its split alone.
   EXPECT_EQ(splits("voc/valid"), (Splits{{"", ".", "."}}));
+}
+
+TEST_F(FindSource, SplitsAreAsTheDatasetSays) {
+  const std::string text = "0 .5 .5 .2 .2\n";
+  const struct {
+    std::string name;
+    std::vector<std::array<std::string, 3>> splits;  ///< split, root, list
+    std::vector<std::pair<std::string, std::string>> files;
+    std::vector<std::string> images;
+    std::vector<std::string> remarks = {};
+  } cases[] = {
+      {"folders",
+       {{"", "images/a", ""}, {"", "images/b", ""}, {"val", "images/c", ""}},
+       {{"data.yaml",
+         "path: .\ntrain:\n  - images/a\n  - images/b\nval: images/c\nnames: [car]\n"}},
+       {"images/a/1", "images/b/2", "images/c/3"}},
+      {"holdout",
+       {{"", "images/train", ""}, {"val", "images/holdout", ""}},
+       {{"own.yaml", "train: ../x/images/train\nval: /elsewhere/images/holdout/\nnames: [car]\n"}},
+       {"images/train/1", "images/holdout/2"}},
+      {"lists",
+       {{"", "images", "autosplit_train.txt"},
+        {"val", "images", "autosplit_val.txt"},
+        {"test", "images", "autosplit_test.txt"}},
+       {{"data.yaml",
+         "train: autosplit_train.txt\nval: autosplit_val.txt\ntest: autosplit_test.txt\n"
+         "names: [car]\n"},
+        {"autosplit_train.txt", "./images/1.jpg\n"},
+        {"autosplit_val.txt", "./images/2.jpg\n"},
+        {"autosplit_test.txt", "./images/3.jpg\n"}},
+       {"images/1", "images/2", "images/3"}},
+      {"by_name",
+       {{"", "images", "autosplit_train.txt"}, {"val", "images", "autosplit_val.txt"}},
+       {{"classes.txt", "car\n"},
+        {"autosplit_train.txt", "./images/1.jpg\n"},
+        {"autosplit_val.txt", "./images/2.jpg\n./images/1.jpg\n"}},
+       {"images/1", "images/2", "images/3"},
+       {"warning: 1 image in lists of two splits, as by_name/autosplit_*.txt says",
+        "warning: 1 image left out: in no list of by_name/autosplit_*.txt"}},
+      {"darknet",
+       {{"", "data", "data/train.txt"}, {"test", "data", "data/test.txt"}},
+       {{"data/obj.data", "classes = 1\ntrain = data/train.txt\nvalid = data/test.txt\n"},
+        {"data/obj.names", "car\n"},
+        {"data/train.txt", "data/obj/1.jpg\n"},
+        {"data/test.txt", "data/obj/2.jpg\n"}},
+       {"data/obj/1", "data/obj/2"}},
+      {"one",
+       {{"", "images", ""}},
+       {{"data.yaml", "train: images/train\nval: images/train\nnames: [car]\n"}},
+       {"images/train/1"},
+       {"warning: one/data.yaml gives one/images/train two splits: it is in one, train"}}};
+  for (const auto& expected : cases) {
+    const fs::path root = at(expected.name);
+    for (const auto& [file, content] : expected.files) write(expected.name + "/" + file, content);
+    for (const std::string& image : expected.images) {
+      write(expected.name + "/" + image + ".jpg");
+      std::string label = image;
+      if (label.starts_with("images")) label.replace(0, 6, "labels");
+      write(expected.name + "/" + label + ".txt", text);
+    }
+    std::vector<std::array<std::string, 3>> splits;
+    for (const FoundSource& source : find_sources(root)) {
+      ASSERT_TRUE(source.labels) << expected.name;
+      const fs::path below = source.root.lexically_relative(root);
+      splits.push_back({std::string(source.split), below == "." ? "" : below.generic_string(),
+                        source.ids ? source.ids->lexically_relative(root).generic_string() : ""});
+    }
+    EXPECT_EQ(splits, expected.splits) << expected.name;
+    std::vector<std::string> remarks = find(expected.name).remarks;
+    for (std::string& remark : remarks) {
+      for (std::size_t i; (i = remark.find(at("").string())) != remark.npos;) {
+        remark.erase(i, at("").string().size());
+      }
+    }
+    EXPECT_EQ(remarks, expected.remarks) << expected.name;
+  }
 }
 
 TEST_F(FindSource, KnowsRecordingsOfEventCameras) {

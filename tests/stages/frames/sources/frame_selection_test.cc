@@ -78,6 +78,15 @@ TEST_F(FrameSelectionTest, TakesTheIdsOfAListInTheDatasetsOrder) {
   EXPECT_THAT(ids(), ElementsAre("S1/Eating-1/7/6", "S5/Walking-1/8/11"));
 }
 
+TEST_F(FrameSelectionTest, AListMayNameImages) {
+  testing::write_file(folder_ / "val.txt",
+                      "./data/S5/Walking-1/8/11.jpg\n/far/away/S1/Eating-1/7/6.PNG\nS1/none.jpg\n");
+  spec_.selection.ids = "val.txt";
+  EXPECT_THAT(ids(), ElementsAre("S1/Eating-1/7/6", "S5/Walking-1/8/11"));
+  EXPECT_THAT(select_frames(frames_, spec_, folder_.path(), 0).notes,
+              ElementsAre("1 image without a label in val.txt"));
+}
+
 TEST_F(FrameSelectionTest, AnIdThatIsNotThereIsAnError) {
   testing::write_file(folder_ / "ids.txt", "S1/Eating-1/7/6\nS9\n");
   spec_.selection.ids = "ids.txt";
