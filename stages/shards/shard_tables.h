@@ -6,6 +6,7 @@
 #include <numeric>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "manifests/values/labels.h"
@@ -120,6 +121,15 @@ struct ColumnSpec {
   const char* feature = nullptr;
   const char* unit = "";  ///< of an optional column of samples, for people
 
+  /// What stands for "unknown": the numbers of a row, or of each of the row's innermost lines or
+  /// elements, as many as these are. None: nothing but NaN, and an empty text.
+  std::vector<double> unknown = {};
+
+  ColumnSpec with_unknown(std::vector<double> row) && {
+    unknown = std::move(row);
+    return std::move(*this);
+  }
+
   bool optional() const { return feature != nullptr; }
 
   /// The path without its groups, and these with a "/" behind them.
@@ -168,8 +178,8 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   visit(ColumnSpec{"/pairs/next_path", kSamples}, p.next_path);
   visit(ColumnSpec{"/pairs/prev_index", kSamples}, p.prev_index);
   visit(ColumnSpec{"/pairs/next_index", kSamples}, p.next_index);
-  visit(ColumnSpec{"/pairs/prev_video_frame", kSamples}, p.prev_video_frame);
-  visit(ColumnSpec{"/pairs/next_video_frame", kSamples}, p.next_video_frame);
+  visit(ColumnSpec{"/pairs/prev_video_frame", kSamples}.with_unknown({-1}), p.prev_video_frame);
+  visit(ColumnSpec{"/pairs/next_video_frame", kSamples}.with_unknown({-1}), p.next_video_frame);
   visit(ColumnSpec{"/pairs/gap_frames", kSamples}, p.gap_frames);
   visit(ColumnSpec{"/pairs/gap_s", kSamples}, p.gap_s);
   visit(ColumnSpec{"/pairs/label_index", kSamples}, p.label_index);
@@ -207,14 +217,19 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
         b.xyxy_unclipped);
   visit(ColumnSpec{"/labels/boxes/xyxy_source", kBoxes, {4}, kFinite}, b.xyxy_source);
   visit(ColumnSpec{"/labels/boxes/class_id", kBoxes}, b.class_id);
-  visit(ColumnSpec{"/labels/boxes/truncation", kBoxes, {}, kFinite}, b.truncation);
-  visit(ColumnSpec{"/labels/boxes/occlusion", kBoxes}, b.occlusion);
-  visit(ColumnSpec{"/labels/boxes/alpha", kBoxes, {}, kFinite}, b.alpha);
-  visit(ColumnSpec{"/labels/boxes/box3d", kBoxes, {7}, kFinite}, b.box3d);
+  visit(ColumnSpec{"/labels/boxes/truncation", kBoxes, {}, kFinite}.with_unknown({-1}),
+        b.truncation);
+  visit(ColumnSpec{"/labels/boxes/occlusion", kBoxes}.with_unknown({-1}), b.occlusion);
+  visit(ColumnSpec{"/labels/boxes/alpha", kBoxes, {}, kFinite}.with_unknown({-10}), b.alpha);
+  visit(ColumnSpec{"/labels/boxes/box3d", kBoxes, {7}, kFinite}.with_unknown(
+            {-1, -1, -1, -1000, -1000, -1000, -10}),
+        b.box3d);
   visit(ColumnSpec{"/labels/boxes/ignore", kBoxes}, b.ignore);
   visit(ColumnSpec{"/labels/boxes/ignore_source", kBoxes}, b.ignore_source);
-  visit(ColumnSpec{"/labels/boxes/track_id", kBoxes}, b.track_id);
-  visit(ColumnSpec{"/labels/boxes/difficulty", kBoxes, {}, kAny, {}, "difficulty"}, b.difficulty);
+  visit(ColumnSpec{"/labels/boxes/track_id", kBoxes}.with_unknown({-1}), b.track_id);
+  visit(
+      ColumnSpec{"/labels/boxes/difficulty", kBoxes, {}, kAny, {}, "difficulty"}.with_unknown({-1}),
+      b.difficulty);
   visit(ColumnSpec{"/labels/boxes/outline", kBoxes, {}, kAny, {}, "outlines"}, b.outline);
   visit(ColumnSpec{"/labels/boxes/motion", kBoxes, {4}, kFiniteOrNone, {}, "object_motion"},
         b.motion);
@@ -222,22 +237,29 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   auto& h = tables.poses;
   visit(ColumnSpec{"/labels/poses/offsets", kOffsets}, h.offsets);
   visit(
-      ColumnSpec{
-          "/labels/poses/joints", kPersons, {joints, 2}, kFinite, {kPoints, "joints_source"}},
+      ColumnSpec{"/labels/poses/joints", kPersons, {joints, 2}, kFinite, {kPoints, "joints_source"}}
+          .with_unknown({-1, -1}),
       h.joints);
-  visit(ColumnSpec{"/labels/poses/joints_source", kPersons, {joints, 2}, kFinite}, h.joints_source);
-  visit(ColumnSpec{"/labels/poses/visible", kPersons, {joints}}, h.visible);
-  visit(ColumnSpec{"/labels/poses/center", kPersons, {2}, kFinite, {kPoints, "center_source"}},
+  visit(ColumnSpec{"/labels/poses/joints_source", kPersons, {joints, 2}, kFinite}.with_unknown(
+            {-1, -1}),
+        h.joints_source);
+  visit(ColumnSpec{"/labels/poses/visible", kPersons, {joints}}.with_unknown({-1}), h.visible);
+  visit(ColumnSpec{"/labels/poses/center", kPersons, {2}, kFinite, {kPoints, "center_source"}}
+            .with_unknown({-1, -1}),
         h.center);
-  visit(ColumnSpec{"/labels/poses/center_source", kPersons, {2}, kFinite}, h.center_source);
-  visit(ColumnSpec{"/labels/poses/scale", kPersons, {}, kFinite}, h.scale);
-  visit(ColumnSpec{"/labels/poses/scale_volume", kPersons, {}, kFinite, {kScale, "scale"}},
+  visit(ColumnSpec{"/labels/poses/center_source", kPersons, {2}, kFinite}.with_unknown({-1, -1}),
+        h.center_source);
+  visit(ColumnSpec{"/labels/poses/scale", kPersons, {}, kFinite}.with_unknown({-1}), h.scale);
+  visit(ColumnSpec{"/labels/poses/scale_volume", kPersons, {}, kFinite, {kScale, "scale"}}
+            .with_unknown({-1}),
         h.scale_volume);
   visit(
-      ColumnSpec{
-          "/labels/poses/head_box", kPersons, {4}, kFinite, {kEdgesIfAny, "head_box_source"}},
+      ColumnSpec{"/labels/poses/head_box", kPersons, {4}, kFinite, {kEdgesIfAny, "head_box_source"}}
+          .with_unknown({-1, -1, -1, -1}),
       h.head_box);
-  visit(ColumnSpec{"/labels/poses/head_box_source", kPersons, {4}, kFinite}, h.head_box_source);
+  visit(ColumnSpec{"/labels/poses/head_box_source", kPersons, {4}, kFinite}.with_unknown(
+            {-1, -1, -1, -1}),
+        h.head_box_source);
   visit(ColumnSpec{"/labels/poses/box",
                    kPersons,
                    {4},
