@@ -2,13 +2,17 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
+#include <span>
 #include <stdexcept>
 #include <string_view>
+#include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "manifests/documents/json_text.h"
 #include "manifests/files/atomic_file.h"
@@ -19,149 +23,86 @@
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/exports/array_files.h"
 #include "stages/shards/codec/volume_codec.h"
+#include "stages/shards/shard_tables.h"
 
 namespace eventgan {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The shard's columns under their names (manifests/guides/shard_format.md), null for what is not
-// known; a NaN becomes null by itself.
-
-Json json_of(Point point) {
-  return point == kMissingPoint ? Json() : Json::array({point.x, point.y});
-}
-
-Json json_of(const Rectangle& box) { return {box.left, box.top, box.right, box.bottom}; }
-
-Json json_of(const Intrinsics& camera) {
-  return {camera.focal_x, camera.focal_y, camera.centre_x, camera.centre_y};
-}
-
-Json json_of(const LensDistortion& lens) { return {lens.k1, lens.k2, lens.k3, lens.p1, lens.p2}; }
-
-Json json_of(const ImageMotion& motion) {
-  return {motion.x_px, motion.y_px, motion.angle_deg, motion.scale};
-}
-
-Json json_of(const std::array<double, 3>& place) { return place; }
-
-/// A matrix of four columns as its rows.
-Json json_of(const std::array<double, 12>& matrix) {
-  Json rows = Json::array();
-  for (std::size_t i = 0; i < matrix.size(); i += 4) {
-    rows.push_back({matrix[i], matrix[i + 1], matrix[i + 2], matrix[i + 3]});
+/// A row's numbers in their shape, null for what is unknown.
+template <class Number>
+Json json_of(const ColumnSpec& column, std::span<const std::size_t> sides,
+             std::span<const Number> numbers) {
+  if constexpr (std::is_floating_point_v<Number>) {
+    const auto is_nan = [](Number x) { return std::isnan(x); };
+    if (!numbers.empty() && std::ranges::all_of(numbers, is_nan)) return {};
   }
-  return rows;
-}
-
-template <class Value>
-Json json_of(const std::optional<Value>& value) {
-  return value ? json_of(*value) : Json();
-}
-
-/// What stands for "unknown" in the shard becomes null.
-template <class Value>
-Json unless(const Value& unknown, const Value& value) {
-  return value == unknown ? Json() : Json(value);
-}
-
-Json box_json(const Box& box, const VolumeBox& in_volume, const std::vector<std::string>& names) {
-  const Box unknown;
-  return {{"class_id", box.class_id},
-          {"class", names.at(static_cast<std::size_t>(box.class_id))},
-          {"xyxy", json_of(in_volume.clipped)},
-          {"xyxy_unclipped", json_of(in_volume.unclipped)},
-          {"xyxy_source", json_of(box.xyxy)},
-          {"truncation", unless(unknown.truncation, box.truncation)},
-          {"occlusion", unless(unknown.occlusion, box.occlusion)},
-          {"alpha", unless(unknown.alpha, box.alpha)},
-          {"box3d", unless(unknown.box3d, box.box3d)},
-          {"ignore", in_volume.ignore},
-          {"ignore_source", box.ignore},
-          {"track_id", unless(unknown.track_id, box.track_id)},
-          {"difficulty", unless(unknown.difficulty, box.difficulty)},
-          {"outline",
-           in_volume.outline.empty() ? Json() : Json::parse(outline_text(in_volume.outline))}};
-}
-
-Json person_json(const Person& person, const VolumePerson& in_volume) {
-  const Person unknown;
-  Json joints = Json::array();
-  Json joints_source = Json::array();
-  Json visible = Json::array();
-  for (std::size_t j = 0; j < person.joints.size(); ++j) {
-    joints.push_back(json_of(in_volume.joints.at(j)));
-    joints_source.push_back(json_of(person.joints[j].at));
-    visible.push_back(unless(Joint().visible, person.joints[j].visible));
+  if (!numbers.empty() && std::ranges::equal(numbers, column.unknown)) return {};
+  if (sides.empty()) {
+    // The bytes of a shard are flags.
+    if constexpr (std::is_same_v<Number, std::uint8_t>) return numbers.front() != 0;
+    return numbers.front();
   }
-  Json joints3d;
-  for (const auto& joint : person.joints3d_mm) joints3d.push_back(json_of(joint));
-  return {{"joints", joints},
-          {"joints_source", joints_source},
-          {"visible", visible},
-          {"center", json_of(in_volume.center)},
-          {"center_source", json_of(person.center)},
-          {"scale", unless(unknown.scale, person.scale)},
-          {"scale_volume", unless(unknown.scale, in_volume.scale)},
-          {"head_box", json_of(in_volume.head_box)},
-          {"head_box_source", json_of(person.head_box)},
-          {"box", json_of(in_volume.box)},
-          {"box_source", json_of(person.box)},
-          {"joints3d_mm", joints3d},
-          {"camera", json_of(in_volume.camera)},
-          {"camera_source", json_of(person.camera)},
-          {"camera_distortion", json_of(person.distortion)}};
+  Json lines = Json::array();
+  const std::size_t size = sides[0] == 0 ? 0 : numbers.size() / sides[0];
+  for (std::size_t i = 0; i < sides[0]; ++i) {
+    lines.push_back(json_of(column, sides.subspan(1), numbers.subspan(i * size, size)));
+  }
+  return lines;
 }
 
+/// A row of a column; null also if the shard does not have the column.
+template <class Element>
+Json row_json(const ColumnSpec& column, const std::vector<Element>& values, std::size_t row) {
+  if (values.empty()) return {};
+  if constexpr (std::is_same_v<Element, std::string>) {
+    return values[row].empty() ? Json() : Json(values[row]);
+  } else if constexpr (std::is_same_v<Element, std::vector<char>>) {  // an outline
+    const auto outline = read_outline({values[row].data(), values[row].size()});
+    return outline && !outline->empty() ? Json::parse(outline_text(*outline)) : Json();
+  } else {
+    return json_of<Element>(column, column.inner,
+                            std::span(values).subspan(row * column.width(), column.width()));
+  }
+}
+
+/// The sample's columns of /pairs and /labels under their names
+/// (manifests/guides/shard_format.md), but for the original annotation.
 std::string labels_json(const OutgoingSample& sample) {
-  const ShardSample& labels = sample.labels;
-  const FramePair& pair = labels.pair;
-  const LabelSchema& schema = sample.reader.header().label_schema;
-  const FrameRef unknown;
-  const std::string none;
-  const std::array<double, 6>& map = labels.source_to_volume;
-  Json json = {{"sample_id", labels.sample_id},
-               {"dataset", sample.source.dataset},
-               {"split", sample.source.split},
-               {"sequence", unless(none, labels.sequence)},
-               {"prev_path", pair.previous.path},
-               {"next_path", pair.next.path},
-               {"prev_index", pair.previous.index},
-               {"next_index", pair.next.index},
-               {"prev_video_frame", unless(unknown.video_frame, pair.previous.video_frame)},
-               {"next_video_frame", unless(unknown.video_frame, pair.next.video_frame)},
-               {"gap_frames", pair.gap_frames},
-               {"gap_s", pair.gap_s()},
-               {"label_index", pair.label_index},
-               {"label_position", pair.label_position},
-               {"prev_time_s", pair.previous.time_s},
-               {"next_time_s", pair.next.time_s},
-               {"subject", unless(none, labels.origin.subject)},
-               {"action", unless(none, labels.origin.action)},
-               {"camera", unless(none, labels.origin.camera)},
-               {"drive", unless(none, labels.origin.drive)},
-               {"motion", json_of(pair.motion)},
-               {"threshold", labels.threshold ? Json(*labels.threshold) : Json()},
-               {"source_size", {labels.source_size.height, labels.source_size.width}},
-               {"source_to_volume",
-                Json::array({Json{map[0], map[1], map[2]}, Json{map[3], map[4], map[5]}})},
-               {"projection", json_of(labels.labels.projection)},
-               {"projection_source", json_of(labels.annotation.projection)}};
-  if (sample.source.has_boxes()) {
-    Json& boxes = json["boxes"] = Json::array();
-    for (std::size_t i = 0; i < labels.annotation.boxes.size(); ++i) {
-      boxes.push_back(
-          box_json(labels.annotation.boxes[i], labels.labels.boxes[i], schema.class_names));
+  const ShardHeader& header = sample.reader.header();
+  const ShardTables& tables = sample.reader.tables();
+  const LabelSchema& schema = header.label_schema;
+  const auto slot = static_cast<std::size_t>(sample.slot);
+  Json json = {{"split", sample.source.split}};
+  Json boxes = Json::array();
+  Json persons = Json::array();
+  visit_columns(tables, header, [&](const ColumnSpec& column, const auto& values) {
+    const std::string_view path = column.path;
+    if (!path.starts_with("/pairs/") && !path.starts_with("/labels/")) return;
+    if (path == "/labels/original" || column.rows == Rows::kOffsets) return;
+    const std::string name(column.name());
+    const auto each_of = [&](Json& list, const std::vector<std::int64_t>& offsets) {
+      const auto first = static_cast<std::size_t>(offsets[slot]);
+      const auto count = static_cast<std::size_t>(offsets[slot + 1]) - first;
+      for (std::size_t i = 0; i < count; ++i) list[i][name] = row_json(column, values, first + i);
+    };
+    if (column.rows == Rows::kBoxes) {
+      each_of(boxes, tables.boxes.offsets);
+    } else if (column.rows == Rows::kPersons) {
+      each_of(persons, tables.poses.offsets);
+    } else {
+      json[name] = row_json(column, values, slot);
     }
+  });
+  if (sample.source.has_boxes()) {
+    for (Json& box : boxes) box["class"] = schema.class_names.at(box.at("class_id"));
+    json["boxes"] = std::move(boxes);
   }
   if (sample.source.has_joints()) {
     json["joint_names"] = schema.joint_names;
     if (!schema.joint_aliases.empty()) json["joint_aliases"] = schema.joint_aliases;
-    Json& persons = json["persons"] = Json::array();
-    for (std::size_t i = 0; i < labels.annotation.persons.size(); ++i) {
-      persons.push_back(person_json(labels.annotation.persons[i], labels.labels.persons[i]));
-    }
+    json["persons"] = std::move(persons);
   }
   return dump_json(json) + "\n";
 }

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "manifests/values/labels.h"
@@ -121,6 +122,15 @@ struct ColumnSpec {
   const char* feature = nullptr;
   const char* unit = "";  ///< of an optional column of samples, for people
 
+  /// What stands for "unknown": the numbers of a row, or of each of the row's innermost lines or
+  /// elements, as many as these are. None: nothing but NaN, and an empty text.
+  std::vector<double> unknown = {};
+
+  ColumnSpec with_unknown(std::vector<double> row) && {
+    unknown = std::move(row);
+    return std::move(*this);
+  }
+
   bool optional() const { return feature != nullptr; }
 
   /// The path without its groups, and these with a "/" behind them.
@@ -200,9 +210,11 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   visit(ColumnSpec{"/pairs/next_index", "Next frame's", kSamples}, p.next_index);
   visit(ColumnSpec{"/pairs/prev_video_frame",
                    "Previous frame's position in the video or recording, from 0; -1: an image",
-                   kSamples},
+                   kSamples}
+            .with_unknown({-1}),
         p.prev_video_frame);
-  visit(ColumnSpec{"/pairs/next_video_frame", "Next frame's", kSamples}, p.next_video_frame);
+  visit(ColumnSpec{"/pairs/next_video_frame", "Next frame's", kSamples}.with_unknown({-1}),
+        p.next_video_frame);
   visit(
       ColumnSpec{"/pairs/gap_frames",
                  "Frames from previous to next, 1..6; 0: a window of a camera's events", kSamples},
@@ -320,21 +332,25 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
                    "(to be ignored)",
                    kBoxes,
                    {},
-                   kFinite},
+                   kFinite}
+            .with_unknown({-1}),
         b.truncation);
   visit(ColumnSpec{"/labels/boxes/occlusion",
-                   "0 visible, 1 partly, 2 largely occluded, 3 unknown; -1 not annotated", kBoxes},
+                   "0 visible, 1 partly, 2 largely occluded, 3 unknown; -1 not annotated", kBoxes}
+            .with_unknown({-1}),
         b.occlusion);
   visit(
       ColumnSpec{
-          "/labels/boxes/alpha", "Observation angle, rad, -π..π; -10 unknown", kBoxes, {}, kFinite},
+          "/labels/boxes/alpha", "Observation angle, rad, -π..π; -10 unknown", kBoxes, {}, kFinite}
+          .with_unknown({-10}),
       b.alpha);
   visit(ColumnSpec{"/labels/boxes/box3d",
                    "Height, width, length, x, y, z (m, camera's frame), rotation_y (rad); unknown: "
                    "-1 -1 -1 -1000 -1000 -1000 -10",
                    kBoxes,
                    {7},
-                   kFinite},
+                   kFinite}
+            .with_unknown({-1, -1, -1, -1000, -1000, -1000, -10}),
         b.box3d);
   visit(ColumnSpec{"/labels/boxes/ignore",
                    "1: leave out of training and scoring: annotated so, or nothing of box or "
@@ -342,9 +358,9 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
                    kBoxes},
         b.ignore);
   visit(ColumnSpec{"/labels/boxes/ignore_source", "1: annotated so", kBoxes}, b.ignore_source);
-  visit(
-      ColumnSpec{"/labels/boxes/track_id", "The object's number in its sequence; -1 none", kBoxes},
-      b.track_id);
+  visit(ColumnSpec{"/labels/boxes/track_id", "The object's number in its sequence; -1 none", kBoxes}
+            .with_unknown({-1}),
+        b.track_id);
   visit(ColumnSpec{"/labels/boxes/difficulty",
                    "KITTI object's: 0 easy (height ≥ 40 source pixels, visible, truncation ≤ "
                    "0.15), 1 moderate (≥ 25, partly occluded, ≤ 0.30), 2 hard (≥ 25, largely, ≤ "
@@ -353,7 +369,8 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
                    {},
                    kAny,
                    {},
-                   "difficulty"},
+                   "difficulty"}
+            .with_unknown({-1}),
         b.difficulty);
   visit(ColumnSpec{"/labels/boxes/outline",
                    "[Outline](#outlines), not cut: JSON `[[x,y,x,y,...],...]`, float32 in decimal "
@@ -382,46 +399,54 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
                    kPersons,
                    {joints, 2},
                    kFinite,
-                   {kPoints, "joints_source"}},
+                   {kPoints, "joints_source"}}
+            .with_unknown({-1, -1}),
         h.joints);
   visit(ColumnSpec{"/labels/poses/joints_source",
                    "As annotated, from 0, in the image of `source_size`",
                    kPersons,
                    {joints, 2},
-                   kFinite},
+                   kFinite}
+            .with_unknown({-1, -1}),
         h.joints_source);
   visit(ColumnSpec{"/labels/poses/visible",
                    "1 visible; 0 hidden or not annotated; -1 annotated, visibility unknown",
                    kPersons,
-                   {joints}},
+                   {joints}}
+            .with_unknown({-1}),
         h.visible);
   visit(
-      ColumnSpec{
-          "/labels/poses/center", "x, y", kPersons, {2}, kFinite, {kPoints, "center_source"}},
+      ColumnSpec{"/labels/poses/center", "x, y", kPersons, {2}, kFinite, {kPoints, "center_source"}}
+          .with_unknown({-1, -1}),
       h.center);
-  visit(ColumnSpec{"/labels/poses/center_source", "As annotated", kPersons, {2}, kFinite},
+  visit(ColumnSpec{"/labels/poses/center_source", "As annotated", kPersons, {2}, kFinite}
+            .with_unknown({-1, -1}),
         h.center_source);
   visit(ColumnSpec{"/labels/poses/scale",
                    "As annotated (MPII: height / 200 source pixels)",
                    kPersons,
                    {},
-                   kFinite},
+                   kFinite}
+            .with_unknown({-1}),
         h.scale);
   visit(ColumnSpec{"/labels/poses/scale_volume",
                    "scale x √(s_x s_y)",
                    kPersons,
                    {},
                    kFinite,
-                   {kScale, "scale"}},
+                   {kScale, "scale"}}
+            .with_unknown({-1}),
         h.scale_volume);
   visit(ColumnSpec{"/labels/poses/head_box",
                    "Left, top, right, bottom, not cut",
                    kPersons,
                    {4},
                    kFinite,
-                   {kEdgesIfAny, "head_box_source"}},
+                   {kEdgesIfAny, "head_box_source"}}
+            .with_unknown({-1, -1, -1, -1}),
         h.head_box);
-  visit(ColumnSpec{"/labels/poses/head_box_source", "As annotated", kPersons, {4}, kFinite},
+  visit(ColumnSpec{"/labels/poses/head_box_source", "As annotated", kPersons, {4}, kFinite}
+            .with_unknown({-1, -1, -1, -1}),
         h.head_box_source);
   visit(ColumnSpec{"/labels/poses/box",
                    "Around all annotated joints (Human3.6M), not cut",
