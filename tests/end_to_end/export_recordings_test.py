@@ -370,7 +370,7 @@ class Recordings(Export):
         moved.mkdir()
         (self.out.parent / "clip").rename(moved / "clip")
         _, err = self.export("aedat4", source=frames, expect=66)
-        self.assertIn("0000.png", err)
+        self.assertRegex(err, r"clip/\d{4}\.png")
         self.assertIn("--frames names the folder", err)
         self.export("aedat4", "--frames", moved, "--overwrite", source=frames)
         _, _, found = aedat4.read(self.out / "aedat4" / "train" / "clip.aedat4")
