@@ -5,27 +5,28 @@
 
 #include <algorithm>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
+
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
 
 using ::testing::StartsWith;
 
-TEST(JsonPath, PlainKeysFollowADot) {
-  EXPECT_EQ(json_path("$", "max_count"), "$.max_count");
-  EXPECT_EQ(json_path("$.a", "B2"), "$.a.B2");
+TEST(JsonPath, QuotesOddKeysInAscii) {
+  for (const auto& [at, key, path] : {std::tuple("$", "max_count", "$.max_count"),
+                                      {"$.a", "B2", "$.a.B2"},
+                                      {"$", "", R"($[""])"},
+                                      {"$", "a b", R"($["a b"])"},
+                                      {"$", "a\"]\n", R"($["a\"]\n"])"},
+                                      {"$", "\xc3\xa9", R"($["\u00e9"])"}}) {
+    EXPECT_EQ(json_path(at, key), path);
+  }
+  EXPECT_EQ(json_path("$.a", std::size_t{12}), "$.a[12]");
 }
-
-TEST(JsonPath, OddKeysAreQuotedInAscii) {
-  EXPECT_EQ(json_path("$", ""), R"($[""])");
-  EXPECT_EQ(json_path("$", "a b"), R"($["a b"])");
-  EXPECT_EQ(json_path("$", "a\"]\n"), R"($["a\"]\n"])");
-  EXPECT_EQ(json_path("$", "\xc3\xa9"), R"($["\u00e9"])");
-}
-
-TEST(JsonPath, ElementsHaveBrackets) { EXPECT_EQ(json_path("$.a", std::size_t{12}), "$.a[12]"); }
 
 TEST(EscapeControls, LeavesNoControlCharactersAndNoBrokenText) {
   using namespace std::string_literals;
@@ -42,14 +43,10 @@ TEST(EscapeControls, LeavesNoControlCharactersAndNoBrokenText) {
   EXPECT_EQ(escape_controls(""), "");
 }
 
-TEST(FaultList, IsEmptyAtFirst) {
-  const FaultList faults("m");
-  EXPECT_TRUE(faults.empty());
-  EXPECT_EQ(faults.text(), "");
-}
-
 TEST(FaultList, KeepsTheOrder) {
   FaultList faults("m");
+  EXPECT_TRUE(faults.empty());
+  EXPECT_EQ(faults.text(), "");
   faults.add("$.b", "1", "2");
   faults.add("$.a", "x", "y");
   EXPECT_FALSE(faults.empty());
@@ -57,18 +54,13 @@ TEST(FaultList, KeepsTheOrder) {
 }
 
 TEST(FaultList, CountsLinesAndCharactersFrom1) {
-  const std::string text = "a\n\xc3\xa9z\n";  // line 2: é in two bytes (2, 3), then z
-  const auto place = [&](std::size_t byte) {
+  // Line 2 is é in two bytes (2, 3), then z; beyond the end is the end.
+  for (const auto& [byte, place] :
+       {std::pair(0, "1:1"), {1, "1:2"}, {2, "2:1"}, {4, "2:2"}, {6, "3:1"}, {99, "3:1"}}) {
     FaultList faults("m");
-    faults.add_at(text, byte, "x", "y");
-    return faults.text();
-  };
-  EXPECT_EQ(place(0), "m:1:1: expected x, got y");
-  EXPECT_EQ(place(1), "m:1:2: expected x, got y");
-  EXPECT_EQ(place(2), "m:2:1: expected x, got y");
-  EXPECT_EQ(place(4), "m:2:2: expected x, got y");
-  EXPECT_EQ(place(6), "m:3:1: expected x, got y");
-  EXPECT_EQ(place(99), "m:3:1: expected x, got y");  // beyond the end is the end
+    faults.add_at("a\n\xc3\xa9z\n", byte, "x", "y");
+    EXPECT_EQ(faults.text(), "m:" + std::string(place) + ": expected x, got y");
+  }
 }
 
 TEST(FaultList, BeyondAThousandOnlyCounts) {
@@ -105,72 +97,43 @@ TEST(JsonText, AllowsComments) {
   EXPECT_EQ(*document, nlohmann::json({{"a", "// kept"}}));
 }
 
-TEST(JsonText, SyntaxErrorsHaveLineAndColumn) {
+TEST(JsonText, FaultsHaveLineAndColumn) {
   // The position is where the reader stopped: at the last byte it took, or at the end.
+  const std::string error = "expected JSON, got an error ", parsing = error + "while parsing",
+                    byte = "expected UTF-8 text, got the byte 0x";
   const std::vector<std::pair<std::string, std::string>> table = {
-      {"", "t:1:1: "},
-      {"   ", "t:1:4: "},
-      {"{\n  \"a\": 1,\n  b\n}", "t:3:3: "},
-      {"{\n\"a\": 1\n", "t:3:1: "},
-      {"{\"a\": 1,}", "t:1:9: "},
-      {"[1 2]", "t:1:4: "},
-      {"{} {}", "t:1:4: "},
-      {"[NaN]", "t:1:2: "},
-      {"[\"\xc3\xa9\", x]", "t:1:7: "},  // é is one character
-      {"[01]", "t:1:3: "},
-      {"[\"a\nb\"]", "t:1:4: "},
-      {"/* open", "t:1:8: "},
+      {"", "1:1: " + parsing},
+      {"   ", "1:4: " + parsing},
+      {"{\n  \"a\": 1,\n  b\n}", "3:3: " + parsing},
+      {"{\n\"a\": 1\n", "3:1: " + parsing},
+      {"{\"a\": 1,}", "1:9: " + parsing},
+      {"[1 2]", "1:4: " + parsing},
+      {"{} {}", "1:4: " + parsing},
+      {"[NaN]", "1:2: " + parsing},
+      {"[\"\xc3\xa9\", x]", "1:7: " + parsing},  // é is one character
+      {"[01]", "1:3: " + parsing},
+      {"[\"a\nb\"]", "1:4: " + parsing},
+      {"/* open", "1:8: " + parsing},
+      {"[1,",
+       "1:4: " + parsing + " value - unexpected end of input; expected '[', '{', or a literal"},
+      {"[1e999]", "1:6: " + error + "number overflow"},
+      {"\xef\xbb\xbf{}", "1:1: expected UTF-8 without a byte order mark, got a byte order mark"},
+      {"[\"\xff\"]", "1:3: " + byte + "ff"},
+      {"// \xe9\n{}", "1:4: " + byte + "e9"},         // Latin-1
+      {"\n[\"\xc0\x80\"]", "2:3: " + byte + "c0"},    // overlong NUL
+      {"[\"\xe0\x80\x80\"]", "1:3: " + byte + "e0"},  // overlong
+      {"[\"\xed\xa0\x80\"]", "1:3: " + byte + "ed"},  // surrogate
+      {"[\"\xf0\x8f\xbf\xbf\"]", "1:3: " + byte + "f0"},
+      {"[\"\xf4\x90\x80\x80\"]", "1:3: " + byte + "f4"},
+      {"{}//\xe2\x82", "1:5: " + byte + "e2"},  // cut at the end
+      {std::string("{}\0 lost", 8), "1:3: " + byte + "00"},
+      {std::string("\xff\xfe{\0}\0", 6), "1:1: " + byte + "ff"},
   };
-  for (const auto& [text, place] : table) {
-    EXPECT_THAT(text_faults(text), StartsWith(place + "expected JSON, got an error while parsing"))
-        << text;
+  for (const auto& [text, fault] : table) {
+    EXPECT_THAT(text_faults(text), StartsWith("t:" + fault)) << text;
   }
-}
-
-TEST(JsonText, SaysWhatTheErrorIs) {
-  EXPECT_EQ(text_faults("[1,"),
-            "t:1:4: expected JSON, got an error while parsing value - unexpected end of input; "
-            "expected '[', '{', or a literal");
-}
-
-TEST(JsonText, ErrorsAreShortWhateverWasRead) {
-  std::string text = "[\"";
-  for (int i = 0; i < 1000; ++i) text += "\xc3\xa9";
-  for (const std::string& unfinished : {text, text + "x"}) {
-    const std::string fault = text_faults(unfinished);
-    EXPECT_LT(fault.size(), 300u);
-    EXPECT_THAT(fault, ::testing::EndsWith("\xc3\xa9..."));  // cut between two characters
-  }
-}
-
-TEST(JsonText, NumbersBeyondDoubleAreFaults) {
-  EXPECT_THAT(text_faults("[1e999]"),
-              StartsWith("t:1:6: expected JSON, got an error number overflow"));
-}
-
-TEST(JsonText, TextMustBeUtf8Throughout) {
-  const std::vector<std::pair<std::string, std::string>> table = {
-      {"\xef\xbb\xbf{}", "t:1:1: expected UTF-8 without a byte order mark, got a byte order mark"},
-      {"[\"\xff\"]", "t:1:3: expected UTF-8 text, got the byte 0xff"},
-      {"// \xe9\n{}", "t:1:4: expected UTF-8 text, got the byte 0xe9"},         // Latin-1
-      {"\n[\"\xc0\x80\"]", "t:2:3: expected UTF-8 text, got the byte 0xc0"},    // overlong NUL
-      {"[\"\xe0\x80\x80\"]", "t:1:3: expected UTF-8 text, got the byte 0xe0"},  // overlong
-      {"[\"\xed\xa0\x80\"]", "t:1:3: expected UTF-8 text, got the byte 0xed"},  // surrogate
-      {"[\"\xf0\x8f\xbf\xbf\"]", "t:1:3: expected UTF-8 text, got the byte 0xf0"},
-      {"[\"\xf4\x90\x80\x80\"]", "t:1:3: expected UTF-8 text, got the byte 0xf4"},
-      {"{}//\xe2\x82", "t:1:5: expected UTF-8 text, got the byte 0xe2"},  // cut at the end
-      {std::string("{}\0 lost", 8), "t:1:3: expected UTF-8 text, got the byte 0x00"},
-      {std::string("\xff\xfe{\0}\0", 6), "t:1:1: expected UTF-8 text, got the byte 0xff"},
-  };
-  for (const auto& [text, fault] : table) EXPECT_EQ(text_faults(text), fault);
-}
-
-TEST(JsonText, TakesTheBoundsOfEveryLengthOfUtf8) {
-  // U+007F, U+0080, U+07FF, U+0800, U+D7FF, U+E000, U+FFFF, U+10000, U+10FFFF.
-  const std::string text =
-      "[\"\x7f\xc2\x80\xdf\xbf\xe0\xa0\x80\xed\x9f\xbf\xee\x80\x80\xef\xbf\xbf\xf0\x90\x80\x80"
-      "\xf4\x8f\xbf\xbf\"]";
-  EXPECT_EQ(text_faults(text, true), "");
+  EXPECT_THAT(text_faults(nested(33)),
+              ::testing::EndsWith("]: expected at most 32 levels of nesting, got more"));
 }
 
 TEST(JsonText, EveryDoubleKeyIsReportedWithItsPath) {
@@ -181,14 +144,25 @@ TEST(JsonText, EveryDoubleKeyIsReportedWithItsPath) {
       "t: $[\"c d\"]: expected the key once, got it twice");
 }
 
-TEST(JsonText, TheSameKeyInTwoObjectsIsFine) {
-  EXPECT_EQ(text_faults(R"({"a": {"a": 1}, "b": [{"a": 1}, {"a": 2}]})", true), "");
+TEST(JsonText, WithoutFaultsIsTaken) {
+  for (const std::string& text :
+       {std::string(R"({"a": {"a": 1}, "b": [{"a": 1}, {"a": 2}]})"), nested(32),
+        // U+007F, U+0080, U+07FF, U+0800, U+D7FF, U+E000, U+FFFF, U+10000, U+10FFFF.
+        std::string("[\"\x7f\xc2\x80\xdf\xbf\xe0\xa0\x80\xed\x9f\xbf\xee\x80\x80\xef\xbf\xbf\xf0"
+                    "\x90\x80\x80"
+                    "\xf4\x8f\xbf\xbf\"]")}) {
+    EXPECT_EQ(text_faults(text, true), "");
+  }
 }
 
-TEST(JsonText, NestingEndsAt32) {
-  EXPECT_EQ(text_faults(nested(32), true), "");
-  EXPECT_THAT(text_faults(nested(33)),
-              ::testing::EndsWith("]: expected at most 32 levels of nesting, got more"));
+TEST(JsonText, ErrorsAreShortWhateverWasRead) {
+  std::string text = "[\"";
+  for (int i = 0; i < 1000; ++i) text += "\xc3\xa9";
+  for (const std::string& unfinished : {text, text + "x"}) {
+    const std::string fault = text_faults(unfinished);
+    EXPECT_LT(fault.size(), 300u);
+    EXPECT_THAT(fault, ::testing::EndsWith("\xc3\xa9..."));  // cut between two characters
+  }
 }
 
 TEST(JsonText, NestingWithoutEndDoesNoHarm) {
@@ -205,9 +179,7 @@ TEST(JsonData, KeepsTheOrderOfKeysAndRefusesWhatADocumentMayNotHave) {
       R"({"b":[1,{"z":2.5,"y":null}],"a":"x"})");
   EXPECT_EQ(parse_json_data("[1] // one", "d", JsonComments::kPassedOver).dump(), "[1]");
   const auto refused = [](const std::string& text, const std::string& fault) {
-    EXPECT_THAT([&] { parse_json_data(text, "d"); },
-                ::testing::ThrowsMessage<std::runtime_error>(StartsWith(fault)))
-        << text;
+    EXPECT_THROWS(parse_json_data(text, "d"), std::runtime_error, StartsWith(fault)) << text;
   };
   refused(R"({"a": {"b": 1, "b": 2}, "a": 3})", "d: $.a.b: expected the key once, got it twice");
   refused("[1] // one", "d:1:5: expected JSON, got an error");

@@ -1,8 +1,13 @@
 #include "tests/manifests/documents/manifest_cases.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cctype>
 #include <nlohmann/json.hpp>
+
+#include "manifests/values/faults.h"
+#include "tests/manifests/documents/json_schema.h"
 
 namespace eventgan::testing {
 
@@ -726,8 +731,21 @@ std::string edited(const char* sound, const std::vector<Edit>& edits) {
   return document.dump();
 }
 
-std::string manifest_text(const ManifestCase& manifest_case) {
-  return edited(kSoundManifest, manifest_case.edits);
+void expect_faults(const ManifestCase& manifest_case, const char* sound, const char* schema,
+                   const std::function<void(const std::string& text)>& parse) {
+  const std::string text = edited(sound, manifest_case.edits);
+  std::string expected, got;
+  for (const std::string& line : manifest_case.faults) {
+    expected += (expected.empty() ? "d: " : "\nd: ") + line;
+  }
+  try {
+    parse(text);
+  } catch (const UsageError& error) {
+    got = error.what();
+  }
+  EXPECT_EQ(got, expected);
+  EXPECT_EQ(schema_accepts(schema, nlohmann::json::parse(text)),
+            manifest_case.faults.empty() || manifest_case.beyond_schema);
 }
 
 std::string test_name(const ManifestCase& manifest_case) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -26,8 +27,10 @@ struct ManifestCase {
 /// A JSON text with some changes.
 std::string edited(const char* sound, const std::vector<Edit>& edits);
 
-/// The case's manifest as text.
-std::string manifest_text(const ManifestCase& manifest_case);
+/// That the sound text with the case's changes has its faults, each after the document's name "d",
+/// and that the schema sees them.
+void expect_faults(const ManifestCase& manifest_case, const char* sound, const char* schema,
+                   const std::function<void(const std::string& text)>& parse);
 
 /// What a test of all cases calls one: its name in letters, digits and "_".
 std::string test_name(const ManifestCase& manifest_case);

@@ -4,13 +4,16 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
 
+#include "manifests/documents/detail/document_tables.h"
+#include "manifests/documents/document_schemas.h"
 #include "manifests/documents/job_manifest.h"
 #include "manifests/documents/manifest_fields.h"
 #include "manifests/documents/simulation_manifest.h"
 #include "manifests/documents/training_manifest.h"
-#include "manifests/values/events.h"
-#include "manifests/values/words.h"
 #include "tests/manifests/documents/json_schema.h"
 #include "tests/manifests/documents/manifest_cases.h"
 
@@ -18,16 +21,6 @@ namespace eventgan {
 namespace {
 
 using nlohmann::json;
-constexpr char kSchema[] = "manifest.schema.json";
-
-TEST(ManifestSchema, AcceptsAndRejectsWhatTheProgramDoes) {
-  // The other test of this table holds the program to `faults`.
-  for (const testing::ManifestCase& c : testing::manifest_cases()) {
-    const json document = json::parse(testing::manifest_text(c));
-    EXPECT_EQ(testing::schema_accepts(kSchema, document), c.faults.empty() || c.beyond_schema)
-        << c.name;
-  }
-}
 
 TEST(ManifestSchema, LeavesOnlyTheOrderOfARangeAndTheSizeOfVolumesToTheProgram) {
   // Double keys and the text's encoding, too, but of these a parsed document shows nothing.
@@ -41,87 +34,183 @@ TEST(ManifestSchema, LeavesOnlyTheOrderOfARangeAndTheSizeOfVolumesToTheProgram) 
                                      "noise from more to less"));
 }
 
-TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
-  const auto stated = [](const char* pointer) { return testing::stated_default(kSchema, pointer); };
-  const JobManifest manifest;
-  const SourceSpec source;
-  EXPECT_EQ(stated("/properties/seed"), manifest.seed);
-  EXPECT_EQ(stated("/properties/sources/items/properties/split"), source.split);
-  EXPECT_EQ(stated("/properties/sources/items/properties/every"), source.every);
-  const std::string columns = "/properties/sources/items/properties/columns/properties/";
-  const EventFields& fields = source.recording.columns;
-  EXPECT_EQ(stated((columns + "t").c_str()), fields.t);
-  EXPECT_EQ(stated((columns + "x").c_str()), fields.x);
-  EXPECT_EQ(stated((columns + "y").c_str()), fields.y);
-  EXPECT_EQ(stated((columns + "p").c_str()), fields.p);
-  EXPECT_EQ(stated("/properties/sources/items/properties/camera"), source.recording.camera);
-  EXPECT_EQ(stated("/properties/sources/items/properties/rectify"), source.recording.rectify);
-  EXPECT_EQ(stated("/properties/sources/items/properties/pairs/properties/side"),
-            to_string(source.pairs.side));
-  EXPECT_EQ(stated("/properties/sources/items/properties/pairs/properties/choose"),
-            to_string(source.pairs.choose));
-  EXPECT_EQ(stated("/properties/sources/items/properties/pairs/properties/min_pairs"),
-            source.pairs.min_pairs);
-  EXPECT_EQ(stated("/properties/sources/items/properties/pairs/properties/from"),
-            word_of(kPairOriginWords, source.pairs.stills.has_value()));
-  const StillsSpec stills;
-  const std::string motion =
-      "/properties/sources/items/properties/pairs/properties/motion/properties/";
-  EXPECT_EQ(stated((motion + "translation_px").c_str()), json(stills.translation_px));
-  EXPECT_EQ(stated((motion + "rotation_deg").c_str()), stills.rotation_deg);
-  EXPECT_EQ(stated((motion + "scale").c_str()), stills.scale);
-  EXPECT_EQ(stated((motion + "frames").c_str()), stills.frames);
-  const ObjectMotionSpec objects;
-  const std::string of_objects = motion + "objects/properties/";
-  EXPECT_EQ(stated((of_objects + "translation_px").c_str()), json(objects.translation_px));
-  EXPECT_EQ(stated((of_objects + "rotation_deg").c_str()), objects.rotation_deg);
-  EXPECT_EQ(stated((of_objects + "scale").c_str()), objects.scale);
-  EXPECT_EQ(stated((of_objects + "rests").c_str()), objects.rests);
-  EXPECT_EQ(stated("/properties/image/properties/fit"), to_string(manifest.image.fit));
-  const GeneratorSpec& generator = manifest.generator;
-  EXPECT_EQ(stated("/properties/generator/properties/kind"), to_string(generator.kind));
-  EXPECT_EQ(stated("/properties/generator/properties/weights"), generator.weights);
-  EXPECT_EQ(stated("/properties/generator/properties/precision"),
-            word_of(kPrecisionChoiceWords, generator.precision));
-  EXPECT_EQ(stated("/properties/generator/properties/engine"),
-            word_of(kEngineWords, generator.engine));
-  EXPECT_EQ(stated("/properties/generator/properties/device"), to_string(generator.device));
-  EXPECT_EQ(stated("/properties/generator/properties/scope"), to_string(generator.scope.scope));
-  EXPECT_EQ(stated("/properties/generator/properties/motion_threshold"),
-            generator.scope.motion_threshold);
-  EXPECT_EQ(stated("/properties/generator/properties/motion_margin_px"),
-            generator.scope.motion_margin_px);
-  EXPECT_EQ(stated("/properties/generator/properties/label_margin_px"),
-            generator.scope.label_margin_px);
-  EXPECT_EQ(stated("/properties/generator/properties/tile_px"), generator.scope.tile_px);
-  EXPECT_EQ(stated("/properties/generator/properties/sample"), generator.sample);
-  EXPECT_EQ(stated("/properties/generator/properties/sensor/anyOf/2/properties/threshold_ratio"),
-            ThresholdSpec().ratio);
-  EXPECT_EQ(stated("/properties/generator/properties/duration_s"), generator.duration_s);
-  EXPECT_EQ(stated("/properties/generator/properties/max_displacement_px"),
-            generator.max_displacement_px);
-  EXPECT_EQ(stated("/properties/volume/properties/bins"), manifest.volume.bins);
-  EXPECT_EQ(stated("/properties/volume/properties/normalize"),
-            to_string(manifest.volume.normalize));
-  EXPECT_EQ(stated("/properties/output/properties/dtype"), to_string(manifest.output.dtype));
-  EXPECT_EQ(stated("/properties/output/properties/deflate_level"), manifest.output.deflate_level);
-  EXPECT_EQ(stated("/properties/errors/properties/policy"), to_string(manifest.errors.policy));
-  EXPECT_EQ(stated("/properties/errors/properties/max_count"), manifest.errors.max_count);
-  EXPECT_EQ(stated("/properties/errors/properties/max_fraction"), manifest.errors.max_fraction);
-}
-
-TEST(ManifestSchema, EveryObjectIsClosedAndEveryPropertyDescribed) {
-  EXPECT_EQ(testing::open_or_undescribed(kSchema), "");
-}
-
-TEST(SensorSchema, StatesTheDefaults) {
-  const json& sensor =
-      testing::schema_document("simulation.schema.json").at("properties").at("sensor");
-  json defaults;
-  for (const auto& [key, property] : sensor.at("properties").items()) {
-    defaults[key] = property.at("default").get<double>();
+/// A document of all keys that `list` tells, and what it writes of what it reads.
+struct Written {
+  template <class T>
+  Written(std::string file, const char* text, void (*list)(Fields&, T&))
+      : schema(std::move(file)), given(json::parse(text)) {
+    FaultList faults("d");
+    T document;
+    objects(list).read(StrictValue(given, faults), document);
+    EXPECT_EQ(faults.text(), "");
+    written = objects(list).json(document);
   }
-  EXPECT_EQ(defaults, json::parse(to_json(SensorSpec())));
+  std::string schema;
+  json given, written;
+};
+
+std::vector<Written> written_documents() {
+  constexpr char kJob[] = "manifest.schema.json", kTraining[] = "training.schema.json";
+  return {{kJob, R"({
+    "format": "eventgan-manifest", "version": 1, "name": "n", "seed": 9223372036854775807,
+    "sources": [
+      {"dataset": "kitti_object", "root": "a", "split": "val", "raw_root": "b", "devkit": "c",
+       "outlines": "m", "ids": "i", "classes": ["Car"], "fraction": [0.25, 0.5],
+       "pairs": {"from": "sequence", "gaps": [1, 4, 6], "side": "after", "choose": "all",
+                 "min_pairs": 5, "max_gap_s": 0.4}},
+      {"dataset": "mpii", "root": "d", "annotations": "e", "sequences": "f",
+       "pairs": {"gaps": [4], "side": "around"}},
+      {"dataset": "human36m", "root": "g", "layout": "official", "every": 5, "subjects": ["S1"],
+       "cameras": ["2"], "actions": ["Eating"], "pairs": {"gaps": [2]}},
+      {"dataset": "frames", "root": "h", "frames_per_second": 29.97,
+       "labels": {"format": "voc", "path": "i", "edges_from": 0},
+       "pairs": {"from": "stills", "frames": 7,
+                 "motion": {"translation_px": [1, 2], "rotation_deg": 3, "scale": 0.25, "frames": 2,
+                            "rests": 0.75,
+                            "objects": {"translation_px": [3, 4], "rotation_deg": 5, "scale": 0.125,
+                                        "rests": 0.5}}}}],
+    "image": {"width": 861, "height": 260, "fit": "crop", "grey": "after_resize", "blur": 5,
+              "range": [7000, 9000.5]},
+    "generator": {"kind": "network", "weights": "untrained:8", "engine": "onednn", "device": "cuda",
+                  "precision": "int8", "sample": false, "scope": "labels", "motion_threshold": 2.5,
+                  "motion_margin_px": 0, "label_margin_px": 100, "tile_px": 32, "sensor": {}},
+    "volume": {"bins": 3, "normalize": "eta98"},
+    "output": {"directory": "o", "samples_per_shard": 7, "dtype": "uint8", "deflate_level": 9},
+    "errors": {"policy": "fail", "max_count": 3, "max_fraction": 0.5}})",
+           list_job},
+          {kJob, R"({
+    "format": "eventgan-manifest", "version": 1, "name": "n", "sources": [
+      {"dataset": "recording", "root": "r", "camera": "right", "rectify": true,
+       "sensor": {"height": 260, "width": 346}, "stream": 3, "time_shift": false,
+       "columns": {"t": "a", "x": "b", "y": "c", "p": "d", "unit": "ns"}, "window_s": 0.5,
+       "label_at": "middle"},
+      {"dataset": "recording", "root": "s"},
+      {"dataset": "dhp19", "root": "d", "without_actions": ["2_1"], "window_events": 5}],
+    "image": {}, "generator": {"kind": "events"}, "output": {"directory": "o"}})",
+           list_job},
+          {kJob, R"({
+    "format": "eventgan-manifest", "version": 1, "name": "n",
+    "sources": [{"dataset": "frames", "root": "r", "pairs": {"gaps": [1]}},
+                {"dataset": "frames", "root": "r", "pairs": {"from": "stills", "motion": {"objects": {}}}}],
+    "image": {"preset": "kitti"}, "generator": {"kind": "esim", "duration_s": 0.03, "max_displacement_px": 4},
+    "output": {"directory": "o"}})",
+           list_job},
+          {kTraining, R"({
+    "format": "eventgan-training", "version": 1, "name": "n", "seed": 9,
+    "recordings": [{"path": "a", "format": "mvsec", "camera": "right", "weight": 2.5,
+                    "first_frame": 3, "last_frame": 8},
+                   {"path": "b", "format": "dsec", "rectify": true}],
+    "validation": [{"path": "c", "format": "eventgan"}],
+    "gaps": [1, 3], "crop": {"width": 96, "height": 64}, "batch": 4,
+    "network": {"generator_channels": 8, "discriminator_channels": 16, "cycle_channels": 4,
+                "spectral_norm": "encoders", "output_slope": 0.25, "difference_gain": 6, "bins": 5,
+                "sensor": false},
+    "losses": {"adversarial": 0.5, "flow": 2, "reconstruction": 3, "volume": 4, "count": 6,
+               "overlap": 7, "quantile": 0.7, "smoothness": 5},
+    "label_flip": 0.2, "discriminator_steps": 3,
+    "augmentation": {"flip": false, "gain": [0.5, 2], "gamma": [0.8, 1.25],
+                     "reverse": true, "static_fraction": 0.1, "event_fraction": 0.3},
+    "optimizer": {"generator_rate": 1e-3, "cycle_rate": 2e-3, "discriminator_rate": 3e-3,
+                  "betas": [0.5, 0.9], "final_rate_fraction": 0.01},
+    "precision": "bfloat16", "steps": {"flow": 1, "reconstruction": 2, "generator": 3},
+    "output": {"directory": "o", "checkpoint_minutes": 0, "image_minutes": 0.5}})",
+           list_training},
+          {kTraining, R"({
+    "format": "eventgan-training", "version": 1, "name": "n",
+    "recordings": [{"path": "a", "format": "ecd", "threshold": 0.4, "threshold_ratio": 1.5}],
+    "network": {"sensor": true}, "teacher": "w.safetensors",
+    "losses": {"adversarial": 0, "flow": 0, "reconstruction": 0, "likelihood": 1,
+               "block_likelihood": 0.25},
+    "simulated": {"textures": ["t/a", "b"], "fraction": 0.75}, "steps": {"generator": 3},
+    "output": {"directory": "o"}})",
+           list_training},
+          {kTraining, R"({
+    "format": "eventgan-training", "version": 1, "name": "n",
+    "recordings": [{"path": "a", "format": "ecd"}], "steps": {"flow": 1, "reconstruction": 1},
+    "output": {"directory": "o"}})",
+           list_training},
+          {"simulation.schema.json", R"({
+    "format": "eventgan-simulation", "version": 1, "name": "n", "seed": 9,
+    "sources": [
+      {"path": "q", "name": "q", "method": "affine", "frames_per_second": 29.97, "first_frame": 3,
+       "frame_count": 4, "frame_step": 5, "frames_per_image": 6, "max_displacement_px": 7.5},
+      {"path": "r", "name": "r"}, {"path": "s", "name": "s", "method": "affine"}],
+    "size": {"width": 346, "height": 260},
+    "sensor": {"positive_threshold": 0.5, "negative_threshold": 0.25, "threshold_spread": 0.125,
+               "refractory_s": 0.01, "leak_rate_hz": 2, "shot_noise_rate_hz": 3,
+               "hot_pixel_fraction": 0.5, "hot_pixel_rate_hz": 4, "log_epsilon": 0.02},
+    "output": {"directory": "o", "format": "aedat4"}})",
+           list_simulation}};
+}
+
+/// Keys whose values are kept as other members, of which the tests of the documents tell.
+bool is_kept_otherwise(const std::string& pointer) {
+  for (const char* part : {"/image/", "/generator/sensor", "/threshold"}) {
+    if (pointer.find(part) != pointer.npos) return true;
+  }
+  return false;
+}
+
+/// Each value that was written is the one that was given, or else the default that the schema says.
+void expect_given_or_default(const json& schema, const json& given, const json& written) {
+  for (const auto& [key, value] : written.items()) {
+    const json& property = schema.at("properties").at(key);
+    const bool has_objects = value.is_array() && property.at("items").contains("properties");
+    const bool has_default = !given.contains(key) && property.contains("default");
+    if (is_kept_otherwise("/" + key)) continue;
+    if (value.is_object() && !has_default) {
+      expect_given_or_default(property, given.value(key, json::object()), value);
+    } else if (has_objects) {
+      for (std::size_t i = 0; i < value.size(); ++i) {
+        expect_given_or_default(property.at("items"), given.at(key).at(i), value.at(i));
+      }
+    } else {
+      EXPECT_EQ(value, given.value(key, property.value("default", json()))) << key;
+    }
+  }
+}
+
+void add_keys(const json& value, const std::string& place, std::set<std::string>& keys) {
+  if (!value.is_structured()) return;
+  for (const auto& [key, member] : value.items()) {
+    const std::string at = value.is_object() ? place + "/" + key : place;
+    if (value.is_object()) keys.insert(at);
+    add_keys(member, at, keys);
+  }
+}
+
+void add_schema_keys(const json& schema, const std::string& place, std::set<std::string>& keys) {
+  const json properties = schema.value("properties", json::object());
+  for (const auto& [key, property] : properties.items()) {
+    keys.insert(place + "/" + key);
+    if (key == "validation") continue;  // the table of recordings
+    add_schema_keys(property.value("items", property), place + "/" + key, keys);
+  }
+}
+
+TEST(Documents, HoldEveryValueGivenAndElseTheDefaultsOfTheSchema) {
+  std::map<std::string, std::set<std::string>> given_keys;
+  for (const Written& one : written_documents()) {
+    SCOPED_TRACE(one.given.dump());
+    expect_given_or_default(testing::schema_document(one.schema), one.given, one.written);
+    const json flat = one.written.flatten(), given = one.given.flatten();
+    for (const auto& [pointer, value] : given.items()) {
+      EXPECT_TRUE(flat.contains(pointer) || value.is_null() || is_kept_otherwise(pointer))
+          << pointer;
+    }
+    add_keys(one.given, "", given_keys[one.schema]);
+  }
+  for (const auto& [schema, given] : given_keys) {
+    std::set<std::string> all;
+    add_schema_keys(testing::schema_document(schema), "", all);
+    for (const std::string& key : all) EXPECT_TRUE(given.contains(key)) << schema << key;
+  }
+}
+
+TEST(Documents, HaveSchemasWhoseObjectsAreClosedAndWhosePropertiesAreDescribed) {
+  for (const auto& [name, schema] : document_schemas()) {
+    EXPECT_EQ(testing::open_or_undescribed(name), "") << name;
+  }
 }
 
 std::filesystem::path examples() {

@@ -16,15 +16,14 @@
 #include "tests/manifests/documents/manifest_cases.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
 
 using testing::edited;
-using ::testing::HasSubstr;
 using testing::kSoundManifest;
 using testing::ManifestCase;
-using ::testing::ThrowsMessage;
 
 constexpr char kSensorSchema[] = "sensor.schema.json";
 
@@ -78,19 +77,8 @@ const ManifestCase kSensorCases[] = {
 class SensorFaults : public ::testing::TestWithParam<ManifestCase> {};
 
 TEST_P(SensorFaults, AreAllReportedAndSeenByTheSchema) {
-  const std::string text = edited(kSoundSensor, GetParam().edits);
-  std::string expected, got;
-  for (const std::string& line : GetParam().faults) {
-    expected += (expected.empty() ? "s.json: " : "\ns.json: ") + line;
-  }
-  try {
-    parse_camera_sensor(text, "s.json");
-  } catch (const UsageError& error) {
-    got = error.what();
-  }
-  EXPECT_EQ(got, expected);
-  EXPECT_EQ(testing::schema_accepts(kSensorSchema, nlohmann::json::parse(text)),
-            GetParam().faults.empty() || GetParam().beyond_schema);
+  testing::expect_faults(GetParam(), kSoundSensor, kSensorSchema,
+                         [](const std::string& text) { parse_camera_sensor(text, "d"); });
 }
 
 INSTANTIATE_TEST_SUITE_P(Table, SensorFaults, ::testing::ValuesIn(kSensorCases),
@@ -106,20 +94,13 @@ CameraSensor sound_sensor() {
   return sensor;
 }
 
-TEST(SensorDocument, HoldsEveryValueGiven) {
+TEST(SensorDocument, HoldsEveryValueGivenAndIsReadAsItWasWritten) {
   EXPECT_EQ(parse_camera_sensor(kSoundSensor, "s"), sound_sensor());
-}
-
-TEST(SensorDocument, IsReadAsItWasWritten) {
   EXPECT_EQ(parse_camera_sensor(to_document(sound_sensor()), "s"), sound_sensor());
   CameraSensor bare;
   bare.name = "bare";
   EXPECT_EQ(parse_camera_sensor(to_document(bare), "s"), bare);
   EXPECT_TRUE(testing::schema_accepts(kSensorSchema, nlohmann::json::parse(to_document(bare))));
-}
-
-TEST(SensorSchema, IsClosedAndDescribed) {
-  EXPECT_EQ(testing::open_or_undescribed(kSensorSchema), "");
 }
 
 TEST(ShippedSensors, AreThoseOfTheRepositoryAndOfTheSchema) {
@@ -142,12 +123,12 @@ TEST(ShippedSensors, AreThoseOfTheRepositoryAndOfTheSchema) {
 }
 
 TEST(OpenCameraSensor, SaysWhatThereIs) {
-  EXPECT_THAT([] { open_camera_sensor("davis"); },
-              ThrowsMessage<UsageError>("expected davis346, prophesee_gen4 or the path of a "
-                                        "sensor's document (*.json), got davis"));
-  EXPECT_THAT([] { open_camera_sensor("/none/s.json"); },
-              ThrowsMessage<InputError>("expected a sensor's document, got \"No such file or "
-                                        "directory\", in /none/s.json"));
+  EXPECT_THROWS(open_camera_sensor("davis"), UsageError,
+                ::testing::Eq("expected davis346, prophesee_gen4 or the path of a "
+                              "sensor's document (*.json), got davis"));
+  EXPECT_THROWS(open_camera_sensor("/none/s.json"), InputError,
+                ::testing::Eq("expected a sensor's document, got \"No such file or "
+                              "directory\", in /none/s.json"));
 }
 
 class SensorOfAManifest : public ::testing::Test {
@@ -181,10 +162,9 @@ TEST_F(SensorOfAManifest, IsThatOfTheDocument) {
 
 TEST_F(SensorOfAManifest, OfAModelAloneIsNoneForANetwork) {
   testing::write_file(folder_ / "model.json", edited(kSoundSensor, {{"/network", ""}}));
-  EXPECT_THAT([&] { read("model.json"); },
-              ThrowsMessage<UsageError>(HasSubstr(
-                  "$.generator.sensor: expected a \"network\" in the sensor's document, which "
-                  "`eventgan fit --weights` finds, got a threshold of difference and esim alone")));
+  EXPECT_THROWS(read("model.json"), UsageError,
+                "$.generator.sensor: expected a \"network\" in the sensor's document, which "
+                "`eventgan fit --weights` finds, got a threshold of difference and esim alone");
   testing::write_file(
       folder_ / "noise.json",
       edited(kSoundSensor, {{"/network", ""}, {"/threshold", ""}, {"/threshold_ratio", ""}}));
@@ -204,25 +184,17 @@ TEST_F(SensorOfAManifest, StaysInTheTextWithoutTheFile) {
   EXPECT_EQ(fields.at("$.generator.sensor.origin"), R"("by eye")");
 }
 
-TEST_F(SensorOfAManifest, IsFoundByAShippedName) {
+TEST_F(SensorOfAManifest, IsFoundByAShippedNameOrHasFaultsOfItsOwnFile) {
   const GeneratorSpec spec = read("davis346").generator;
   EXPECT_EQ(spec.camera, "davis346");
   EXPECT_EQ(spec.threshold, open_camera_sensor("davis346").network->threshold);
-}
-
-TEST_F(SensorOfAManifest, HasFaultsOfItsOwnFile) {
+  constexpr char kPair[] = R"({"generator": {"kind": "esim", "sensor": "davis346"}})";
+  EXPECT_EQ(parse_pair_manifest(kPair, "", "pair").generator.camera, "davis346");
   testing::write_file(folder_ / "bad.json", edited(kSoundSensor, {{"/threshold", "0"}}));
   const std::string file = (folder_ / "bad.json").string();
-  EXPECT_THAT([&] { read("bad.json"); },
-              ThrowsMessage<UsageError>(file + ": $.threshold: expected a number 0.01..5, got 0"));
-  EXPECT_THAT([&] { read("none.json"); },
-              ThrowsMessage<InputError>(HasSubstr("expected a sensor's document, got \"No such")));
-}
-
-TEST(SensorOfAPair, MayBeNamed) {
-  const JobManifest manifest =
-      parse_pair_manifest(R"({"generator": {"kind": "esim", "sensor": "davis346"}})", "", "pair");
-  EXPECT_EQ(manifest.generator.camera, "davis346");
+  EXPECT_THROWS(read("bad.json"), UsageError,
+                ::testing::Eq(file + ": $.threshold: expected a number 0.01..5, got 0"));
+  EXPECT_THROWS(read("none.json"), InputError, "expected a sensor's document, got \"No such");
 }
 
 TEST(WithSensorDocument, LeavesOtherTextsAsTheyAre) {

@@ -13,8 +13,6 @@ namespace {
 
 using testing::ManifestCase;
 
-constexpr char kSimulationSchema[] = "simulation.schema.json";
-
 constexpr char kSoundSimulation[] = R"({
   "format": "eventgan-simulation", "version": 1, "name": "s",
   "sources": [{"path": "a/clip.mp4"}, {"path": "drive", "method": "affine"}],
@@ -22,7 +20,7 @@ constexpr char kSoundSimulation[] = R"({
 })";
 
 SimulationManifest parse_simulation(const std::string& text) {
-  return parse_simulation_manifest(text, "/data", "s.json");
+  return parse_simulation_manifest(text, "/data", "d");
 }
 
 const ManifestCase kSimulationCases[] = {
@@ -93,82 +91,19 @@ const ManifestCase kSimulationCases[] = {
 class SimulationFaults : public ::testing::TestWithParam<ManifestCase> {};
 
 TEST_P(SimulationFaults, AreAllReportedAndSeenByTheSchema) {
-  const std::string text = testing::edited(kSoundSimulation, GetParam().edits);
-  std::string expected, got;
-  for (const std::string& line : GetParam().faults) {
-    expected += (expected.empty() ? "s.json: " : "\ns.json: ") + line;
-  }
-  try {
-    parse_simulation(text);
-  } catch (const UsageError& error) {
-    got = error.what();
-  }
-  EXPECT_EQ(got, expected);
-  EXPECT_EQ(testing::schema_accepts(kSimulationSchema, nlohmann::json::parse(text)),
-            GetParam().faults.empty() || GetParam().beyond_schema);
+  testing::expect_faults(GetParam(), kSoundSimulation, "simulation.schema.json", parse_simulation);
 }
 
 INSTANTIATE_TEST_SUITE_P(Table, SimulationFaults, ::testing::ValuesIn(kSimulationCases),
                          [](const auto& entry) { return testing::test_name(entry.param); });
 
-TEST(SimulationManifest, HasTheDefaultsOfItsHeader) {
+TEST(SimulationManifest, NamesASourceByItsPath) {
   const SimulationManifest manifest = parse_simulation(kSoundSimulation);
-  EXPECT_EQ(manifest.seed, 0u);
-  EXPECT_EQ(manifest.size, std::nullopt);
-  EXPECT_EQ(manifest.sensor, SensorSpec());
-  EXPECT_EQ(manifest.file, SimulatedFile::kHdf5);
-  const SimulationSource& clip = manifest.sources.at(0);
-  EXPECT_EQ(clip.name, "clip");
-  EXPECT_EQ(clip.method.motion, SimulationMethod::kClip);
-  EXPECT_EQ(clip.frames_per_second, std::nullopt);
-  EXPECT_EQ(clip.first_frame, 0);
-  EXPECT_EQ(clip.frame_count, 0);
-  EXPECT_EQ(clip.frame_step, 1);
+  EXPECT_EQ(manifest.sources.at(0).name, "clip");
   EXPECT_EQ(manifest.sources.at(1).name, "drive");
-  EXPECT_EQ(manifest.sources.at(1).frames_per_image, 7);
-  EXPECT_EQ(manifest.sources.at(1).max_displacement_px, 5);
+  const std::string named = testing::edited(kSoundSimulation, {{"/sources/0/name", R"("q")"}});
+  EXPECT_EQ(parse_simulation(named).sources.at(0).name, "q");
   EXPECT_EQ(resolve(manifest, "a/clip.mp4"), "/data/a/clip.mp4");
-}
-
-TEST(SimulationManifest, HoldsEveryValueGiven) {
-  const SimulationManifest manifest = parse_simulation(R"({
-    "format": "eventgan-simulation", "version": 1, "name": "n", "seed": 9,
-    "sources": [{"path": "p", "name": "q", "method": "affine", "frames_per_second": 29.97,
-      "first_frame": 3, "frame_count": 4, "frame_step": 5, "frames_per_image": 6,
-      "max_displacement_px": 7.5}],
-    "size": {"width": 346, "height": 260}, "sensor": {"log_epsilon": 0.01},
-    "output": {"directory": "o", "format": "aedat4"}})");
-  EXPECT_EQ(manifest.seed, 9u);
-  const SimulationSource& source = manifest.sources.at(0);
-  EXPECT_EQ(source.path, "p");
-  EXPECT_EQ(source.name, "q");
-  EXPECT_EQ(source.method.simulator, GeneratorKind::kEsim);
-  EXPECT_TRUE(source.method.moves_one_frame());
-  EXPECT_EQ(source.frames_per_second, 29.97);
-  EXPECT_EQ(source.first_frame, 3);
-  EXPECT_EQ(source.frame_count, 4);
-  EXPECT_EQ(source.frame_step, 5);
-  EXPECT_EQ(source.frames_per_image, 6);
-  EXPECT_EQ(source.max_displacement_px, 7.5);
-  EXPECT_EQ(manifest.size, (ImageSize{.height = 260, .width = 346}));
-  EXPECT_EQ(manifest.sensor.log_epsilon, 0.01);
-  EXPECT_EQ(manifest.output_directory, "o");
-  EXPECT_EQ(manifest.file, SimulatedFile::kAedat4);
-}
-
-TEST(SimulationSchema, IsClosedDescribedAndStatesTheDefaults) {
-  EXPECT_EQ(testing::open_or_undescribed(kSimulationSchema), "");
-  const SimulationSource source;
-  const auto stated = [](const std::string& key) {
-    return testing::stated_default(kSimulationSchema,
-                                   "/properties/sources/items/properties/" + key);
-  };
-  EXPECT_EQ(stated("method"), to_string(source.method));
-  EXPECT_EQ(stated("first_frame"), source.first_frame);
-  EXPECT_EQ(stated("frame_count"), source.frame_count);
-  EXPECT_EQ(stated("frame_step"), source.frame_step);
-  EXPECT_EQ(stated("frames_per_image"), source.frames_per_image);
-  EXPECT_EQ(stated("max_displacement_px"), source.max_displacement_px);
 }
 
 }  // namespace

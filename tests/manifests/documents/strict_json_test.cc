@@ -14,26 +14,22 @@ namespace {
 
 constexpr std::array<std::string_view, 4> kWords{"root", "split", "samples_per_shard", "raw_root"};
 
-TEST(NearWord, FindsTheOneFewestEditsAway) {
-  EXPECT_EQ(near_word("rot", kWords), "root");      // inserted
-  EXPECT_EQ(near_word("splitt", kWords), "split");  // deleted
-  EXPECT_EQ(near_word("Root", kWords), "root");     // replaced
-  EXPECT_EQ(near_word("roto", kWords), "root");     // neighbours swapped
-  EXPECT_EQ(near_word("raw_rot", kWords), "raw_root");
-  EXPECT_EQ(near_word("sample_per_shards", kWords), "samples_per_shard");  // two edits
-}
-
-TEST(NearWord, FindsNoneFarAway) {
-  EXPECT_EQ(near_word("rt", kWords), "");  // two edits, but "root" is short
-  EXPECT_EQ(near_word("", kWords), "");
-  EXPECT_EQ(near_word("directory", kWords), "");
+TEST(NearWord, IsTheOneFewestEditsAway) {
+  for (const auto& [word, near] : {std::pair("rot", "root"),  // inserted
+                                   {"splitt", "split"},       // deleted
+                                   {"Root", "root"},          // replaced
+                                   {"roto", "root"},          // neighbours swapped
+                                   {"raw_rot", "raw_root"},
+                                   {"sample_per_shards", "samples_per_shard"},  // two edits
+                                   {"rt", ""},  // two edits, but "root" is short
+                                   {"", ""},
+                                   {"directory", ""}}) {
+    EXPECT_EQ(near_word(word, kWords), near) << word;
+  }
   EXPECT_EQ(near_word("root", {}), "");
   EXPECT_EQ(near_word(std::string(1'000'000, 'r'), kWords), "");
-}
-
-TEST(NearWord, OfTwoEquallyNearTakesTheFirst) {
   constexpr std::array<std::string_view, 2> kTwo{"bat", "cat"};
-  EXPECT_EQ(near_word("rat", kTwo), "bat");
+  EXPECT_EQ(near_word("rat", kTwo), "bat") << "of two that are equally near the first";
 }
 
 enum class Colour { kRed, kGreen };
@@ -62,7 +58,7 @@ TEST(StrictValue, IntegerTakesItsRange) {
 TEST(StrictValue, IntegerRefusesAllElse) {
   for (const char* text :
        {"-4", "4", "2.5", "2.0", "2e0", "\"2\"", "null", "true", "18446744073709551615"}) {
-    Reading reading(text);
+    Reading reading(text);                                  // the last would be -1 as int64
     EXPECT_EQ(reading.value().integer(-3, 3), -3) << text;  // the harmless value
     EXPECT_THAT(reading.faults.text(),
                 ::testing::StartsWith("d: $: expected an integer -3..3, got "));
@@ -70,60 +66,39 @@ TEST(StrictValue, IntegerRefusesAllElse) {
   }
 }
 
-TEST(StrictValue, AnUnsignedNumberIsNotTakenForANegativeOne) {
-  Reading reading("18446744073709551615");  // as int64 it would be -1
-  EXPECT_EQ(reading.value().sound_integer(-5, 5), std::nullopt);
-}
-
-TEST(StrictValue, NumberTakesWholeOnesToo) {
+TEST(StrictValue, NumbersTextAndChoicesAreTakenOrSayWhatIsAllowed) {
   EXPECT_EQ(Reading("1").value().number(0, 1), 1.0);
   EXPECT_EQ(Reading("0.25").value().number(0, 1), 0.25);
-  Reading high("1.5"), text("\"1\"");
-  EXPECT_EQ(high.value().number(0.5, 1), 0.5);
-  EXPECT_EQ(high.faults.text(), "d: $: expected a number 0.5..1, got 1.5");
-  text.value().number(0, 1);
-  EXPECT_EQ(text.faults.text(), "d: $: expected a number 0..1, got \"1\"");
-}
-
-TEST(StrictValue, Text) {
   EXPECT_EQ(Reading(R"("a\u0000b")").value().text(), std::string("a\0b", 3));
   const auto is_a = [](std::string_view text) { return text == "a"; };
   EXPECT_EQ(Reading(R"("a")").value().text("an a", is_a), "a");
-  Reading wrong(R"("b")");
-  EXPECT_EQ(wrong.value().text("an a", is_a), "");
-  EXPECT_EQ(wrong.faults.text(), "d: $: expected an a, got \"b\"");
-}
-
-TEST(StrictValue, ChoiceListsWhatIsAllowed) {
   EXPECT_EQ(Reading(R"("green")").value().choice(kColours), Colour::kGreen);
-  Reading wrong(R"("blue")");
-  EXPECT_EQ(wrong.value().sound_choice(kColours), std::nullopt);
-  EXPECT_EQ(wrong.faults.text(), R"(d: $: expected "red" or "green", got "blue")");
+  Reading high("1.5"), text("\"1\""), wrong(R"("b")"), blue(R"("blue")");
+  EXPECT_EQ(high.value().number(0.5, 1), 0.5);
+  text.value().number(0, 1);
+  EXPECT_EQ(wrong.value().text("an a", is_a), "");
+  EXPECT_EQ(blue.value().sound_choice(kColours), std::nullopt);
+  EXPECT_EQ(high.faults.text(), "d: $: expected a number 0.5..1, got 1.5");
+  EXPECT_EQ(text.faults.text(), "d: $: expected a number 0..1, got \"1\"");
+  EXPECT_EQ(wrong.faults.text(), "d: $: expected an a, got \"b\"");
+  EXPECT_EQ(blue.faults.text(), R"(d: $: expected "red" or "green", got "blue")");
 }
 
-TEST(StrictValue, ElementsHaveTheirPaths) {
-  Reading reading(R"([1, [2, "x"]])");
-  const auto elements = reading.value().elements(2);
+TEST(StrictValue, ElementsAndSortedMembersHaveTheirPaths) {
+  Reading array(R"([1, [2, "x"]])"), object(R"({"b c": "x", "a": 1})"), one("[1]");
+  const auto elements = array.value().elements(2);
   ASSERT_EQ(elements.size(), 2u);
   EXPECT_EQ(elements[0].integer(0, 9), 1);
-  EXPECT_EQ(reading.faults.text(), "");
+  EXPECT_EQ(array.faults.text(), "");
   elements[1].elements()[1].integer(0, 9);
-  EXPECT_EQ(reading.faults.text(), "d: $[1][1]: expected an integer 0..9, got \"x\"");
-}
-
-TEST(StrictValue, ElementsMustBeEnough) {
-  Reading reading("[1]");
-  EXPECT_TRUE(reading.value().elements(2).empty());
-  EXPECT_EQ(reading.faults.text(), "d: $: expected an array of 2 or more, got an array of 1");
-}
-
-TEST(StrictValue, MembersComeSortedWithTheirPaths) {
-  Reading reading(R"({"b c": "x", "a": 1})");
-  const auto members = reading.value().members();
+  EXPECT_EQ(array.faults.text(), "d: $[1][1]: expected an integer 0..9, got \"x\"");
+  const auto members = object.value().members();
   ASSERT_EQ(members.size(), 2u);
   EXPECT_EQ(members[0].first, "a");
   members[1].second.integer(0, 9);
-  EXPECT_EQ(reading.faults.text(), "d: $[\"b c\"]: expected an integer 0..9, got \"x\"");
+  EXPECT_EQ(object.faults.text(), "d: $[\"b c\"]: expected an integer 0..9, got \"x\"");
+  EXPECT_TRUE(one.value().elements(2).empty());
+  EXPECT_EQ(one.faults.text(), "d: $: expected an array of 2 or more, got an array of 1");
 }
 
 TEST(StrictValue, MessagesAreShortAndPrintable) {
@@ -145,35 +120,25 @@ TEST(StrictObject, ReadsWhatIsThere) {
   EXPECT_EQ(reading.faults.text(), "");
 }
 
-TEST(StrictObject, AMissingMemberIsAFaultThatSaysWhatIsMissing) {
-  Reading reading("{}");
-  StrictObject object = reading.object();
+TEST(StrictObject, SaysWhatIsMissingAndWhatIsUnknown) {
+  Reading empty("{}"), array("[]"), unknown(R"({"widht": 1, "zz": 2, "height": 3})");
+  StrictObject object = empty.object();
   object.at("a").integer(0, 9);
   object.at("b").object().at("c").text();  // below what is missing nothing more is missed
   object.at("d").elements();
-  EXPECT_EQ(reading.faults.text(),
+  EXPECT_EQ(empty.faults.text(),
             "d: $.a: expected an integer 0..9, got nothing\n"
             "d: $.b: expected an object, got nothing\n"
             "d: $.d: expected an array, got nothing");
-}
-
-TEST(StrictObject, WhatIsNoObjectIsOneFault) {
-  Reading reading("[]");
-  StrictObject object = reading.object();
-  object.at("a").integer(0, 9);
-  EXPECT_FALSE(object.find("b").has_value());
-  object.finish();
-  EXPECT_EQ(reading.faults.text(), "d: $: expected an object, got an array of 0");
-}
-
-TEST(StrictObject, EveryUnknownKeyIsAFault) {
-  Reading reading(R"({"widht": 1, "zz": 2, "height": 3})");
-  StrictObject object = reading.object();
-  object.find("width");
-  object.find("width");  // asked for twice, listed once
-  object.find("height");
-  object.finish();
-  EXPECT_EQ(reading.faults.text(),
+  StrictObject none = array.object();
+  none.at("a").integer(0, 9);
+  EXPECT_FALSE(none.find("b").has_value());
+  none.finish();
+  EXPECT_EQ(array.faults.text(), "d: $: expected an object, got an array of 0") << "one fault";
+  StrictObject sized = unknown.object();
+  for (const char* key : {"width", "width", "height"}) sized.find(key);  // each is listed once
+  sized.finish();
+  EXPECT_EQ(unknown.faults.text(),
             "d: $.widht: expected the key \"width\" or none, got an unknown key\n"
             "d: $.zz: expected one of the keys width, height, got an unknown key");
 }

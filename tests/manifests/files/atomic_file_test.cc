@@ -11,6 +11,7 @@
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -96,12 +97,12 @@ TEST(AtomicFile, CreatesInPieces) {
 
 TEST(AtomicFile, AWriterThatFailsLeavesNothing) {
   const TemporaryFolder folder;
-  EXPECT_THROW(create_file_atomically(folder / "plan.json",
-                                      [](const TextSink& sink) {
-                                        sink("half");
-                                        throw std::logic_error("the other half");
-                                      }),
-               std::logic_error);
+  EXPECT_THROWS(create_file_atomically(folder / "plan.json",
+                                       [](const TextSink& sink) {
+                                         sink("half");
+                                         throw std::logic_error("the other half");
+                                       }),
+                std::logic_error, "the other half");
   EXPECT_THAT(names_in(folder.path()), ElementsAre());
 }
 

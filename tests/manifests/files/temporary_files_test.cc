@@ -12,6 +12,7 @@
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -94,15 +95,12 @@ TEST_F(UnfinishedFiles, AreTemporariesAloneInTheOrderOfTheirPaths) {
   EXPECT_EQ(files[1].name, (TemporaryName{"b.h5", "node6", 11, 3}));
 }
 
-TEST_F(UnfinishedFiles, OfThisHostTellWhetherTheirWriterLives) {
+TEST_F(UnfinishedFiles, TellWhetherTheirWriterLivesOrTheirAgeAlone) {
   EXPECT_EQ(file_of(host_name(), dead_pid(), 0).writer, WriterLife::kDead);
   EXPECT_EQ(file_of(host_name(), kAlivePid, 0).writer, WriterLife::kAlive);
   EXPECT_EQ(file_of(host_name(), kAlivePid, 1800).writer, WriterLife::kAlive);
   EXPECT_TRUE(is_stale(file_of(host_name(), dead_pid(), 0)));
   EXPECT_FALSE(is_stale(file_of(host_name(), kAlivePid, 3500)));
-}
-
-TEST_F(UnfinishedFiles, OfAnotherHostTellTheirAgeAlone) {
   const UnfinishedFile young = file_of("node7-1", dead_pid(), 3500);
   EXPECT_EQ(young.writer, WriterLife::kUnknown);
   EXPECT_NEAR(young.silent_s, 3500, 60);
@@ -138,9 +136,8 @@ TEST_F(UnfinishedFiles, OfAClockThatIsAheadAreStaleFromAnHourOn) {
 }
 
 TEST_F(UnfinishedFiles, NamesAFolderThatCannotBeListed) {
-  EXPECT_THAT([&] { unfinished_files(folder_ / "absent"); },
-              ::testing::ThrowsMessage<std::runtime_error>(
-                  ::testing::HasSubstr((folder_ / "absent").string())));
+  EXPECT_THROWS(unfinished_files(folder_ / "absent"), std::runtime_error,
+                (folder_ / "absent").string());
 }
 
 TEST(StaleTemporaries, OnlyThoseOfDeadWritersGo) {

@@ -6,6 +6,7 @@
 
 #include "manifests/values/weights.h"
 #include "manifests/values/words.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -40,14 +41,11 @@ TEST(JobWords, GoThereAndBack) {
   expect_one_to_one(kPolicyWords);
 }
 
-TEST(JobWords, NameTheEnginesAndTheProgramsChoice) {
+TEST(JobWords, AreThoseThatFilesHoldAndThePeopleWrite) {
   EXPECT_EQ(word_of(kEngineWords, std::optional<Engine>()), "auto");
   EXPECT_EQ(word_of(kPrecisionChoiceWords, std::optional<Precision>()), "auto");
   EXPECT_EQ(to_string(Engine::kTorch), "torch");
   EXPECT_EQ(to_string(Engine::kOnednn), "onednn");
-}
-
-TEST(JobWords, AreThoseThatFilesHold) {
   // Shards and plans hold these; a change is a change of the formats.
   EXPECT_EQ(to_string(DatasetKind::kKittiObject), "kitti_object");
   EXPECT_EQ(to_string(DatasetKind::kHuman36m), "human36m");
@@ -55,24 +53,21 @@ TEST(JobWords, AreThoseThatFilesHold) {
   EXPECT_EQ(to_string(GreyOrder::kBeforeResize), "before_resize");
   EXPECT_EQ(to_string(Normalization::kEta98), "eta98");
   EXPECT_EQ(to_string(StoredType::kFloat16), "float16");
+  EXPECT_THROWS(to_string(static_cast<StoredType>(99)), std::invalid_argument,
+                "expected a value of the enumeration, got another number");
 }
 
-TEST(JobWords, ANumberThatIsNoValueHasNone) {
-  EXPECT_THROW(to_string(static_cast<StoredType>(99)), std::invalid_argument);
-}
-
-TEST(WeightsName, KnowsTheWords) {
-  EXPECT_EQ(parse_weights_name("shipped"), (WeightsName{WeightsOrigin::kShipped, "", {}}));
-  EXPECT_EQ(parse_weights_name("shipped:16"), (WeightsName{WeightsOrigin::kShipped, "", 16}));
-  EXPECT_EQ(parse_weights_name("shipped:sensor"),
-            (WeightsName{WeightsOrigin::kShipped, "", kSensorWeights}));
-  EXPECT_EQ(parse_weights_name("untrained:1"), (WeightsName{WeightsOrigin::kUntrained, "", 1}));
-  EXPECT_EQ(parse_weights_name("untrained:64"), (WeightsName{WeightsOrigin::kUntrained, "", 64}));
-}
-
-TEST(WeightsName, TakesTheRestForPaths) {
+TEST(WeightsName, KnowsTheWordsAndTakesTheRestForPaths) {
+  using enum WeightsOrigin;
+  for (const auto& [text, name] : {std::pair("shipped", WeightsName{kShipped, "", {}}),
+                                   {"shipped:16", {kShipped, "", 16}},
+                                   {"shipped:sensor", {kShipped, "", kSensorWeights}},
+                                   {"untrained:1", {kUntrained, "", 1}},
+                                   {"untrained:64", {kUntrained, "", 64}}}) {
+    EXPECT_EQ(parse_weights_name(text), name) << text;
+  }
   for (const char* path : {"w.safetensors", "../a b/w", "shipped.safetensors", "untrained", ":"}) {
-    EXPECT_EQ(parse_weights_name(path), (WeightsName{WeightsOrigin::kFile, path, {}})) << path;
+    EXPECT_EQ(parse_weights_name(path), (WeightsName{kFile, path, {}})) << path;
   }
 }
 
@@ -85,12 +80,17 @@ TEST(WeightsName, RefusesWhatNamesNothing) {
   }
 }
 
-TEST(BeyondLimits, CountAndFractionBothBind) {
-  const ErrorSpec errors{ErrorPolicy::kQuarantine, 3, 0.1};
+TEST(BeyondLimits, CountAndFractionBothBindAndThePolicyFailAllowsNone) {
+  const ErrorSpec errors{ErrorPolicy::kQuarantine, 3, 0.1}, none{ErrorPolicy::kFail, 100, 1};
   EXPECT_FALSE(beyond_limits(errors, 0, 0));
   EXPECT_FALSE(beyond_limits(errors, 3, 30));
   EXPECT_TRUE(beyond_limits(errors, 3, 29));  // 10.3 %
   EXPECT_TRUE(beyond_limits(errors, 4, 1000));
+  EXPECT_FALSE(beyond_limits(none, 0, 10));
+  EXPECT_TRUE(beyond_limits(none, 1, 10));
+  EXPECT_EQ(limits_text({ErrorPolicy::kQuarantine, 3, 0.25}, 8),
+            "at most 2 quarantined pairs (errors in the manifest)");
+  EXPECT_EQ(limits_text(none, 8), "no quarantined pair (errors.policy in the manifest is \"fail\")");
 }
 
 TEST(BeyondLimits, OfFewSamplesOneMayFail) {
@@ -102,19 +102,6 @@ TEST(BeyondLimits, OfFewSamplesOneMayFail) {
   EXPECT_EQ(most_quarantined(errors, 1), 0);  // then nothing is made
   EXPECT_EQ(most_quarantined({ErrorPolicy::kQuarantine, 100, 0}, 44), 0);
   EXPECT_EQ(most_quarantined({ErrorPolicy::kQuarantine, 0, 1}, 44), 0);
-}
-
-TEST(BeyondLimits, PolicyFailAllowsNone) {
-  const ErrorSpec errors{ErrorPolicy::kFail, 100, 1};
-  EXPECT_FALSE(beyond_limits(errors, 0, 10));
-  EXPECT_TRUE(beyond_limits(errors, 1, 10));
-}
-
-TEST(LimitsText, SaysWhatThePolicyAllows) {
-  EXPECT_EQ(limits_text({ErrorPolicy::kQuarantine, 3, 0.25}, 8),
-            "at most 2 quarantined pairs (errors in the manifest)");
-  EXPECT_EQ(limits_text({ErrorPolicy::kFail, 3, 0.25}, 8),
-            "no quarantined pair (errors.policy in the manifest is \"fail\")");
 }
 
 }  // namespace

@@ -10,8 +10,8 @@
 namespace eventgan {
 namespace {
 
-using testing::ElementsAre;
-using testing::Optional;
+using ::testing::ElementsAre;
+using ::testing::Optional;
 
 GreyImage drawn(const std::vector<std::string>& rows) {
   GreyImage mask{{static_cast<int>(rows.size()), static_cast<int>(rows.at(0).size())}, {}};
@@ -43,24 +43,18 @@ int winding(const Outline& outline, double x, double y) {
   return static_cast<int>(std::lround(angle / (2 * std::acos(-1))));
 }
 
-TEST(Outlines, OfAPixelIsItsFourCornersClockwise) {
-  const Outline outline = outline_of(drawn({"...", ".#."}));
+TEST(Outlines, OfPixelsAreClockwiseAndHolesRunTheOtherWay) {
+  Outline outline = outline_of(drawn({"...", ".#."}));
   ASSERT_EQ(outline.rings.size(), 1U);
   EXPECT_THAT(outline.rings[0],
-              testing::UnorderedElementsAre(Point{1, 1}, Point{2, 1}, Point{2, 2}, Point{1, 2}));
+              ::testing::UnorderedElementsAre(Point{1, 1}, Point{2, 1}, Point{2, 2}, Point{1, 2}));
   EXPECT_EQ(winding(outline, 1.5, 1.5), 1);
-}
-
-TEST(Outlines, AHoleRunsTheOtherWay) {
   const GreyImage mask = drawn({"#####", "#...#", "#.#.#", "#...#", "#####"});
-  const Outline outline = outline_of(mask);
+  outline = outline_of(mask);
   EXPECT_EQ(outline.rings.size(), 3U);
   EXPECT_EQ(winding(outline, 1.5, 1.5), 0);
   EXPECT_EQ(winding(outline, 2.5, 2.5), 1);
   EXPECT_EQ(mask_of(outline, mask.size), mask);
-}
-
-TEST(Outlines, PixelsThatTouchAtACornerHaveRingsOfTheirOwn) {
   EXPECT_EQ(outline_of(drawn({"#.", ".#"})).rings.size(), 2U);
 }
 
@@ -167,15 +161,12 @@ TEST(Outlines, LobesTheOtherWayTakeNothingFromOtherParts) {
   EXPECT_EQ(mask_of(bow, {4, 4}), drawn({"...#", "#.##", "#.##", "...#"}));
 }
 
-TEST(Outlines, FarCornersAreCutOff) {
+TEST(Outlines, FarCornersAreCutOffAndRingsFilledByTurns) {
   for (const double far : {3e9, 3e38}) {
     EXPECT_EQ(mask_of({{{{0, 0}, {1, 0}, {1, far}, {0, far}}}}, {2, 2}), drawn({"#.", "#."}));
     EXPECT_EQ(mask_of({{{{0, -far}, {1, -far}, {1, far}, {0, far}}}}, {2, 2}), drawn({"#.", "#."}));
     EXPECT_EQ(mask_of({{{{0, far}, {1, far}, {1, 2 * far}}}}, {2, 2}), drawn({"..", ".."}));
   }
-}
-
-TEST(Outlines, AreFilledByTurns) {
   const std::vector<Point> twice = chained({square(0, 0), square(0, 0)});
   EXPECT_EQ(mask_of({{twice}}, {2, 2}), drawn({"##", "##"}));
   EXPECT_EQ(mask_of({{twice}}, {2, 2}, FillRule::kByTurns), drawn({"..", ".."}));

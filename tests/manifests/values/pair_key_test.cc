@@ -14,11 +14,8 @@ double threshold(std::array<double, 2> range, const PairKey& key) {
   return pair_threshold(spec, key).value().mean;
 }
 
-TEST(PairThreshold, IsNoneUnlessTold) {
+TEST(PairThreshold, IsNoneUnlessToldAndOfOneNumberThatNumber) {
   EXPECT_EQ(pair_threshold({}, {1, "mpii", "a"}), std::nullopt);
-}
-
-TEST(PairThreshold, OfOneNumberIsThatNumber) {
   for (const double told : {0.01, 0.25, 0.3, 5.0}) {
     EXPECT_EQ(threshold({told, told}, {1, "mpii", "a"}), told);
   }

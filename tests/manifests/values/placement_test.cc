@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "manifests/values/counter_random.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -20,32 +21,23 @@ ImageSpec spec_of(std::optional<ImageSize> volume, ImageFit fit) {
   return spec;
 }
 
-TEST(Placement, StretchFillsTheVolume) {
+TEST(Placement, FitsAsTheKindOfFitSays) {
   const Placement placement = place({375, 1242}, spec_of(ImageSize{260, 861}, ImageFit::kStretch));
   EXPECT_EQ(placement, (Placement{{375, 1242}, {260, 861}, {260, 861}, 0, 0}));
   EXPECT_DOUBLE_EQ(placement.scale_x(), 861.0 / 1242);
   EXPECT_DOUBLE_EQ(placement.scale_y(), 260.0 / 375);
-}
-
-TEST(Placement, LetterboxFits) {
   // 100 x 50 into 64 x 64: 64/100 < 64/50, so 64 wide and 50 * 0.64 = 32 high; (64 - 32)/2 above.
   EXPECT_EQ(place({50, 100}, spec_of(ImageSize{64, 64}, ImageFit::kLetterbox)),
             (Placement{{50, 100}, {32, 64}, {64, 64}, 0, 16}));
   // 50 x 100 the other way round; 31 rows left over of 63: floor(31/2) = 15 in front.
   EXPECT_EQ(place({100, 50}, spec_of(ImageSize{64, 63}, ImageFit::kLetterbox)),
             (Placement{{100, 50}, {64, 32}, {64, 63}, 15, 0}));
-}
-
-TEST(Placement, CropCovers) {
   // 100 x 50 over 64 x 64: 64/50 = 1.28, so 128 x 64; half of 64 columns over on each side.
   EXPECT_EQ(place({50, 100}, spec_of(ImageSize{64, 64}, ImageFit::kCrop)),
             (Placement{{50, 100}, {64, 128}, {64, 64}, -32, 0}));
   // 51 x 50 over 50 x 50: one column over; floor(-1/2) = -1, so the left one is cut.
   EXPECT_EQ(place({50, 51}, spec_of(ImageSize{50, 50}, ImageFit::kCrop)),
             (Placement{{50, 51}, {50, 51}, {50, 50}, -1, 0}));
-}
-
-TEST(Placement, SidesAreRoundedToTheNearestPixel) {
   // 3 x 2 pixels to a width of 64: 2 * 64/3 = 42.67 rows; 4 x 1 to 10: 2.5, halves up.
   EXPECT_EQ(place({2, 3}, spec_of(ImageSize{64, 64}, ImageFit::kLetterbox)).scaled,
             (ImageSize{43, 64}));
@@ -53,12 +45,17 @@ TEST(Placement, SidesAreRoundedToTheNearestPixel) {
             (ImageSize{3, 10}));
 }
 
-TEST(Placement, WithoutSizeTheImageKeepsItsOwn) {
+TEST(Placement, WithoutSizeOrBoundsKeepsOnePixelAtLeast) {
   for (const ImageFit fit : {ImageFit::kStretch, ImageFit::kLetterbox, ImageFit::kCrop}) {
     const Placement placement = place({375, 1242}, spec_of(std::nullopt, fit));
     EXPECT_EQ(placement, (Placement{{375, 1242}, {375, 1242}, {375, 1242}, 0, 0}));
     EXPECT_EQ(placement.source_to_volume(), (std::array<double, 6>{1, 0, 0, 0, 1, 0}));
   }
+  // 10000 x 1 into 64 x 64: 0.0064 rows, but an image has at least one.
+  EXPECT_EQ(place({1, 10000}, spec_of(ImageSize{64, 64}, ImageFit::kLetterbox)),
+            (Placement{{1, 10000}, {1, 64}, {64, 64}, 0, 31}));
+  EXPECT_EQ(place({1, 1}, spec_of(ImageSize{64, 32}, ImageFit::kCrop)),
+            (Placement{{1, 1}, {64, 64}, {64, 32}, -16, 0}));
 }
 
 TEST(Placement, MapsPointsAndEdgesByTheEquations) {
@@ -69,31 +66,21 @@ TEST(Placement, MapsPointsAndEdgesByTheEquations) {
   EXPECT_EQ(placement.source_to_volume(), (std::array<double, 6>{2, 0, 10.5, 0, 2, 0.5}));
 }
 
-TEST(Placement, ShapesWithoutBoundsKeepOnePixel) {
-  // 10000 x 1 into 64 x 64: 0.0064 rows, but an image has at least one.
-  EXPECT_EQ(place({1, 10000}, spec_of(ImageSize{64, 64}, ImageFit::kLetterbox)),
-            (Placement{{1, 10000}, {1, 64}, {64, 64}, 0, 31}));
-  EXPECT_EQ(place({1, 1}, spec_of(ImageSize{64, 32}, ImageFit::kCrop)),
-            (Placement{{1, 1}, {64, 64}, {64, 32}, -16, 0}));
-}
-
-TEST(Placement, HugeImagesDoNotOverflow) {
+TEST(Placement, HugeImagesDoNotOverflowAndNothingIsPlacedNowhere) {
   constexpr int kMost = std::numeric_limits<int>::max();
   EXPECT_EQ(place({kMost, kMost}, spec_of(ImageSize{8192, 8192}, ImageFit::kLetterbox)).scaled,
             (ImageSize{8192, 8192}));
   EXPECT_EQ(place({kMost, kMost}, spec_of(std::nullopt, ImageFit::kCrop)).scaled,
             (ImageSize{kMost, kMost}));
   // 1 x 2^31 over 8192 x 8192 would be 2^44 pixels high.
-  EXPECT_THROW(place({kMost, 1}, spec_of(ImageSize{8192, 8192}, ImageFit::kCrop)),
-               std::invalid_argument);
-}
-
-TEST(Placement, NothingIsPlacedNowhere) {
-  EXPECT_THROW(place({0, 10}, spec_of(ImageSize{64, 64}, ImageFit::kStretch)),
-               std::invalid_argument);
-  EXPECT_THROW(place({10, -1}, ImageSpec{}), std::invalid_argument);
-  EXPECT_THROW(place({10, 10}, spec_of(ImageSize{0, 64}, ImageFit::kStretch)),
-               std::invalid_argument);
+  EXPECT_THROWS(place({kMost, 1}, spec_of(ImageSize{8192, 8192}, ImageFit::kCrop)),
+                std::invalid_argument, "expected a scaled image of at most 2147483647 pixels a");
+  EXPECT_THROWS(place({0, 10}, spec_of(ImageSize{64, 64}, ImageFit::kStretch)),
+                std::invalid_argument, "expected a source image of at least 1x1 pixels, got 10x0");
+  EXPECT_THROWS(place({10, -1}, ImageSpec{}), std::invalid_argument,
+                "expected a source image of at least 1x1 pixels, got -1x10");
+  EXPECT_THROWS(place({10, 10}, spec_of(ImageSize{0, 64}, ImageFit::kStretch)),
+                std::invalid_argument, "expected a volume of at least 1x1 pixels, got 64x0");
 }
 
 /// What must hold of every placement, whatever the sizes.
@@ -207,11 +194,15 @@ TEST(StillPlacement, TheWholeImagesPlaceInTheVolumeIsKept) {
 
 TEST(StillPlacement, MotionsThatLeaveLessThanHalfAreRefused) {
   EXPECT_NO_THROW(place({16, 16}, {}, still({.x_px = 4})));
-  EXPECT_THROW(place({16, 16}, {}, still({.x_px = 4.01})), std::invalid_argument);
-  EXPECT_THROW(place({16, 16}, {}, still({.x_px = 100})), std::invalid_argument);
-  EXPECT_THROW(place({1, 1}, {}, still({.y_px = 0.1})), std::invalid_argument);
-  EXPECT_THROW(place({16, 16}, {}, still({.angle_deg = 180, .scale = 0.4}, 0)),
-               std::invalid_argument);
+  EXPECT_THROWS(place({16, 16}, {}, still({.x_px = 4.01})), std::invalid_argument,
+                "expected a motion after which half of each side can be seen");
+  EXPECT_THROWS(place({16, 16}, {}, still({.x_px = 100})), std::invalid_argument,
+                "expected a motion after which half of each side can be seen");
+  EXPECT_THROWS(place({1, 1}, {}, still({.y_px = 0.1})), std::invalid_argument,
+                "expected a motion after which half of each side can be seen");
+  EXPECT_THROWS(place({16, 16}, {}, still({.angle_deg = 180, .scale = 0.4}, 0)),
+                std::invalid_argument,
+                "expected a motion after which half of each side can be seen");
   EXPECT_NO_THROW(place({16, 16}, {}, still({.angle_deg = 180}))) << "upside down, but all there";
 }
 

@@ -66,38 +66,32 @@ TEST(SensorInput, RisesByThePositiveThresholdAndFallsByTheNegativeOne) {
   EXPECT_NEAR(change(140, 100, {0.5, 4}), -step / 10, 1e-6);
   EXPECT_NEAR(change(100, 140, {0.5, 0.25}), step / 10, 1e-6);
   EXPECT_NEAR(change(140, 100, {0.5, 0.25}), -step / 2.5, 1e-6);
+  for (const int level : {0, 7, 255}) EXPECT_EQ(change(level, level, {0.01, 5}), 0) << level;
 }
 
-TEST(SensorInput, IsNoMoreThanTenThresholds) {
+TEST(SensorInput, IsNoMoreThanTenThresholdsOfWholeGreyLevels) {
   // From black to white ln(1.02 / 0.02) = 3.93: 39 thresholds of 0.1.
   EXPECT_EQ(change(0, 255, {0.1}), 1);
   EXPECT_EQ(change(255, 0, {0.1}), -1);
   EXPECT_LT(change(0, 255, {0.4}), 1);
   EXPECT_EQ(change(0, 255, {1e-300}), 1);
-}
-
-TEST(SensorInput, OfEqualFramesIsZero) {
-  for (const int level : {0, 7, 255}) EXPECT_EQ(change(level, level, {0.01, 5}), 0) << level;
-}
-
-TEST(SensorInput, RoundsToTheNearestGreyLevelAndKeepsInRange) {
   EXPECT_EQ(change(100, 140.4, {0.5}), change(100, 140, {0.5}));
   EXPECT_EQ(change(100, 139.6, {0.5}), change(100, 140, {0.5}));
   EXPECT_EQ(change(-3, 300, {0.5}), change(0, 255, {0.5}));
   const float infinity = std::numeric_limits<float>::infinity();
   EXPECT_EQ(sensor_input(std::vector{-infinity, infinity}, {0.5})[2], change(0, 255, {0.5}));
+  EXPECT_TRUE(sensor_input({}, {0.2}).empty());
 }
 
 TEST(SensorInput, OfAPixelThatIsNotANumberIsNone) {
-  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float nan = std::nanf("");
   const std::vector<float> planes =
       sensor_input(std::vector{nan, 0.0f, 0.0f, 0.0f, nan, 0.0f}, {0.2});
-  EXPECT_TRUE(std::isnan(planes[0]) && std::isnan(planes[4]));
-  EXPECT_TRUE(std::isnan(planes[6]) && std::isnan(planes[7]));
+  for (std::size_t i = 0; i < 9; ++i) {
+    EXPECT_EQ(std::isnan(planes[i]), i == 0 || i == 4 || i == 6 || i == 7) << i;
+  }
   EXPECT_EQ(planes[8], 0);
 }
-
-TEST(SensorInput, OfNothingIsEmpty) { EXPECT_TRUE(sensor_input({}, {0.2}).empty()); }
 
 }  // namespace
 }  // namespace eventgan

@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/testing/texts.h"
+
 namespace eventgan {
 namespace {
 
@@ -40,7 +42,8 @@ TEST(StillMotion, MapsAreComposedAndInverted) {
     expect_near(mapped(compose(a, b), p), mapped(a, mapped(b, p)));
     expect_near(mapped(inverse(a), mapped(a, p)), p);
   }
-  EXPECT_THROW(inverse({1, 2, 0, 2, 4, 0}), std::invalid_argument);
+  EXPECT_THROWS(inverse({1, 2, 0, 2, 4, 0}), std::invalid_argument,
+                "expected a map that has an inverse");
 }
 
 TEST(StillMotion, LeadsToTheLabelledImage) {

@@ -10,9 +10,12 @@
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/convert.h"
 #include "tests/pipeline/conversion/small_conversion.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
+
+using testing::texts_with;
 
 /// 11 pairs in 6 shards; "whole" holds what one worker makes of them.
 class ConvertParts : public testing::SmallConversion {
@@ -117,8 +120,7 @@ TEST_F(ConvertParts, OverwritingIsNotForAPart) {
   ConversionOptions overwriting = options();
   overwriting.overwrite = true;
   overwriting.part = {1, 6, "SLURM_ARRAY_TASK_ID"};
-  EXPECT_THAT([&] { run(overwriting); },
-              ::testing::ThrowsMessage<UsageError>(::testing::HasSubstr("SLURM_ARRAY_TASK_ID")));
+  EXPECT_THROWS(run(overwriting), UsageError, "SLURM_ARRAY_TASK_ID");
   EXPECT_EQ(shards().size(), 1u);
 }
 
@@ -168,8 +170,8 @@ TEST_F(ConvertParts, IsNotCompleteIfAShardWentMissingMeanwhile) {
   const ConversionReport report = convert(manifest_, Deleting(generator_, first), "weights", rest);
   EXPECT_FALSE(report.complete());
   EXPECT_FALSE(report.stopped);
-  EXPECT_THAT(report.lost, ::testing::ElementsAre(::testing::HasSubstr(first.string())));
-  EXPECT_THAT(warnings, ::testing::ElementsAre(::testing::HasSubstr("run again")));
+  EXPECT_THAT(report.lost, texts_with({first.string()}));
+  EXPECT_THAT(warnings, texts_with({"run again"}));
   EXPECT_TRUE(run().complete());
   EXPECT_EQ(shards(), shards("whole"));
 }

@@ -8,6 +8,7 @@
 #include "pipeline/conversion/convert.h"
 #include "pipeline/dataset/verify_folder.h"
 #include "tests/pipeline/conversion/small_conversion.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -135,7 +136,7 @@ TEST_F(ConvertStop, ARequestWhilePlanningWritesNothing) {
   request.make();
   ConversionOptions stopping = options();
   stopping.since_stop_request = request.since();
-  EXPECT_THROW(run(stopping), Stopped);
+  EXPECT_THROWS(run(stopping), Stopped, "stopped while planning; nothing was written: run again");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 

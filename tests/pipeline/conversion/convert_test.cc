@@ -21,10 +21,12 @@
 #include "tests/pipeline/conversion/small_conversion.h"
 #include "tests/testing/hdf5_file.h"
 #include "tests/testing/image_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
 
+using testing::texts_with;
 namespace fs = std::filesystem;
 
 using Convert = testing::SmallConversion;
@@ -162,9 +164,9 @@ TEST_F(Convert, WarnsOnceOfVolumesBeyondTheCalibration) {
   telling.warn = [&](const std::string& text) { warnings.push_back(text); };
   generator_.saturate(0.25);
   run(telling);
-  EXPECT_THAT(warnings, ::testing::ElementsAre(::testing::HasSubstr(
-                            "got 11 of 11 volumes with more than 0.05 % of them clipped, the worst "
-                            "with 25 % (")));
+  EXPECT_THAT(warnings,
+              texts_with({"got 11 of 11 volumes with more than 0.05 % of them clipped, the worst "
+                          "with 25 % ("}));
 }
 
 TEST_F(Convert, DoesNotDependOnTheOrderOfTheFileSystem) {
@@ -210,15 +212,14 @@ TEST_F(Convert, LeavesAWholeFolderUntouched) {
 
   testing::write_file(out("run.json"), R"({"manifest_folder": "not absolute"})");
   run(listening);
-  EXPECT_THAT(told, ::testing::ElementsAre(::testing::HasSubstr("run.json: the manifest is now")));
+  EXPECT_THAT(told, texts_with({"run.json: the manifest is now"}));
   EXPECT_EQ(recorded_manifest_folder(folder_ / "out"), manifest_.directory);
 }
 
 TEST_F(Convert, RefusesAFolderOfAnotherPlanUnlessToldToOverwrite) {
   run();
   change(R"("samples_per_shard": 4)", R"("samples_per_shard": 11)");
-  EXPECT_THAT([&] { run(); }, ::testing::ThrowsMessage<UsageError>(::testing::HasSubstr(
-                                  "manifest $.output.samples_per_shard: expected 4, got 11")));
+  EXPECT_THROWS(run(), UsageError, "manifest $.output.samples_per_shard: expected 4, got 11");
   EXPECT_EQ(shards("out").size(), 3u);
   run("out", 2, /*overwrite=*/true);
   EXPECT_EQ(shards("out").size(), 1u);
@@ -266,11 +267,9 @@ TEST_F(Convert, RefusesAPlanThatSomeoneAltered) {
   std::string text = testing::read_file(folder_ / "out" / "plan.json");
   text.replace(text.find("f_10.png"), 8, "f_11.png");
   testing::write_file(folder_ / "out" / "plan.json", text);
-  EXPECT_THAT([&] { run(); },
-              ::testing::ThrowsMessage<UsageError>(::testing::HasSubstr("altered")));
+  EXPECT_THROWS(run(), UsageError, "altered");
   testing::write_file(folder_ / "out" / "plan.json", text.substr(0, 60));
-  EXPECT_THAT([&] { run(); }, ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr(
-                                  "expected a whole plan, got a damaged one")));
+  EXPECT_THROWS(run(), std::runtime_error, "expected a whole plan, got a damaged one");
   EXPECT_EQ(run("out", 2, /*overwrite=*/true).written, 11);
 }
 
@@ -325,8 +324,7 @@ TEST_F(Convert, TheFractionIsOfTheWholePlan) {
 TEST_F(Convert, PolicyFailEndsAtTheFirstFaultAndLeavesNoPartOfAShard) {
   testing::write_file(image(6), "");
   manifest_.errors.policy = ErrorPolicy::kFail;
-  EXPECT_THAT([&] { run(); },
-              ::testing::ThrowsMessage<TooManyFaults>(::testing::HasSubstr("clip/f_16.png")));
+  EXPECT_THROWS(run(), TooManyFaults, "clip/f_16.png");
   EXPECT_THAT(names("out"),
               ::testing::ElementsAre("job-train-00000-of-00003.h5", "job-train-00000-of-00003.json",
                                      "plan.json", "run.json"));
@@ -342,8 +340,7 @@ TEST_F(Convert, AVolumeThatIsNotFiniteIsQuarantined) {
 
 TEST_F(Convert, AFolderThatCannotBeWrittenIsAnErrorThatNamesIt) {
   testing::write_file(folder_ / "file", "");
-  EXPECT_THAT([&] { run("file/out"); }, ::testing::ThrowsMessage<std::runtime_error>(
-                                            ::testing::HasSubstr((folder_ / "file/out").string())));
+  EXPECT_THROWS(run("file/out"), std::runtime_error, (folder_ / "file/out").string());
 }
 
 TEST_F(Convert, ShowsProgressOfEveryPair) {
@@ -391,7 +388,7 @@ TEST_F(Convert, TheSameManifestGoesWithEveryKindOfGenerator) {
 
   // A folder of one kind is not resumed by another.
   change(R"({ "weights": "untrained:1" })", R"({ "kind": "esim" })");
-  EXPECT_THROW(run("network"), UsageError);
+  EXPECT_THROWS(run("network"), UsageError, "plan.json was frozen by a run");
 }
 
 /// Six labelled KITTI images, each with three frames before it.

@@ -68,15 +68,17 @@ TEST_F(PlanSummary, CountsStills) {
   EXPECT_THAT(plan_text(manifest_, job_, estimate_, 2), ::testing::HasSubstr("no paired frame"));
 }
 
-TEST_F(PlanSummary, SaysWhenThereIsNoEstimate) {
+TEST_F(PlanSummary, SaysWhatIsEstimatedAndWhatIsMissing) {
   EXPECT_THAT(plan_text(manifest_, job_, {}, 1), ::testing::HasSubstr("no pair could be measured"));
-}
-
-TEST_F(PlanSummary, SaysThatADeviceIsFasterThanItsTrial) {
   manifest_.generator.device = Device::kCuda;
   EXPECT_THAT(
       plan_text(manifest_, job_, estimate_, 2),
       ::testing::HasSubstr("measured on 2 pairs one by one; the device is faster in batches)\n"));
+  job_.plan.sources[0].unpaired_ids = {};
+  job_.unpaired_by_gap = {{}};
+  EXPECT_THAT(plan_text(manifest_, job_, {}, 1),
+              ::testing::HasSubstr(
+                  "  no paired frame  0 of 24 possible pairs (labelled frames x gaps)\n  to "));
 }
 
 TEST_F(PlanSummary, JsonHasTheSameNumbers) {
@@ -99,14 +101,6 @@ TEST_F(PlanSummary, OfOneGapAFrameItNamesThoseThatGiveNoPair) {
               ::testing::HasSubstr("  no paired frame  9 of 24 possible pairs (labelled frames x "
                                    "gaps)  (gap 1: 3, gap 3: 6)\n"
                                    "  no pair at all   2 of 12 labelled frames  (a, b)\n"));
-}
-
-TEST_F(PlanSummary, SaysThatNothingIsMissing) {
-  job_.plan.sources[0].unpaired_ids = {};
-  job_.unpaired_by_gap = {{}};
-  EXPECT_THAT(plan_text(manifest_, job_, {}, 1),
-              ::testing::HasSubstr(
-                  "  no paired frame  0 of 24 possible pairs (labelled frames x gaps)\n  to "));
 }
 
 TEST(MeasureTrial, ScalesAFewPairsToTheWholePlan) {

@@ -109,13 +109,10 @@ TEST(AddShard, CountsItsCommitRecord) {
   EXPECT_EQ(sum.volume_bytes, 9'000'070);
 }
 
-TEST(ReportText, CountsWhatItDoesNotList) {
+TEST(ReportText, CountsWhatItDoesNotListAndOfNothingHasNoRatio) {
   ConversionReport many = report();
   many.quarantined.assign(25, many.quarantined[0]);
   EXPECT_THAT(to_text(many), ::testing::HasSubstr("... and 5 more"));
-}
-
-TEST(ReportText, OfAnEmptyRunHasNoRatioOfNothing) {
   EXPECT_THAT(to_text(ConversionReport{}), ::testing::HasSubstr("compressed 0.0x"));
 }
 
@@ -150,37 +147,28 @@ TEST(RetryText, SaysWhatWasMendedAndWhatIsLeft) {
             "samples\n"
             "quarantined: expected an image (000007)\n"
             "/out\n");
-}
-
-TEST(RetryText, SaysThatThereIsNothingToDo) {
   RetryReport report;
   report.folder = "/out";
   EXPECT_EQ(to_text(report),
             "nothing to retry: no sample of a committed shard is quarantined\n/out\n");
+  report = example();
+  report.failed.resize(1000, report.failed[0]);
+  EXPECT_THAT(to_text(report), HasSubstr("... and 980 more"));
 }
 
-TEST(RetryText, SaysThatChangedInputsWereRecorded) {
+TEST(RetryText, SaysThatInputsChangedOrThatItWasStopped) {
   RetryReport report;
   report.changed_inputs = {"annotations", "frames"};
   EXPECT_THAT(
       to_text(report),
       HasSubstr("inputs changed since the plan was frozen (annotations, frames): recorded"));
   EXPECT_EQ(nlohmann::json::parse(to_json(report))["changed_inputs"].size(), 2u);
-}
-
-TEST(RetryText, SaysThatItWasStoppedAndThatTheDatasetIsOutdated) {
-  RetryReport report = example();
+  report = example();
   EXPECT_THAT(to_text(report), Not(HasSubstr("stopped")));
   report.stopped = true;
   report.dataset_outdated = true;
   EXPECT_THAT(to_text(report), HasSubstr("run again"));
   EXPECT_THAT(to_text(report), HasSubstr("eventgan finalize"));
-}
-
-TEST(RetryText, OfVeryManyTellsTheFirst) {
-  RetryReport report = example();
-  report.failed.resize(1000, report.failed[0]);
-  EXPECT_THAT(to_text(report), HasSubstr("... and 980 more"));
 }
 
 TEST(RetryJson, HasEveryField) {

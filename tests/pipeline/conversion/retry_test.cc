@@ -24,16 +24,16 @@
 #include "tests/testing/image_file.h"
 #include "tests/testing/small_job.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
 
+using testing::texts_with;
 namespace fs = std::filesystem;
-using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using ::testing::ThrowsMessage;
 
 /// 12 frames, so 11 pairs in shards of 4, 4 and 3; pair k is of the frames k and k + 1.
 class Retry : public ::testing::Test {
@@ -152,7 +152,7 @@ TEST_F(Retry, LaterRunsAcceptTheMendedInputs) {
   spoil(5);
   run();
   mend(5);
-  EXPECT_THROW(run(), UsageError) << "inputs have changed";
+  EXPECT_THROWS(run(), UsageError, "plan.json was frozen by a run") << "inputs have changed";
   again();
   const auto amendments = read_amendments(out_, read_frozen_plan(out_).hash);
   ASSERT_EQ(amendments.size(), 1u);
@@ -217,9 +217,9 @@ TEST_F(Retry, NothingToDoIsSaid) {
 TEST_F(Retry, ChangedInputsAreRecordedWhereNothingIsQuarantined) {
   manifest_.errors = {ErrorPolicy::kFail, 0, 0};
   spoil(5);
-  EXPECT_THROW(run(), TooManyFaults);
+  EXPECT_THROWS(run(), TooManyFaults, "errors.policy is \"fail\": expected an image (JPEG, PNG");
   mend(5);
-  EXPECT_THROW(run(), UsageError) << "inputs have changed";
+  EXPECT_THROWS(run(), UsageError, "plan.json was frozen by a run") << "inputs have changed";
   const auto nothing = look();
   ASSERT_TRUE(nothing);
   EXPECT_THAT(nothing->changed_inputs, ElementsAre("frames"));
@@ -234,7 +234,7 @@ TEST_F(Retry, ChangedInputsOfAPlanThatWasOnlyFrozenAreRecorded) {
   freeze_plan(out_, make_plan(manifest_, "weights", generator_.description()).plan);
   record_manifest_folder(out_, manifest_);
   spoil(5);
-  EXPECT_THROW(run(), UsageError);
+  EXPECT_THROWS(run(), UsageError, "plan.json was frozen by a run");
   ASSERT_TRUE(look());
   EXPECT_EQ(run().quarantined.size(), 2u);
   EXPECT_FALSE(look()) << "samples to redo";
@@ -243,9 +243,9 @@ TEST_F(Retry, ChangedInputsOfAPlanThatWasOnlyFrozenAreRecorded) {
 TEST_F(Retry, AMissingFrameThatWasAddedBeforeItsShardWasMadeIsConverted) {
   manifest_.errors = {ErrorPolicy::kFail, 0, 0};
   fs::remove(image(5));
-  EXPECT_THROW(run(), TooManyFaults);
+  EXPECT_THROWS(run(), TooManyFaults, "errors.policy is \"fail\": expected a frame, got no file");
   mend(5);
-  EXPECT_THROW(run(), UsageError) << "inputs have changed";
+  EXPECT_THROWS(run(), UsageError, "plan.json was frozen by a run") << "inputs have changed";
   ASSERT_TRUE(look());
   const ConversionReport report = run();
   EXPECT_TRUE(report.complete());
@@ -257,7 +257,7 @@ TEST_F(Retry, NothingIsRecordedForAnotherJob) {
   run();
   spoil(5);
   manifest_.text.replace(manifest_.text.find("untrained:1"), 11, "untrained:2");
-  EXPECT_THROW(look(), UsageError);
+  EXPECT_THROWS(look(), UsageError, "expected the job of");
   EXPECT_FALSE(fs::exists(out_ / "amendments.json"));
 }
 
@@ -265,7 +265,7 @@ TEST_F(Retry, MendsASourceOfWhichNoSizeWasKnown) {
   for (int frame = 0; frame < 12; ++frame) spoil(frame);
   const ConversionReport first = run();
   EXPECT_EQ(first.quarantined.size(), 11u);
-  EXPECT_THAT(first.notes, ElementsAre(HasSubstr("size of 11 samples")));
+  EXPECT_THAT(first.notes, texts_with({"size of 11 samples"}));
   finalize(out_, {});
   for (int frame = 0; frame < 6; ++frame) mend(frame);
   for (int frame = 6; frame < 12; ++frame) {
@@ -301,8 +301,7 @@ TEST_F(Retry, AnImageOfUnknownSizeMendedWithinItsBytesIsTaken) {
   ASSERT_EQ(run().quarantined.size(), 3u);  // pairs 4, 5 and 6
   testing::write_file(image(5), sound);
   testing::write_file(image(6), next);
-  EXPECT_THAT([&] { run(); },
-              ::testing::ThrowsMessage<UsageError>(HasSubstr("`eventgan retry` accepts them")));
+  EXPECT_THROWS(run(), UsageError, "`eventgan retry` accepts them");
   EXPECT_EQ(again().mended, 3);
   EXPECT_TRUE(run().complete());
   expect_sound_after_finalize();
@@ -313,14 +312,15 @@ TEST_F(Retry, IsRefusedForAnotherJobWithoutTouchingAnything) {
   run();
   mend(5);
   const auto before = shards("out");
-  EXPECT_THAT([&] { retry(out_, manifest_, generator_, "other weights", options_); },
-              ::testing::ThrowsMessage<UsageError>(
-                  HasSubstr("weights: expected weights, got other weights")));
+  EXPECT_THROWS(retry(out_, manifest_, generator_, "other weights", options_), UsageError,
+                "weights: expected weights, got other weights");
   EXPECT_FALSE(fs::exists(out_ / "amendments.json"));
   EXPECT_EQ(shards("out"), before);
 }
 
-TEST_F(Retry, NeedsAPlan) { EXPECT_THROW(again(), InputError); }
+TEST_F(Retry, NeedsAPlan) {
+  EXPECT_THROWS(again(), InputError, "expected a folder that eventgan convert has written, got no");
+}
 
 TEST_F(Retry, LeavesDamagedAndMissingShardsToConvert) {
   spoil(1);  // pairs 0 and 1 of the first shard
@@ -338,7 +338,7 @@ TEST_F(Retry, LeavesDamagedAndMissingShardsToConvert) {
   EXPECT_EQ(report.mended, 2);
   EXPECT_EQ(report.quarantined, 0);
   EXPECT_EQ(report.shards_missing, 1);
-  EXPECT_THAT(report.damaged_shards, ElementsAre(HasSubstr("job-train-00001-of-00003.h5")));
+  EXPECT_THAT(report.damaged_shards, texts_with({"job-train-00001-of-00003.h5"}));
   EXPECT_EQ(testing::read_file(out_ / "job-train-00001-of-00003.h5"), bytes);
   EXPECT_TRUE(run().complete());
   expect_sound();
@@ -384,7 +384,9 @@ TEST_F(Retry, ARequestToStopStartsNoShard) {
   EXPECT_EQ(report.tried, 0);
   EXPECT_EQ(report.quarantined, 2);
   EXPECT_EQ(shards("out"), before);
-  EXPECT_THROW(again(), Stopped);  // asked before it has planned
+  EXPECT_THROWS(
+      again(), Stopped,
+      "stopped while planning; nothing was written: run again");  // asked before it has planned
   EXPECT_EQ(shards("out"), before);
   options_ = {.threads = 2, .grace_s = 20, .since_stop_request = {}, .make_progress = {}};
   EXPECT_EQ(again().mended, 2);
@@ -425,7 +427,7 @@ TEST_F(Retry, ARequestToStopAmongNewNamesOfClassesIsNoEnd) {
   report = again();
   EXPECT_FALSE(report.stopped);
   EXPECT_EQ(report.shards_renamed, 1);
-  EXPECT_THAT(report.damaged_shards, ElementsAre(HasSubstr("job-train-00001-of-00003.h5")));
+  EXPECT_THAT(report.damaged_shards, texts_with({"job-train-00001-of-00003.h5"}));
   EXPECT_TRUE(run().complete());
   for (const int shard : {0, 1, 2}) EXPECT_THAT(names_in(shard), ElementsAre("car", "bike"));
 }
@@ -436,9 +438,8 @@ TEST_F(Retry, OfTwoAtOnceTheSecondIsRefused) {
   mend(5);
   const RunOptions others = options_;
   options_.make_progress = [&](std::int64_t) {
-    EXPECT_THAT([&] { retry(out_, manifest_, generator_, "weights", others); },
-                ThrowsMessage<std::runtime_error>(
-                    AllOf(HasSubstr("without another retry"), HasSubstr(out_.string()))));
+    EXPECT_THROWS(retry(out_, manifest_, generator_, "weights", others), std::runtime_error,
+                  "without another retry", out_.string());
     return nullptr;
   };
   EXPECT_EQ(again().mended, 2);

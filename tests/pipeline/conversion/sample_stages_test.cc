@@ -16,6 +16,7 @@
 #include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -410,15 +411,12 @@ TEST_F(NoiseTest, IsAddedOverTheGapOrElseTheDuration) {
   EXPECT_NEAR(events(), 1000 * 0.2 * 24, 5 * std::sqrt(4800));
 }
 
-TEST_F(NoiseTest, OfNoRateChangesNoByte) {
+TEST_F(NoiseTest, OfNoRateChangesNoByteAndMakesAStillSceneEventful) {
   const SampleMessage without = run();
   manifest_.generator.noise = NoiseSpec();
   const SampleMessage with = run();
   EXPECT_EQ(with.chunk, without.chunk);
   EXPECT_EQ(with.sample.statistics.flags, 0u);
-}
-
-TEST_F(NoiseTest, MakesAStillSceneEventful) {
   stand_still();
   manifest_.generator.noise = kShotNoise;
   const SampleMessage message = run();
@@ -529,9 +527,8 @@ TEST_F(SampleStagesTest, WhereMemoryIsShortTheSampleAndItsFramesAreNamed) {
   SampleMessage message;
   message.shard = &shard_;
   stages.read(message);
-  EXPECT_THAT([&] { stages.generate(message); },
-              ::testing::ThrowsMessage<std::runtime_error>(
-                  ::testing::HasSubstr("of 6x4, in clip/0000.png and clip/0001.png (0001)")));
+  EXPECT_THROWS(stages.generate(message), std::runtime_error,
+                "of 6x4, in clip/0000.png and clip/0001.png (0001)");
 }
 
 TEST_F(SampleStagesTest, AFrameThatCannotBeReadKeepsTheOriginalLabel) {

@@ -18,6 +18,7 @@
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -26,6 +27,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::names_in;
+using testing::texts_with;
 
 /// A folder of three whole shards that tests damage.
 class EarlierShardsTest : public testing::SmallConversion {
@@ -83,8 +85,7 @@ TEST_F(EarlierShardsTest, AnyDamageIsLeftAndNamed) {
   EXPECT_THAT(earlier.done, IsEmpty());
   EXPECT_THAT(earlier.left, ElementsAre(all_[0], all_[1], all_[2]));
   EXPECT_THAT(earlier.faults,
-              ElementsAre(HasSubstr(shard(0).string()), HasSubstr(shard(1).stem().string()),
-                          HasSubstr(shard(2).string())));
+              texts_with({shard(0).string(), shard(1).stem().string(), shard(2).string()}));
   // Only its bytes tell.
   EXPECT_THAT(earlier.distrusted, ElementsAre(::testing::Pair(all_[0]->name, "")));
 }
@@ -117,9 +118,8 @@ TEST_F(EarlierShardsTest, ACommitRecordWithCountsThatAreNotTheShardsIsNamedAndMa
   testing::write_file(record(0), to_json(wrong));
   const EarlierShards earlier = check();
   EXPECT_THAT(earlier.left, ElementsAre(all_[0]));
-  EXPECT_THAT(earlier.faults, ElementsAre(::testing::AllOf(HasSubstr(record(0).string()),
-                                                           HasSubstr("expected samples by gap "),
-                                                           HasSubstr("got 6: "))));
+  EXPECT_THAT(earlier.faults,
+              texts_with({{record(0).string(), "expected samples by gap ", "got 6: "}}));
   const ConversionReport report = run();
   EXPECT_TRUE(report.complete());
   EXPECT_EQ(report.shards_done_before, 2);
@@ -127,15 +127,12 @@ TEST_F(EarlierShardsTest, ACommitRecordWithCountsThatAreNotTheShardsIsNamedAndMa
   EXPECT_THAT(check().left, IsEmpty());
 }
 
-TEST_F(EarlierShardsTest, ARequestToStopLeavesTheRestOut) {
-  const EarlierShards earlier =
+TEST_F(EarlierShardsTest, OfNoShardsOrAfterARequestToStopAreNone) {
+  EarlierShards earlier =
       check_earlier_shards(folder_ / "out", frozen_, all_, {1, [] { return true; }, {}});
   EXPECT_THAT(earlier.done, IsEmpty());
   EXPECT_THAT(earlier.faults, IsEmpty());  // not looked at is not damaged
-}
-
-TEST_F(EarlierShardsTest, OfNoShardsAreNone) {
-  const EarlierShards earlier = check_earlier_shards(folder_ / "out", frozen_, {}, {4, {}, {}});
+  earlier = check_earlier_shards(folder_ / "out", frozen_, {}, {4, {}, {}});
   EXPECT_THAT(earlier.done, IsEmpty());
   EXPECT_THAT(earlier.left, IsEmpty());
 }
@@ -288,7 +285,8 @@ TEST_F(ShardSinkTest, PolicyFailThrowsAtTheFirst) {
   manifest_.errors.policy = ErrorPolicy::kFail;
   open_sink();
   EXPECT_TRUE(accept(frozen_.plan.shards[0], 0));
-  EXPECT_THROW(accept(frozen_.plan.shards[0], 1, false), TooManyFaults);
+  EXPECT_THROWS(accept(frozen_.plan.shards[0], 1, false), TooManyFaults,
+                "errors.policy is \"fail\": expected a frame, got none");
   sink_.reset();
   EXPECT_THAT(names_in(folder_.path()), IsEmpty());
 }
@@ -298,7 +296,8 @@ TEST_F(ShardSinkTest, AFileLostUnderWayIsAnErrorUnlessAnotherHasMadeTheShard) {
   open_sink();
   accept(a, 0);
   std::filesystem::remove(folder_ / names_in(folder_.path()).at(0));
-  EXPECT_THROW(accept(a, 1), UnfinishedShardLost);
+  EXPECT_THROWS(accept(a, 1), UnfinishedShardLost,
+                "expected the file that was being written, got nothing");
   sink_->abandon();
   EXPECT_THAT(names_in(folder_.path()), IsEmpty());
 

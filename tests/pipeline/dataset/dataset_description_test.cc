@@ -7,6 +7,7 @@
 
 #include "manifests/values/faults.h"
 #include "tests/pipeline/dataset/converted_folder.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -88,7 +89,7 @@ TEST(DatasetViews, ShardsThatAreAlikeAreOneViewAtTheRoot) {
               ElementsAre(SplitRange{"train", {0, 2}}, SplitRange{"val", {2, 1}}));
 }
 
-TEST(DatasetViews, OtherSizesAndOtherDatasetsAreOtherViews) {
+TEST(DatasetViews, OtherSizesDatasetsAndSchemasAreOtherViews) {
   DatasetParts parts = three_sources();
   add_shard(parts, "a", 0, {375, 1242});
   add_shard(parts, "b", 0, {370, 1224});
@@ -97,17 +98,13 @@ TEST(DatasetViews, OtherSizesAndOtherDatasetsAreOtherViews) {
   EXPECT_THAT(groups_of(parts),
               ElementsAre("kitti_object-375x1242", "kitti_object-370x1224", "mpii-375x1242"));
   EXPECT_EQ(views_of(parts)[0].layout.sample_count(), 2);
-}
-
-TEST(DatasetViews, OtherSchemasAreOtherViews) {
-  DatasetParts parts = three_sources();
+  parts = three_sources();
   parts.headers[1].label_schema.class_names = {"Van", "Car"};
   add_shard(parts, "a", 0, {4, 4});
   add_shard(parts, "b", 1, {4, 4});
   EXPECT_THAT(groups_of(parts), ElementsAre("kitti_object-4x4", "kitti_object-4x4-2"));
+  EXPECT_THAT(groups_of(three_sources()), ElementsAre());
 }
-
-TEST(DatasetViews, NoShardsNoViews) { EXPECT_THAT(groups_of(three_sources()), ElementsAre()); }
 
 nlohmann::json description_of(const ConvertedFolder& folder) {
   const DatasetParts parts = parts_of(folder);
@@ -165,7 +162,7 @@ TEST(DatasetDescription, CountsInTotalByShardSplitAndDataset) {
                                                {"sha256", record.sha256}}));
 }
 
-TEST(DatasetDescription, NamesQuarantinedSamplesWithTheirReason) {
+TEST(DatasetDescription, NamesQuarantinedSamplesTheViewAndItsSplits) {
   const nlohmann::json text = description_of(ConvertedFolder());
   ASSERT_EQ(text["quarantined"].size(), 3u);
   EXPECT_EQ(text["quarantined"][1],
@@ -173,9 +170,6 @@ TEST(DatasetDescription, NamesQuarantinedSamplesWithTheirReason) {
                             {"shard", "demo-val-00000-of-00001.h5"},
                             {"slot", 2},
                             {"reason", "cannot decode kitti/image_2/000002.png (000002)"}}));
-}
-
-TEST(DatasetDescription, TellsOfTheViewAndItsSplits) {
   const nlohmann::json view = description_of(ConvertedFolder())["view"];
   EXPECT_EQ(view["name"], "dataset.h5");
   EXPECT_EQ(view["sha256"], std::string(64, 'c'));
@@ -186,19 +180,16 @@ TEST(DatasetDescription, TellsOfTheViewAndItsSplits) {
             (nlohmann::json{{"name", "val"}, {"first", 11}, {"rows", 5}}));
 }
 
-TEST(DatasetDescription, OfASourceWithoutShardsTheNamesAreUnknown) {
-  const nlohmann::json text = description_of(ConvertedFolder(1));
+TEST(DatasetDescription, OfASourceWithoutShardsTheNamesAreUnknownAndAmendmentsAreTold) {
+  nlohmann::json text = description_of(ConvertedFolder(1));
   EXPECT_EQ(text["complete"], false);
   EXPECT_EQ(text["missing"].size(), 3u);
   EXPECT_EQ(text["sources"][0]["class_names"], (nlohmann::json{"Car", "DontCare"}));
   EXPECT_EQ(text["sources"][0]["labelled_frames"], 6);
   EXPECT_EQ(text["sources"][1]["class_names"], nlohmann::json());
-}
-
-TEST(DatasetDescription, AmendmentsAreTold) {
   const ConvertedFolder folder;
   record_amendment(folder.path(), folder.plan_hash(), {{{"annotations", "4567"}}, {"000002"}});
-  const nlohmann::json text = description_of(folder);
+  text = description_of(folder);
   EXPECT_EQ(text["fingerprint"]["annotations"], "4567");
   EXPECT_EQ(
       text["amendments"],
@@ -223,10 +214,8 @@ TEST(DatasetText, TellsAPersonWhatThereIs) {
         "demo-val-00000-of-00001.h5, 5 samples, 1 of them quarantined"}) {
     EXPECT_THAT(text, HasSubstr(part));
   }
-}
-
-TEST(DatasetText, WithoutAShardThereIsNothingToTell) {
-  EXPECT_THROW(read_dataset_parts(ConvertedFolder(0).path()), InputError);
+  EXPECT_THROWS(read_dataset_parts(ConvertedFolder(0).path()), InputError,
+                "expected finished shards, got none");
 }
 
 TEST(DatasetDescription, BytesThatAreNoUtf8AreReplaced) {

@@ -5,12 +5,9 @@
 namespace eventgan {
 namespace {
 
-TEST(ExportName, KeepsWhatIsPlain) {
+TEST(ExportName, KeepsWhatIsPlainWithoutFoldersOrDots) {
   EXPECT_EQ(export_name("000012"), "000012");
   EXPECT_EQ(export_name("Ab-9_z@before2"), "Ab-9_z@before2");
-}
-
-TEST(ExportName, HasNoFoldersNorDots) {
   EXPECT_EQ(export_name("S1/Walking-1/7/000006"), "S1+Walking-1+7+000006");
   EXPECT_EQ(export_name("a.b"), "a%2Eb");
   EXPECT_EQ(export_name("a+b c\xc3\xa9"), "a%2Bb%20c%C3%A9");

@@ -13,11 +13,11 @@
 #include "pipeline/folder/output_folder.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
@@ -31,22 +31,13 @@ TEST(FaultKind, IsWhatIsWrongWithoutWhere) {
   EXPECT_EQ(fault_kind(""), "");
 }
 
-TEST(WorkerRate, IsUnknownBeforeTheFirstCommit) {
+TEST(WorkerRate, IsSamplesASecondWithoutPausesAndWhatIsLongPast) {
   EXPECT_FALSE(worker_rate({}, 3));
   EXPECT_FALSE(
       worker_rate({{1, 10, 0}, {2, 0, 5}}, 1));  // commit records that do not know their time
-}
-
-TEST(WorkerRate, IsSamplesASecond) {
   EXPECT_DOUBLE_EQ(*worker_rate({{1, 10, 5}}, 1), 2);
   EXPECT_DOUBLE_EQ(*worker_rate({{1, 10, 5}, {2, 12, 3}}, 1), 3);  // (2 + 4) / 2
-}
-
-TEST(WorkerRate, APauseDoesNotCount) {
   EXPECT_DOUBLE_EQ(*worker_rate({{1, 10, 5}, {2, 10, 40000}, {3, 10, 5}}, 1), 2);
-}
-
-TEST(WorkerRate, WhatIsLongPastDoesNotCount) {
   std::vector<CommitTiming> timings;
   for (int i = 0; i < 100; ++i) timings.push_back({double(i), 10, i < 80 ? 1.0 : 5.0});
   EXPECT_DOUBLE_EQ(*worker_rate(timings, 1), 2);    // the last 8
@@ -105,8 +96,10 @@ class FolderStatusTest : public ::testing::Test {
 
 TEST_F(FolderStatusTest, NeedsAPlan) {
   std::filesystem::remove(folder_ / "plan.json");
-  EXPECT_THROW(status(), InputError);
-  EXPECT_THROW(folder_status(folder_ / "absent"), InputError);
+  EXPECT_THROWS(status(), InputError,
+                "expected a folder that eventgan convert has written, got no");
+  EXPECT_THROWS(folder_status(folder_ / "absent"), InputError,
+                "expected a folder that eventgan convert has written, got no");
 }
 
 TEST_F(FolderStatusTest, AtTheBeginningEverythingIsMissing) {
@@ -209,8 +202,7 @@ TEST_F(FolderStatusTest, NamesWhatIsDamagedAndCountsItAsMissing) {
   testing::write_file(folder_ / kB, "12345");
   const FolderStatus now = status();
   EXPECT_EQ(now.shards_missing(), 3);
-  EXPECT_THAT(now.damaged,
-              ElementsAre(HasSubstr((folder_ / kA).string()), HasSubstr((folder_ / kB).string())));
+  EXPECT_THAT(now.damaged, testing::texts_with({(folder_ / kA).string(), (folder_ / kB).string()}));
 }
 
 TEST_F(FolderStatusTest, WhatIsMadeAgainIsRunning) {
@@ -289,15 +281,12 @@ TEST(StatusText, TellsWhereARunStands) {
             "  1  expected an image, got none (x, a-00000.h5 slot 3)\n");
 }
 
-TEST(StatusText, TellsOfAFileThatIsDatedAhead) {
+TEST(StatusText, TellsOfAFileThatIsDatedAheadAndWhatItDoesNotKnow) {
   FolderStatus status = half_done();
   status.left_over = {file("a-00006.h5", 5, WriterLife::kUnknown, -9000)};
   EXPECT_THAT(status_text(status),
               HasSubstr("  .a-00006.h5.node7-1.5.0.tmp  unknown  dated 2h30m ahead\n"));
-}
-
-TEST(StatusText, SaysWhatItDoesNotKnow) {
-  FolderStatus status = half_done();
+  status = half_done();
   status.pairs_per_second_of_one.reset();
   EXPECT_THAT(status_text(status), HasSubstr("speed known after the first shard\n"));
   status.writers = 0;

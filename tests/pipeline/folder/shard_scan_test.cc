@@ -9,6 +9,7 @@
 #include "manifests/files/sha256.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -54,7 +55,7 @@ class ShardStateTest : public ::testing::Test {
       EXPECT_EQ(found.condition, condition) << to_string(found.condition);
       EXPECT_FALSE(found.done());
       EXPECT_FALSE(found.record);
-      EXPECT_THAT(found.faults, ElementsAre(HasSubstr(fault)));
+      EXPECT_THAT(found.faults, testing::texts_with({fault}));
     }
   }
 

@@ -16,6 +16,7 @@
 #include "tests/testing/small_job.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -42,17 +43,14 @@ std::vector<std::string> ids(const std::vector<CalibrationSample>& samples, bool
   return result;
 }
 
-TEST(CalibrationSamples, AreSpreadEvenlyAndEveryFifthOfThemIsHeldOut) {
+TEST(CalibrationSamples, AreSpreadEvenlyWithoutKnownFaults) {
   // 100 samples, 8 + 2: one of each ten.
-  const Plan plan = plan_of({100});
+  Plan plan = plan_of({100});
   const auto samples = choose_calibration_samples(plan, 8, 2);
   EXPECT_THAT(ids(samples, false),
               ::testing::ElementsAre("0", "10", "20", "30", "50", "60", "70", "80"));
   EXPECT_THAT(ids(samples, true), ::testing::ElementsAre("40", "90"));
-}
-
-TEST(CalibrationSamples, TakeOfEachSourceInProportion) {
-  const Plan plan = plan_of({300, 60, 40});
+  plan = plan_of({300, 60, 40});
   std::vector<int> of_source(3);
   for (const auto& sample : choose_calibration_samples(plan, 32, 8))
     ++of_source[sample.shard->source];
@@ -118,35 +116,33 @@ class CalibratedFile : public ::testing::Test {
   JobManifest manifest_;
 };
 
-TEST_F(CalibratedFile, StandsBesideTheManifest) {
+TEST_F(CalibratedFile, StandsBesideTheManifestAndIsNamedInIt) {
   EXPECT_EQ(file("shipped"), folder_ / "eventgan-16-calibrated.safetensors");
   EXPECT_EQ(file("shipped:16"), folder_ / "eventgan-16-calibrated.safetensors");
   EXPECT_EQ(file("untrained:16"), folder_ / "untrained-16-calibrated.safetensors");
   EXPECT_EQ(file("a.b.safetensors"), folder_ / "a.b-calibrated.safetensors");
   EXPECT_EQ(file("/elsewhere/w.safetensors"), folder_ / "w-calibrated.safetensors");
-}
-
-TEST_F(CalibratedFile, IsTheInputOnlyIfThatIsSaid) {
-  testing::write_file(folder_ / "w-calibrated.safetensors", "");
-  EXPECT_THROW(file("w-calibrated.safetensors"), UsageError);
-  EXPECT_EQ(file("w-calibrated.safetensors", folder_ / "w-calibrated.safetensors"),
-            folder_ / "w-calibrated.safetensors");
-  EXPECT_EQ(file("w-calibrated.safetensors", folder_ / "other.safetensors"),
-            folder_ / "other.safetensors");
-}
-
-TEST_F(CalibratedFile, MustHaveTheRightNameAndAFolder) {
-  for (const std::string out : {"", "w", "w.h5"}) {
-    EXPECT_THROW(file("shipped", folder_ / out), UsageError) << out;
-  }
-  EXPECT_THROW(file("shipped", folder_ / "none" / "w.safetensors"), UsageError);
-}
-
-TEST_F(CalibratedFile, IsNamedInTheManifestFromItsFolder) {
   EXPECT_EQ(calibrated_generator_line(manifest_, folder_ / "sub" / "w \"8\".safetensors"),
             R"("generator": { "weights": "sub/w \"8\".safetensors", "precision": "int8" })");
   EXPECT_EQ(calibrated_generator_line(manifest_, "/elsewhere/w.safetensors"),
             R"("generator": { "weights": "/elsewhere/w.safetensors", "precision": "int8" })");
+}
+
+TEST_F(CalibratedFile, MustHaveTheRightNameAndIsTheInputOnlyIfThatIsSaid) {
+  testing::write_file(folder_ / "w-calibrated.safetensors", "");
+  EXPECT_THROWS(file("w-calibrated.safetensors"), UsageError,
+                "--out: expected a file for the new calibration, got none");
+  EXPECT_EQ(file("w-calibrated.safetensors", folder_ / "w-calibrated.safetensors"),
+            folder_ / "w-calibrated.safetensors");
+  EXPECT_EQ(file("w-calibrated.safetensors", folder_ / "other.safetensors"),
+            folder_ / "other.safetensors");
+  for (const std::string out : {"", "w", "w.h5"}) {
+    EXPECT_THROWS(file("shipped", folder_ / out), UsageError,
+                  "--out: expected a file named *.safetensors, got \"")
+        << out;
+  }
+  EXPECT_THROWS(file("shipped", folder_ / "none" / "w.safetensors"), UsageError,
+                "--out: expected a file in an existing folder, got \"");
 }
 
 /// 11 pairs of flat images, of which two are held out: the fifth or sixth and the last.
@@ -201,14 +197,14 @@ TEST_F(Calibrate, SkipsPairsThatCannotBeRead) {
 
 TEST_F(Calibrate, RefusesAJobWithoutAnyPair) {
   for (int frame = 0; frame < 12; ++frame) break_frame(frame);
-  EXPECT_THROW(run(), InputError);
+  EXPECT_THROWS(run(), InputError, "expected readable pairs to calibrate on, got none of 11");
 }
 
 TEST_F(Calibrate, StopsBetweenPairs) {
   CalibrationOptions options;
   int asked = 0;
   options.stop_requested = [&] { return ++asked == 4; };
-  EXPECT_THROW(run(options), Stopped);
+  EXPECT_THROWS(run(options), Stopped, "stopped on request; nothing was written");
   EXPECT_EQ(asked, 4);
 }
 

@@ -17,16 +17,16 @@
 #include "tests/stages/generator/engine_trials.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
 
-TEST(EngineSupport, LibtorchAlwaysHasFloat32AndNeverInt8) {
+using testing::texts_with;
+
+TEST(EngineSupport, IsOfOnePieceAndLibtorchAlwaysHasFloat32AndNeverInt8) {
   EXPECT_TRUE(engine_support(Precision::kFloat32).torch_able);
   EXPECT_FALSE(engine_support(Precision::kInt8).torch_able);
-}
-
-TEST(EngineSupport, IsOfOnePieceForEveryPrecision) {
   for (const Precision precision : {Precision::kFloat32, Precision::kBfloat16, Precision::kInt8}) {
     const EngineSupport support = engine_support(precision);
     EXPECT_NE(support.processor, "");
@@ -60,17 +60,14 @@ std::string refusal(const EngineRequest& request, const EngineSupport& support) 
   }
 }
 
-TEST(ChooseEngine, AutoTakesOnednnWhereItIsBuiltAndAble) {
-  const EngineChoice choice = choose_engine(request({}, kFloat32), all_of());
+TEST(ChooseEngine, AutoTakesOnednnWhereItIsAbleElseLibtorchAndSaysWhy) {
+  EngineChoice choice = choose_engine(request({}, kFloat32), all_of());
   EXPECT_EQ(choice.engine, kOnednn);
   EXPECT_EQ(choice.reason, "");
   EXPECT_EQ(choice.warning, "");
-}
-
-TEST(ChooseEngine, AutoTakesLibtorchElseAndSaysWhy) {
   EngineSupport support = all_of("sse41");
   support.onednn_able = false;
-  EngineChoice choice = choose_engine(request({}, kFloat32), support);
+  choice = choose_engine(request({}, kFloat32), support);
   EXPECT_EQ(choice.engine, kTorch);
   EXPECT_EQ(choice.reason, "oneDNN has no compiled kernels for float32 on this processor (sse41)");
   support.onednn_built = false;
@@ -79,7 +76,7 @@ TEST(ChooseEngine, AutoTakesLibtorchElseAndSaysWhy) {
   EXPECT_EQ(choice.reason, "this program was built without oneDNN");
 }
 
-TEST(ChooseEngine, AnAskedOneIsTakenWithoutComment) {
+TEST(ChooseEngine, AnAskedOneIsTakenOrRefusedWithWhatWouldWork) {
   for (const Engine engine : {kTorch, kOnednn}) {
     for (const Precision precision : {kFloat32, kBfloat16}) {
       const EngineChoice choice = choose_engine(request(engine, precision), all_of());
@@ -88,9 +85,6 @@ TEST(ChooseEngine, AnAskedOneIsTakenWithoutComment) {
       EXPECT_EQ(choice.warning, "");
     }
   }
-}
-
-TEST(ChooseEngine, AnAskedOneThatIsNotThereIsRefusedWithWhatWouldWork) {
   EngineSupport support = all_of();
   support.onednn_built = support.onednn_able = false;
   EXPECT_EQ(refusal(request(kOnednn, kFloat32), support),
@@ -227,26 +221,23 @@ TEST(LoadGenerator, ReadsAFileBesideTheManifest) {
   EXPECT_EQ(loaded.weights_hash, sha256_hex(bytes));
   EXPECT_THAT(loaded.warnings, ::testing::IsEmpty());
   manifest.volume.bins = 5;
-  EXPECT_THROW(load_generator(manifest), UsageError);
+  EXPECT_THROWS(load_generator(manifest), UsageError,
+                "$.volume.bins: expected 9 as in the weights, got 5");
 }
 
-TEST(LoadGenerator, WarnsLoudlyOfAnUntrainedOne) {
+TEST(LoadGenerator, WarnsLoudlyOfAnUntrainedOneFromAFileToo) {
   JobManifest manifest;
   manifest.generator.weights = "untrained:2";
   const LoadedGenerator loaded = load_generator(manifest);
-  EXPECT_THAT(loaded.warnings, ::testing::ElementsAre(::testing::HasSubstr("UNTRAINED")));
+  EXPECT_THAT(loaded.warnings, texts_with({"UNTRAINED"}));
   manifest.seed = 1;
   EXPECT_NE(load_generator(manifest).weights_hash, loaded.weights_hash);
-}
-
-TEST(LoadGenerator, WarnsOfAnUntrainedOneFromAFileToo) {
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "w.safetensors", serialize_weights(untrained_weights(1, 9, 1)));
-  JobManifest manifest;
+  manifest = JobManifest();
   manifest.directory = folder.path();
   manifest.generator.weights = "w.safetensors";
-  EXPECT_THAT(load_generator(manifest).warnings,
-              ::testing::ElementsAre(::testing::HasSubstr("UNTRAINED (w.safetensors)")));
+  EXPECT_THAT(load_generator(manifest).warnings, texts_with({"UNTRAINED (w.safetensors)"}));
 }
 
 TEST(LoadGenerator, MakesTheEngineThatIsAskedForAndSaysWhich) {
@@ -375,7 +366,8 @@ TEST(LoadGenerator, MakesTheOneOnCudaOrRefusesIt) {
   manifest.generator.device = Device::kCuda;
   const EngineSupport support = engine_support(Precision::kFloat32, Device::kCuda);
   if (!support.cuda_lack.empty()) {
-    EXPECT_THROW(load_generator(manifest), UsageError);
+    EXPECT_THROWS(load_generator(manifest), UsageError,
+                  "$.generator.device: expected \"cpu\", got \"cuda\"");
     return;
   }
   const LoadedGenerator loaded = load_generator(manifest);
@@ -387,7 +379,8 @@ TEST(LoadGenerator, RefusesInt8WithoutACalibration) {
   JobManifest manifest;
   manifest.generator.weights = "untrained:1";
   manifest.generator.precision = Precision::kInt8;
-  EXPECT_THROW(load_generator(manifest), UsageError);
+  EXPECT_THROWS(load_generator(manifest), UsageError,
+                "$.generator.weights: expected weights with a calibration");
 }
 
 TEST(LoadGenerator, RefusesWeightsThatInt8CannotServe) {
@@ -403,7 +396,8 @@ TEST(LoadGenerator, RefusesWeightsThatInt8CannotServe) {
   EXPECT_THAT(load_generator(manifest).choice, ::testing::StartsWith("generator: onednn int8 on "));
   weights.convolutions[2].bias[0] = std::numeric_limits<float>::max();
   testing::write_file(folder / "w.safetensors", serialize_weights(weights));
-  EXPECT_THROW(load_generator(manifest), InputError);
+  EXPECT_THROWS(load_generator(manifest), InputError,
+                "cannot use the weights w.safetensors in int8");
 }
 
 TEST(LoadGenerator, SetsUpSimulators) {
@@ -447,7 +441,8 @@ TEST(LoadGenerator, OfACamerasEventsGeneratesNone) {
   // 6 channels of 4 pixels, sums in double.
   EXPECT_EQ(loaded.generator->working_bytes({2, 2}), 6u * 4 * 8);
   std::vector<float> frames(8), volume(24);
-  EXPECT_THROW(loaded.generator->generate({frames, {2, 2}}, volume), std::logic_error);
+  EXPECT_THROWS(loaded.generator->generate({frames, {2, 2}}, volume), std::logic_error,
+                "expected frames to generate events from, got events");
   EXPECT_TRUE(loaded.warnings.empty());
 }
 
@@ -455,29 +450,32 @@ TEST(LoadGenerator, FindsTheShippedWeightsOrSaysThatThereAreNone) {
   JobManifest manifest;
   EXPECT_EQ(manifest.generator.weights, "shipped");
   if (shipped_widths().empty()) {
-    EXPECT_THROW(load_generator(manifest), InputError);
+    EXPECT_THROWS(load_generator(manifest), InputError, "expected shipped weights of a base width");
     return;
   }
   const int width = default_shipped_width();
   const LoadedGenerator loaded = load_generator(manifest);
   EXPECT_EQ(loaded.weights_hash, sha256_hex(shipped_weights_bytes(width)));
-  EXPECT_THAT(loaded.warnings, ::testing::ElementsAre(::testing::HasSubstr(
-                                   "shipped:" + std::to_string(width) + " are stand-in")));
+  EXPECT_THAT(loaded.warnings, texts_with({"shipped:" + std::to_string(width) + " are stand-in"}));
   manifest.generator.weights = "shipped:" + std::to_string(width);
   EXPECT_EQ(load_generator(manifest).weights_hash, loaded.weights_hash);
   manifest.generator.weights = "shipped:63";
-  EXPECT_THROW(load_generator(manifest), InputError);
+  EXPECT_THROWS(load_generator(manifest), InputError,
+                "expected a base width of the shipped weights (8, 16)");
 }
 
 TEST(LoadGenerator, RefusesAMissingFileAndAWidthThatIsNone) {
   JobManifest manifest;
   manifest.directory = "/nowhere";
   manifest.generator.weights = "w.safetensors";
-  EXPECT_THROW(load_generator(manifest), InputError);
+  EXPECT_THROWS(load_generator(manifest), InputError,
+                "cannot use the weights in /nowhere/w.safetensors");
   for (const char* weights :
        {"untrained:", "untrained:0", "untrained:8x", "untrained:1000", "shipped:", "shipped:0"}) {
     manifest.generator.weights = weights;
-    EXPECT_THROW(load_generator(manifest), UsageError) << weights;
+    EXPECT_THROWS(load_generator(manifest), UsageError,
+                  "$.generator.weights: expected a file, shipped")
+        << weights;
   }
 }
 

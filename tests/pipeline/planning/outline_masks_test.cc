@@ -13,6 +13,7 @@
 #include "manifests/values/faults.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -21,7 +22,6 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 /// Two photographs, and a text with their boxes.
 class OutlineMasks : public ::testing::Test {
@@ -173,7 +173,7 @@ TEST_F(OutlineMasks, AreMadeUntilSomebodySaysStop) {
 
 TEST_F(OutlineMasks, NeedAPlaceForTheMasks) {
   testing::write_file(folder_.path() / "masks", "a file");
-  EXPECT_THROW(make(manifest()), std::exception);
+  EXPECT_THROWS(make(manifest()), std::exception, "cannot create directories");
 }
 
 }  // namespace

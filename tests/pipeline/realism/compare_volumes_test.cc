@@ -13,6 +13,7 @@
 #include "stages/events/volume_statistics.h"
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -35,14 +36,22 @@ TEST(ChooseIntervals, TakesPairsByGapWithBothFramesInside) {
 
 TEST(ChooseIntervals, RefusesWhatHasNoPairs) {
   const FakeRecording recording = recording_of(3);
-  EXPECT_THROW(choose_intervals(recording, 0, 3, {1}), UsageError);
-  EXPECT_THROW(choose_intervals(recording, -1, 2, {1}), UsageError);
-  EXPECT_THROW(choose_intervals(recording, 2, 1, {1}), UsageError);
-  EXPECT_THROW(choose_intervals(recording, 1, 1, {1}), UsageError);
-  EXPECT_THROW(choose_intervals(recording, 0, 2, {3}), UsageError);
-  EXPECT_THROW(choose_intervals(recording, 0, 2, {}), UsageError);
-  EXPECT_THROW(choose_intervals(recording, 0, 2, {0}), UsageError);
-  EXPECT_THROW(choose_intervals(recording, 0, 2, {1, 1}), UsageError);
+  EXPECT_THROWS(choose_intervals(recording, 0, 3, {1}), UsageError,
+                "--frames: expected FIRST:LAST in 0..2, got 0:3, in fake");
+  EXPECT_THROWS(choose_intervals(recording, -1, 2, {1}), UsageError,
+                "--frames: expected FIRST:LAST in 0..2, got -1:2, in fake");
+  EXPECT_THROWS(choose_intervals(recording, 2, 1, {1}), UsageError,
+                "--frames: expected FIRST:LAST in 0..2, got 2:1, in fake");
+  EXPECT_THROWS(choose_intervals(recording, 1, 1, {1}), UsageError,
+                "expected frames 1 apart, got frames 1:1, in fake recording");
+  EXPECT_THROWS(choose_intervals(recording, 0, 2, {3}), UsageError,
+                "expected frames 3 apart, got frames 0:2, in fake recording");
+  EXPECT_THROWS(choose_intervals(recording, 0, 2, {}), UsageError,
+                "--gaps: expected different numbers of frames, 1 or more");
+  EXPECT_THROWS(choose_intervals(recording, 0, 2, {0}), UsageError,
+                "--gaps: expected different numbers of frames, 1 or more");
+  EXPECT_THROWS(choose_intervals(recording, 0, 2, {1, 1}), UsageError,
+                "--gaps: expected different numbers of frames, 1 or more");
 }
 
 TEST(ReadInterval, HasTheIntervalsFramesEventsAndFlow) {
@@ -130,14 +139,11 @@ TEST(FlowPath, IsUnknownBeyondTheImageAndWhereTheFlowIs) {
   EXPECT_TRUE(std::isnan(down->y_px[5]));
 }
 
-TEST(FlowPath, OfAnImageOfOnePixel) {
+TEST(FlowPath, OfAnImageOfOnePixelAndNoneWithoutFlows) {
   const FlowField still{{1, 1}, {0}, {0}};
   const auto path = flow_path(recording_of({still, still}, {1, 1}), {0, 2});
   ASSERT_TRUE(path.has_value());
   EXPECT_EQ(path->x_px[0], 0);
-}
-
-TEST(FlowPath, IsNotKnownWithoutFlows) {
   const GreyImage frame{{1, 1}, {0}};
   const FakeRecording recording({frame, frame}, {0, 1}, {});
   EXPECT_FALSE(flow_path(recording, {0, 1}).has_value());

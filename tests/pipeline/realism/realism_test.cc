@@ -14,6 +14,7 @@
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -72,13 +73,16 @@ TEST(MeasureRealism, TellsANetworkNoThresholdThatItHasNotLearnt) {
   options.network_threshold = {0.9};
   EXPECT_NO_THROW(measure_realism(recording, options));
   options.network_threshold = {0.9, 1.2};
-  EXPECT_THROW(measure_realism(recording, options), UsageError);
+  EXPECT_THROWS(measure_realism(recording, options), UsageError,
+                "--threshold: expected 0.0675..0.931 as the weights have");
   options.network_threshold = {0.01};
-  EXPECT_THROW(measure_realism(recording, options), UsageError);
+  EXPECT_THROWS(measure_realism(recording, options), UsageError,
+                "--threshold: expected 0.0675..0.931 as the weights have");
   options.network_threshold = {0.3};
   EXPECT_NO_THROW(measure_realism(recording, options));
   options.network_weights = "of others";
-  EXPECT_THROW(measure_realism(recording, options), UsageError);
+  EXPECT_THROWS(measure_realism(recording, options), UsageError,
+                "--sensor: expected the threshold of shipped:sensor");
   // Others take none, and the report says so.
   options.weights = "shipped:8";
   EXPECT_EQ(measure_realism(recording, options).methods[0].settings,
@@ -114,26 +118,35 @@ TEST(MeasureRealism, RefusesOptionsThatCannotBe) {
   const FakeRecording recording = moving_bar_recording({12, 16}, 3);
   RealismOptions none = models_only();
   none.methods = {};
-  EXPECT_THROW(measure_realism(recording, none), UsageError);
+  EXPECT_THROWS(measure_realism(recording, none), UsageError,
+                "--with: expected different methods, at least one, got 0, 0");
   RealismOptions twice = models_only();
   twice.methods = {GeneratorKind::kEsim, GeneratorKind::kEsim};
-  EXPECT_THROW(measure_realism(recording, twice), UsageError);
+  EXPECT_THROWS(measure_realism(recording, twice), UsageError,
+                "--with: expected different methods, at least one, got 2, 1");
   for (const double threshold : {0.0, -1.0, 6.0, std::numeric_limits<double>::quiet_NaN()}) {
     RealismOptions options = models_only();
     options.threshold = {threshold};
-    EXPECT_THROW(measure_realism(recording, options), UsageError) << threshold;
+    EXPECT_THROWS(measure_realism(recording, options), UsageError,
+                  "--threshold: expected fit or a number in 0.01..5")
+        << threshold;
   }
   for (const double number : {0.0, -1.0, 200.0, std::numeric_limits<double>::quiet_NaN()}) {
     RealismOptions options = models_only();
     options.log_epsilon = number;
-    EXPECT_THROW(measure_realism(recording, options), UsageError) << number;
+    EXPECT_THROWS(measure_realism(recording, options), UsageError,
+                  "--log-epsilon: expected a number in 1e-6..1")
+        << number;
     options = models_only();
     options.esim_displacement_px = number;
-    EXPECT_THROW(measure_realism(recording, options), UsageError) << number;
+    EXPECT_THROWS(measure_realism(recording, options), UsageError,
+                  "--esim-displacement: expected a number in 0.1..100")
+        << number;
   }
   RealismOptions gap = models_only();
   gap.gaps = {7};
-  EXPECT_THROW(measure_realism(recording, gap), UsageError);
+  EXPECT_THROWS(measure_realism(recording, gap), UsageError,
+                "expected frames 7 apart, got frames 0:2, in fake recording");
 }
 
 TEST(MeasureRealism, OfARealRecording) {
@@ -182,13 +195,16 @@ RealismReport two_methods() {
 
 std::string text_of(const RealismReport& report) { return to_text({&report, 1}); }
 
-TEST(RealismText, MarksTheBestOfEachRow) {
+TEST(RealismText, MarksTheBestOfEachRowUnlessThereIsButOne) {
   const std::string text = text_of(two_methods());
   EXPECT_THAT(text, ContainsRegex("F1, summed over time +↑ +0.5000\\* +0.2500\n"));
   EXPECT_THAT(text, ContainsRegex("PoolMSE 2 +↓ +0.0200 +0.0100\\*\n"));
   EXPECT_THAT(text, ContainsRegex("events per pixel +≈ +0.3000 +0.2500\\* +0.4000\n"));
   EXPECT_THAT(text, ContainsRegex("in bin 1 +≈ +0.1500 +0.1250\\* +0.2000\n"));
   EXPECT_THAT(text, ContainsRegex("correlation of mean times +↑ +- +-\n"));
+  RealismReport report = two_methods();
+  report.methods.pop_back();
+  EXPECT_THAT(text_of(report), Not(HasSubstr("0.5000*")));
 }
 
 TEST(RealismText, EndsWithWhatToTake) {
@@ -203,16 +219,13 @@ TEST(RealismText, EndsWithWhatToTake) {
               HasSubstr("take \"network\" as generator.kind. esim is for photographs"));
 }
 
-TEST(RealismText, SaysHowSureItIs) {
+TEST(RealismText, SaysWhatWasComparedAndHowSureItIs) {
   RealismReport report = two_methods();
   report.methods[0].bounds.emplace();
   report.methods[0].bounds->low.f1_time = 0.44;
   report.methods[0].bounds->high.f1_time = 0.54;
   EXPECT_THAT(text_of(report),
               ContainsRegex("F1, summed over time +↑ +0.5000\\*±0.0500 +0.2500\n"));
-}
-
-TEST(RealismText, SaysWhatWasCompared) {
   const std::string text = text_of(two_methods());
   EXPECT_THAT(text, HasSubstr("slider: 240x180 pixels, 1 pair of frames (gap 2: 1), 1234 real"));
   EXPECT_THAT(text, HasSubstr("difference: settings of difference"));
@@ -227,12 +240,6 @@ TEST(RealismText, HasTheDirectionWhereTheFlowIsKnown) {
   const std::string text = text_of(report);
   EXPECT_THAT(text, ContainsRegex("direction within 30 deg +↑ +0.9000 +0.8000\\* +-\n"));
   EXPECT_THAT(text, ContainsRegex("pixels that tell it +200 +100 +0\n"));
-}
-
-TEST(RealismText, OfOneMethodMarksNothing) {
-  RealismReport report = two_methods();
-  report.methods.pop_back();
-  EXPECT_THAT(text_of(report), Not(HasSubstr("0.5000*")));
 }
 
 /// As two_methods, another recording, one in which the flow is known.

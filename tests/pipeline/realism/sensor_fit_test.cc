@@ -10,6 +10,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/poisson_random.h"
 #include "tests/testing/fake_recording.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -17,6 +18,7 @@ namespace {
 using testing::FakeRecording;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using testing::texts_with;
 
 constexpr ImageSize kSceneSize{64, 64};
 constexpr double kInterval_s = 0.05;
@@ -247,17 +249,14 @@ TEST(FitSensor, LeavesTheEventsOfHotPixelsOut) {
   EXPECT_EQ(with.rows[0].events_per_pixel, without.rows[0].events_per_pixel);
 }
 
-TEST(FitSensor, TellsNoNoiseThatNoDocumentHolds) {
+TEST(FitSensor, TellsNeitherNoiseNorRatioThatNoDocumentHolds) {
   const Scene flicker{.noise = {{1200, 1200}, {}, {}}, .frames = 3};
-  const SensorFit fit = fit_camera(scene_recording(flicker));
+  SensorFit fit = fit_camera(scene_recording(flicker));
   EXPECT_FALSE(fit.sensor("n", "").noise);
   EXPECT_THAT(fit.warnings[0], HasSubstr("events a second, expected at most 1000"));
-}
-
-TEST(FitSensor, TellsNoRatioThatNoDocumentHolds) {
   const RateGenerator network;
   const Scene scene{.positive_threshold = 0.08, .negative_threshold = 0.5, .frames = 5};
-  const SensorFit fit = fit_camera(scene_recording(scene), &network);
+  fit = fit_camera(scene_recording(scene), &network);
   EXPECT_FALSE(fit.network);
   EXPECT_THAT(fit.warnings, ::testing::Contains(HasSubstr("expected 0.2..5")));
   EXPECT_EQ(fit.sensor("n", "").threshold->ratio, 1);
@@ -320,7 +319,7 @@ TEST(FitSensor, WithoutStillPixelsTellsNoNoise) {
   const SensorFit fit = fit_camera(scene_recording({.still_columns = 0}));
   EXPECT_FALSE(fit.noise);
   EXPECT_FALSE(fit.sensor("n", "").noise);
-  EXPECT_THAT(fit.warnings, ::testing::ElementsAre(HasSubstr("no noise")));
+  EXPECT_THAT(fit.warnings, texts_with({"no noise"}));
   ASSERT_TRUE(fit.difference);
   EXPECT_NEAR(fit.difference->threshold.mean, 0.3, 0.03);
 }
@@ -334,7 +333,7 @@ TEST(FitSensor, WithoutEventsTellsNoThreshold) {
   EXPECT_FALSE(fit.difference || fit.network);
   ASSERT_TRUE(fit.noise);
   EXPECT_EQ(fit.noise->noise, NoiseSpec());
-  EXPECT_THAT(fit.warnings, ::testing::ElementsAre(HasSubstr("no threshold")));
+  EXPECT_THAT(fit.warnings, texts_with({"no threshold"}));
   const CameraSensor sensor = fit.sensor("n", "");
   EXPECT_FALSE(sensor.threshold);
   EXPECT_TRUE(sensor.noise);
@@ -358,7 +357,7 @@ TEST(FitSensor, OfOnePairSaysThatItIsNotSure) {
   EXPECT_THAT(fit.rows, IsEmpty());
   ASSERT_TRUE(fit.difference);
   EXPECT_TRUE(std::isnan(fit.difference->mean.low));
-  EXPECT_THAT(fit.warnings, ::testing::ElementsAre(HasSubstr("fewer than 3 pairs")));
+  EXPECT_THAT(fit.warnings, texts_with({"fewer than 3 pairs"}));
   EXPECT_THAT(to_text(fit), ::testing::Not(HasSubstr("nan")));
 }
 
@@ -385,8 +384,10 @@ TEST(FitSensor, KeepsNoPairAsideThatSharesTimeWithAFittedOne) {
 TEST(FitSensor, RefusesGapsThatCannotBe) {
   const FakeRecording recording = scene_recording({.frames = 3});
   const FitPart part{&recording, 0, std::nullopt};
-  EXPECT_THROW(fit_sensor({&part, 1}, nullptr, {3}, 1), UsageError);
-  EXPECT_THROW(fit_sensor({&part, 1}, nullptr, {}, 1), UsageError);
+  EXPECT_THROWS(fit_sensor({&part, 1}, nullptr, {3}, 1), UsageError,
+                "expected frames 3 apart, got frames 0:2, in fake recording");
+  EXPECT_THROWS(fit_sensor({&part, 1}, nullptr, {}, 1), UsageError,
+                "--gaps: expected different numbers of frames, 1 or more");
 }
 
 SensorFit made_fit() {

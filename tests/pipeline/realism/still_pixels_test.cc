@@ -20,14 +20,11 @@ std::size_t still_count(const GreyImage& previous, const GreyImage& next) {
       std::ranges::count(find_still_pixels(previous, next, {}, 0.1).still, 1));
 }
 
-TEST(FindStillPixels, TakesAChangeOfTwoLevels) {
+TEST(FindStillPixels, TakesAChangeOfTwoLevelsAndLeavesOutClippedOnes) {
   EXPECT_EQ(still_count(grey({7, 9}, 100), grey({7, 9}, 102)), 63u);
   EXPECT_EQ(still_count(grey({7, 9}, 100), grey({7, 9}, 98)), 63u);
   EXPECT_EQ(still_count(grey({7, 9}, 100), grey({7, 9}, 103)), 0u);
   EXPECT_EQ(still_count(grey({1, 1}, 100), grey({1, 1}, 100)), 1u);
-}
-
-TEST(FindStillPixels, LeavesOutClippedLevels) {
   for (const std::uint8_t level : {0, 255}) {
     EXPECT_EQ(still_count(grey({7, 9}, level), grey({7, 9}, level)), 0u) << int{level};
   }
@@ -134,26 +131,20 @@ TEST(FitNoise, LeavesOutHotPixels) {
   EXPECT_EQ(fit.hot[0][500], 1);
 }
 
-TEST(FitNoise, FindsHotPixelsOfASilentCamera) {
+TEST(FitNoise, FindsHotPixelsOfASilentCameraNeitherInFlickerNorInChance) {
   StillPixels pair = pair_of(0, 0);
   for (int event = 0; event < 100; ++event) pair.positive.insert(pair.positive.end(), {3, 700});
   const NoiseFit fit = fit_of({pair});
   EXPECT_EQ(fit.hot_pixels, 2u);
   EXPECT_EQ(fit.positive_hz, 0);
   EXPECT_EQ(fit.noise.leak_hz[0], 0);
-}
-
-TEST(FitNoise, TakesFlickerForNoHotPixels) {
-  StillPixels pair = pair_of(0, 0);
+  pair = pair_of(0, 0);
   for (int event = 0; event < 20; ++event) {
     for (std::uint32_t pixel = 0; pixel < 900; ++pixel) pair.positive.push_back(pixel);
   }
   EXPECT_EQ(fit_of({pair}).hot_pixels, 0u);
-}
-
-TEST(FitNoise, TakesFewEventsForChance) {
   // 4 events in 0.1 s are 40 a second, and all that a pixel of a silent image has: no hot pixel.
-  StillPixels pair = pair_of(0, 0);
+  pair = pair_of(0, 0);
   pair.positive.assign(4, 3);
   EXPECT_EQ(fit_of({pair}).hot_pixels, 0u);
 }
@@ -169,13 +160,10 @@ TEST(FitNoise, NeedsAHundredStillPixels) {
   EXPECT_NEAR(fit.positive_hz, 0.1, 1e-9);
 }
 
-TEST(FitNoise, OfAStillImageWithoutEventsIsNone) {
+TEST(FitNoise, OfAStillImageWithoutEventsIsNoneAndPoolsRecordings) {
   const NoiseFit fit = fit_of({pair_of(0, 0)});
   EXPECT_EQ(fit.noise, NoiseSpec());
   EXPECT_EQ(fit.pixels, 1000u);
-}
-
-TEST(FitNoise, PoolsRecordingsOfOtherSizes) {
   StillPixels large{0.3, std::vector<std::uint8_t>(2000, 1), {}, {}};
   const std::vector<std::vector<StillPixels>> recordings{{pair_of(70, 0)}, {large}};
   EXPECT_NEAR(fit_noise(recordings)->positive_hz, 70 / 700.0, 1e-9);

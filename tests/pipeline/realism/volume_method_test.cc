@@ -10,6 +10,7 @@
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -70,12 +71,19 @@ TEST(NetworkMethod, DrawsEventsOfTheSensorItIsTold) {
 
 TEST(OpenRealismGenerator, RefusesNamesAndFilesThatAreNoWeights) {
   const testing::TemporaryFolder folder;
-  EXPECT_THROW(open_network((folder / "absent.safetensors").string()), InputError);
-  EXPECT_THROW(open_network("shipped:"), UsageError);
-  EXPECT_THROW(open_network("shipped:8x"), UsageError);
-  EXPECT_THROW(open_network("shipped:12345"), UsageError);
-  EXPECT_THROW(open_network("shipped:63"), InputError);  // a width that is not shipped
-  EXPECT_THROW(open_network("untrained:8"), UsageError);
+  EXPECT_THROWS(open_network((folder / "absent.safetensors").string()), InputError,
+                "expected a readable file, got 'No such file or directory'");
+  EXPECT_THROWS(open_network("shipped:"), UsageError,
+                "--weights: expected a file, shipped, shipped:sensor or");
+  EXPECT_THROWS(open_network("shipped:8x"), UsageError,
+                "--weights: expected a file, shipped, shipped:sensor or");
+  EXPECT_THROWS(open_network("shipped:12345"), UsageError,
+                "--weights: expected a file, shipped, shipped:sensor or");
+  EXPECT_THROWS(
+      open_network("shipped:63"), InputError,
+      "expected a base width of the shipped weights (8, 16)");  // a width that is not shipped
+  EXPECT_THROWS(open_network("untrained:8"), UsageError,
+                "--weights: expected a file, shipped, shipped:sensor or");
 }
 
 /// Makes round(scale / threshold) events at one pixel.
@@ -96,15 +104,12 @@ std::vector<IntervalFrames> intervals_of(const std::vector<std::int64_t>& event_
   return frames;
 }
 
-TEST(FittedThreshold, MakesAsManyEventsAsTheCamera) {
+TEST(FittedThreshold, MakesAsManyEventsAsTheCameraWithinItsRange) {
   // Two intervals of 1000 / threshold events each against 1000 and 7000: threshold 1/4.
   EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({1000, 7000}), 0.02, 0, 2), 0.25,
               0.25 * 0.006);
   EXPECT_NEAR(fitted_threshold(inverse_scene(1000, 3), intervals_of({4000}), 0.02, 0, 2), 0.25,
               0.25 * 0.006);
-}
-
-TEST(FittedThreshold, StaysInItsRange) {
   EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({0}), 0.02, 0, 2), 5, 0.01);
   EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({1}), 0.02, 0, 2), 5, 0.01);
   EXPECT_NEAR(fitted_threshold(inverse_scene(0), intervals_of({1000}), 0.02, 0, 2), 0.01, 1e-4);

@@ -12,6 +12,7 @@
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/small_job.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -125,8 +126,9 @@ TEST_F(SurveyFolder, OfAPartTakesWhatIsDone) {
   EXPECT_EQ(survey.counts.samples, 4);
   EXPECT_EQ(survey.parts.missing.size(), 1u);
   std::filesystem::remove(folder_ / "out/job-train-00000-of-00002.h5");
-  EXPECT_THROW(survey_folder(folder_ / "out"), InputError);
-  EXPECT_THROW(survey_folder(folder_.path()), InputError);
+  EXPECT_THROWS(survey_folder(folder_ / "out"), InputError, "expected finished shards, got none");
+  EXPECT_THROWS(survey_folder(folder_.path()), InputError,
+                "expected a folder that eventgan convert has written, got no");
 }
 
 }  // namespace

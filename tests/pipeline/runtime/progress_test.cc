@@ -27,7 +27,7 @@ ProgressDisplay::Columns columns(int count) {
 
 ProgressState state() { return {30, 120, 0, 60'000'000, 15, {}}; }
 
-TEST(ProgressLine, GivesRatesAndTimeLeft) {
+TEST(ProgressLine, GivesRatesAndTimeLeftOnceItIsKnown) {
   // 30 pairs in 15 s: 2 a second, 90 left: 45 s; 60 MB in 15 s: 4 MB/s.
   EXPECT_EQ(progress_line(state()), "30/120 pairs, 0m45s left, 2.00 pairs/s, 4.0 MB/s");
   ProgressState long_run = state();
@@ -35,9 +35,6 @@ TEST(ProgressLine, GivesRatesAndTimeLeft) {
   long_run.quarantined = 2;
   EXPECT_EQ(progress_line(long_run),
             "30/21630 pairs, 3h00m left, 2 quarantined, 2.00 pairs/s, 4.0 MB/s");
-}
-
-TEST(ProgressLine, AtTheStartTimeLeftIsUnknown) {
   EXPECT_EQ(progress_line({0, 10, 0, 0, 0, {}}), "0/10 pairs, ? left, 0.00 pairs/s, 0.0 MB/s");
 }
 

@@ -15,33 +15,18 @@ constexpr double kGrace_s = 20;
 /// 5 samples left of 2 s each, one to spare, a commit of 3 s and an abort of 1 s: 16 s.
 constexpr WorkLeft kOpen{5, 2, 3, 1};
 
-TEST(StopOrder, WithoutARequestEverythingGoesOn) {
+TEST(StopOrder, FinishesAShardWhereTheTimeIsEnough) {
   EXPECT_EQ(stop_order(std::nullopt, kGrace_s, kOpen), StopOrder::kGoOn);
   EXPECT_EQ(stop_order(std::nullopt, 0, std::nullopt), StopOrder::kGoOn);
-}
-
-TEST(StopOrder, FinishesAShardThatFitsWithASampleAndAnAbortToSpare) {
   EXPECT_EQ(stop_order(0, kGrace_s, kOpen), StopOrder::kFinishShard);
   EXPECT_EQ(stop_order(4, kGrace_s, kOpen), StopOrder::kFinishShard);
   EXPECT_EQ(stop_order(4.1, kGrace_s, kOpen), StopOrder::kAbort);
-}
-
-TEST(StopOrder, EachPartOfTheTimeCounts) {
   for (const WorkLeft slower :
        {WorkLeft{6, 2, 3, 1}, WorkLeft{5, 2.5, 3, 1}, WorkLeft{5, 2, 4, 1}, WorkLeft{5, 2, 3, 2}}) {
     EXPECT_EQ(stop_order(4, kGrace_s, slower), StopOrder::kAbort);
   }
-}
-
-TEST(StopOrder, WithoutAnWorkLeftThereIsNothingToFinish) {
   EXPECT_EQ(stop_order(0, kGrace_s, std::nullopt), StopOrder::kAbort);
-}
-
-TEST(StopOrder, WithoutGraceAborts) {
   EXPECT_EQ(stop_order(0.001, 0, WorkLeft{0, 0, 0, 0}), StopOrder::kAbort);
-}
-
-TEST(StopOrder, AShardThatIsBeingCommittedNeedsOnlyThat) {
   EXPECT_EQ(stop_order(19, kGrace_s, WorkLeft{0, 0.1, 0.5, 0.1}), StopOrder::kFinishShard);
 }
 
@@ -165,7 +150,7 @@ TEST(StopSignal, EachKindIsARequest) {
   }
 }
 
-TEST(StopSignal, CountsFromTheFirst) {
+TEST(StopSignal, CountsFromTheFirstAndLeavesSignalsAsTheyWere) {
   const StopSignal signal;
   std::raise(SIGUSR1);
   const double first_s = signal.seconds_since_request().value();
@@ -174,6 +159,12 @@ TEST(StopSignal, CountsFromTheFirst) {
     std::raise(SIGUSR1);
   }
   EXPECT_GE(signal.seconds_since_request(), first_s);
+  std::array<struct sigaction, 3> before{};
+  for (std::size_t i = 0; i < kSignals.size(); ++i) before[i] = action_of(kSignals[i]);
+  { const StopSignal signal; }
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    EXPECT_EQ(action_of(kSignals[i]).sa_handler, before[i].sa_handler);
+  }
 }
 
 TEST(StopSignal, ASecondInterruptEndsTheProcess) {
@@ -195,15 +186,6 @@ TEST(StopSignal, TheFirstInterruptIsAnsweredAtOnce) {
   };
   EXPECT_EQ(said_at(SIGTERM), "");  // nobody looks at a scheduler's terminal
   EXPECT_EQ(said_at(SIGINT), "stopping\n");
-}
-
-TEST(StopSignal, LeavesSignalsAsTheyWere) {
-  std::array<struct sigaction, 3> before{};
-  for (std::size_t i = 0; i < kSignals.size(); ++i) before[i] = action_of(kSignals[i]);
-  { const StopSignal signal; }
-  for (std::size_t i = 0; i < kSignals.size(); ++i) {
-    EXPECT_EQ(action_of(kSignals[i]).sa_handler, before[i].sa_handler);
-  }
 }
 
 }  // namespace

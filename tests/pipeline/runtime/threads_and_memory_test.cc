@@ -18,6 +18,7 @@
 #include "pipeline/runtime/threads.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -28,7 +29,7 @@ TEST(ThreadCount, IsTheRequestOrAllCores) {
   EXPECT_GE(thread_count(0), 1);
 }
 
-TEST(ForEachIndex, TakesEachOnce) {
+TEST(ForEachIndex, TakesEachOnceAndPassesAnExceptionOn) {
   for (const int threads : {1, 3, 64}) {
     for (const std::size_t count : {0, 1, 1000}) {
       std::vector<std::atomic<int>> calls(count);
@@ -36,14 +37,11 @@ TEST(ForEachIndex, TakesEachOnce) {
       for (const auto& number : calls) EXPECT_EQ(number, 1);
     }
   }
-}
-
-TEST(ForEachIndex, PassesAnExceptionOn) {
-  EXPECT_THROW(for_each_index(10, 2,
-                              [](std::size_t i) {
-                                if (i == 7) throw std::runtime_error("seven");
-                              }),
-               std::runtime_error);
+  EXPECT_THROWS(for_each_index(10, 2,
+                               [](std::size_t i) {
+                                 if (i == 7) throw std::runtime_error("seven");
+                               }),
+                std::runtime_error, "seven");
 }
 
 TEST(ForEachIndex, HasItsThreadsWithinACallOfOneThread) {

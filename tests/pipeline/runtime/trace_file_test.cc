@@ -12,6 +12,7 @@
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -20,7 +21,6 @@ using ::testing::ElementsAre;
 using testing::events;
 using ::testing::IsEmpty;
 using testing::names_in;
-using ::testing::SizeIs;
 
 TEST(TraceString, IsAJsonStringOfTheText) {
   for (const std::string text : {"", "plain", "a\"b\\c\n\t\x01", "Zürich 東京"}) {
@@ -44,7 +44,7 @@ class TraceFileTest : public ::testing::Test {
   const std::filesystem::path target_ = folder_ / "t.json";
 };
 
-TEST_F(TraceFileTest, IsThereOnceItIsCommitted) {
+TEST_F(TraceFileTest, IsThereOnceItIsCommittedElseNothingIsLeft) {
   TraceFile file(target_);
   file.write("{\"traceEvents\":");
   file.write("[]}");
@@ -52,9 +52,6 @@ TEST_F(TraceFileTest, IsThereOnceItIsCommitted) {
   file.commit();
   EXPECT_EQ(testing::read_file(target_), kTrace);
   EXPECT_THAT(names_in(folder_.path()), ElementsAre("t.json"));
-}
-
-TEST_F(TraceFileTest, OtherwiseNothingIsLeft) {
   testing::write_file(target_, kTrace);
   { TraceFile(target_).write("half"); }
   EXPECT_THAT(names_in(folder_.path()), ElementsAre("t.json"));
@@ -71,7 +68,8 @@ TEST_F(TraceFileTest, ReplacesAnEarlierTraceAndNothingElse) {
   }
   for (const char* before : {"{", "{\"format\": \"eventgan-manifest\"}"}) {
     testing::write_file(target_, before);
-    EXPECT_THROW(TraceFile{target_}, UsageError);
+    EXPECT_THROWS(TraceFile{target_}, UsageError,
+                  "--profile: expected a new file or an earlier trace");
     EXPECT_EQ(testing::read_file(target_), before);
   }
 }
@@ -89,11 +87,15 @@ TEST_F(TraceFileTest, BehindALinkItReplacesWhatTheLinkPointsTo) {
 }
 
 TEST_F(TraceFileTest, RefusesWhatCannotBeWritten) {
-  EXPECT_THROW(TraceFile{folder_.path()}, UsageError);
-  EXPECT_THROW(TraceFile{folder_ / "none" / "t.json"}, UsageError);
-  EXPECT_THROW(TraceFile{folder_ / ""}, UsageError);
-  EXPECT_THROW(TraceFile{""}, UsageError);
-  EXPECT_THROW(TraceFile{"/dev/null"}, UsageError);
+  EXPECT_THROWS(TraceFile{folder_.path()}, UsageError,
+                "--profile: expected a file, got something else");
+  EXPECT_THROWS(TraceFile{folder_ / "none" / "t.json"}, UsageError,
+                "--profile: expected a file that can be written, got No such");
+  EXPECT_THROWS(TraceFile{folder_ / ""}, UsageError,
+                "--profile: expected a file, got a folder or nothing");
+  EXPECT_THROWS(TraceFile{""}, UsageError, "--profile: expected a file, got a folder or nothing");
+  EXPECT_THROWS(TraceFile{"/dev/null"}, UsageError,
+                "--profile: expected a file, got something else, in /dev/null");
   EXPECT_THAT(names_in(folder_.path()), IsEmpty());
 }
 

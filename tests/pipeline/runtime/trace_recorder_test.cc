@@ -12,6 +12,7 @@
 #include "tests/pipeline/runtime/trace_reading.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -72,12 +73,12 @@ TEST_F(Span, NotesWhatItIsTold) {
 }
 
 TEST_F(Span, IsRecordedWhenAnExceptionEndsIt) {
-  EXPECT_THROW(
+  EXPECT_THROWS(
       {
         const TraceSpan span(&trace_, "a", "c");
         throw std::runtime_error("disk full");
       },
-      std::runtime_error);
+      std::runtime_error, "disk full");
   EXPECT_EQ(events(finished(), "X", "a").size(), 1u);
 }
 

@@ -13,6 +13,7 @@
 #include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -32,19 +33,13 @@ TEST(GreyImageOfAFrame, IsByBt601) {
   EXPECT_EQ(grey_image(blue), (GreyImage{{1, 1}, {23}}));
 }
 
-TEST(SensorImage, ShrinksByAveragingAndCutsAroundTheCentre) {
+TEST(SensorImage, IsScaledToCoverAndCutAroundTheCentre) {
   // 8 x 2 covers 2 x 1 by the scale 1/2: 4 x 1, of which the middle two are left.
-  const GreyImage frame = columns(2, {0, 0, 10, 30, 100, 200, 0, 0});
+  GreyImage frame = columns(2, {0, 0, 10, 30, 100, 200, 0, 0});
   EXPECT_EQ(sensor_image(frame, ImageSize{1, 2}), (GreyImage{{1, 2}, {20, 150}}));
-}
-
-TEST(SensorImage, GrowsToCover) {
   const GreyImage image = sensor_image(columns(2, {50, 50}), ImageSize{6, 4});
   EXPECT_EQ(image, (GreyImage{{6, 4}, std::vector<std::uint8_t>(24, 50)}));
-}
-
-TEST(SensorImage, OfItsOwnSizeIsUntouched) {
-  const GreyImage frame = columns(3, {0, 255, 3});
+  frame = columns(3, {0, 255, 3});
   EXPECT_EQ(sensor_image(frame, ImageSize{3, 3}), sensor_image(frame, std::nullopt));
   EXPECT_EQ(sensor_image(frame, std::nullopt).pixels,
             (std::vector<std::uint8_t>{0, 255, 3, 0, 255, 3, 0, 255, 3}));
@@ -160,8 +155,8 @@ TEST_F(ClipFramesTest, RefusesFramesThatCannotBeUsed) {
   testing::write_file(folder_ / "clip/f2.png", "no image");
   ClipFrames clip = open(R"({"path": "clip"})");
   clip.frame(0);
-  EXPECT_THROW(clip.frame(1), InputError);
-  EXPECT_THROW(clip.frame(2), InputError);
+  EXPECT_THROWS(clip.frame(1), InputError, "expected a frame of 30x20 as the first one, got 30x21");
+  EXPECT_THROWS(clip.frame(2), InputError, "expected an image (JPEG, PNG, WebP, TIFF, BMP or PNM)");
 }
 
 class ClipSceneTest : public ::testing::Test {

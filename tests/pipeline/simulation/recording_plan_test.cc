@@ -10,6 +10,7 @@
 #include "tests/pipeline/simulation/moving_clip.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -19,21 +20,15 @@ std::string settings(const std::string& source, const std::string& more = "") {
   return recording_settings(manifest, manifest.sources.at(0), "clip", "hash", std::nullopt);
 }
 
-TEST(RecordingSettings, AreTheSourcesAndTheSensors) {
+TEST(RecordingSettings, AreTheSourcesAndTheSensorsAlone) {
   const auto json = nlohmann::json::parse(
       settings(R"({"path": "clip", "frame_count": 7})", R"(, "sensor": {"leak_rate_hz": 2})"));
   EXPECT_EQ(json.at("source").at("frame_count"), 7);
   EXPECT_EQ(json.at("sensor").at("leak_rate_hz"), 2);
   EXPECT_EQ(json.at("files"), "hash");
   EXPECT_FALSE(json.contains("size"));
-}
-
-TEST(RecordingSettings, OfOtherSourcesDoNotMatter) {
   EXPECT_EQ(settings(R"({"path": "clip"})"), settings(R"({"path": "clip"}, {"path": "other"})"));
   EXPECT_NE(settings(R"({"path": "clip"})"), settings(R"({"path": "clip"})", R"(, "seed": 1)"));
-}
-
-TEST(RecordingSettings, HowManyImagesFollowDoesNotMatter) {
   EXPECT_EQ(settings(R"({"path": "clip", "method": "affine", "frame_count": 1})"),
             settings(R"({"path": "clip", "method": "affine", "frame_count": 9})"));
 }
@@ -50,7 +45,9 @@ TEST(RecordingSettings, AreReadBackFromARecording) {
     EXPECT_EQ(settings_on_disk(folder / ("a" + ending)), settings);
     for (const char* other : {"", "no recording", "#!AER-DAT4.0\r\n", "% evt 3.0\n% end\n"}) {
       testing::write_file(folder / ("b" + ending), other);
-      EXPECT_THROW(settings_on_disk(folder / ("b" + ending)), InputError) << other;
+      EXPECT_THROWS(settings_on_disk(folder / ("b" + ending)), InputError,
+                    "expected no file, or a recording that eventgan simulate has")
+          << other;
     }
   }
 }

@@ -10,6 +10,7 @@
 #include "manifests/values/faults.h"
 #include "tests/testing/small_job.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -50,17 +51,14 @@ TEST_F(ComparedPairsTest, AreHeldInTheReferencesSizeAndOneOther) {
   }
 }
 
-TEST_F(ComparedPairsTest, ThoseThatCannotBeReadKeepTheirPlace) {
+TEST_F(ComparedPairsTest, ThoseThatCannotBeReadKeepTheirPlaceAndAStopEndsTheReading) {
   std::filesystem::remove(folder_ / "clip" / "f_13.png");
   const ComparedPairs pairs(job_, reference_);
   std::vector<bool> failed;
   for (const SampleMessage& pair : pairs.reference().pairs) failed.push_back(pair.failed());
   EXPECT_THAT(failed, ElementsAre(false, true, false));
-}
-
-TEST_F(ComparedPairsTest, AStopEndsTheReading) {
   stop_ = true;
-  EXPECT_THROW(ComparedPairs(job_, reference_), Stopped);
+  EXPECT_THROWS(ComparedPairs(job_, reference_), Stopped, "stopped on request");
 }
 
 }  // namespace

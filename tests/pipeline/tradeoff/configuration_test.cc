@@ -5,12 +5,12 @@
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 constexpr auto kNetwork = GeneratorKind::kNetwork;
 
@@ -78,19 +78,17 @@ TEST(TrialJob, HasTheConfigurationsKeysAndAllOthersOfTheManifest) {
           R"("output": {"directory":"out","deflate_level":3,"dtype":"uint8"})"));
 }
 
-TEST(TrialJob, OfSizeOneLeavesTheImageAlone) {
+TEST(TrialJob, OfSizeOneLeavesTheImageAloneAndOfAnotherNeedsToKnowTheVolumes) {
   const JobManifest manifest = manifest_with(R"({ "preset": "mpii" })", "{}");
   const TrialJob trial = trial_job(manifest, {{kNetwork, "shipped:8"}, StoredType::kFloat32}, {});
   EXPECT_EQ(trial.manifest.image.size, std::nullopt);
   EXPECT_EQ(trial.lines.size(), 2u);
-}
-
-TEST(TrialJob, OfAnotherSizeNeedsToKnowTheVolumes) {
-  const JobManifest manifest = manifest_with(R"({ "preset": "mpii" })", "{}");
   const Configuration half{{kNetwork, "shipped:8", Precision::kFloat32, 0.5}, StoredType::kUint8};
   EXPECT_EQ(trial_job(manifest, half, ImageSize{100, 60}).manifest.image.size, (ImageSize{50, 30}));
-  EXPECT_THROW(trial_job(manifest, half, std::nullopt), UsageError);
-  EXPECT_THROW(trial_job(manifest, half, ImageSize{100, 30}), UsageError);  // 15 pixels
+  EXPECT_THROWS(trial_job(manifest, half, std::nullopt), UsageError,
+                "size: expected images of one size, or $.image.width and");
+  EXPECT_THROWS(trial_job(manifest, half, ImageSize{100, 30}), UsageError,
+                "shipped:8 float32 x0.5 uint8: $.image.width: expected an");  // 15 pixels
 }
 
 TEST(TrialJob, SimulatorsHaveTheManifestsSensorIfItHasOne) {

@@ -8,6 +8,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "tests/testing/texts.h"
+
 namespace eventgan {
 namespace {
 
@@ -20,16 +22,13 @@ using ::testing::IsNan;
 /// A source of `source` pixels, stretched to the volume.
 Placement stretched(ImageSize source, ImageSize volume) { return {source, volume, volume, 0, 0}; }
 
-TEST(OnGrid, GivesEachPixelTheMeanByAreaOfThoseItCovers) {
+TEST(OnGrid, GivesEachPixelTheMeanByAreaByAxisAndChannel) {
   // Two pixels to three: a new one is 2/3 of an old one wide, the middle one lies half on each.
   const Placement two = stretched({1, 6}, {1, 2});
   const Placement three = stretched({1, 6}, {1, 3});
   EXPECT_THAT(on_grid({3, 6}, 1, two, three), ElementsAre(FloatEq(3), FloatEq(4.5), FloatEq(6)));
   // Three to two: a new one covers one and a half.
   EXPECT_THAT(on_grid({3, 6, 9}, 1, three, two), ElementsAre(FloatEq(4), FloatEq(8)));
-}
-
-TEST(OnGrid, TakesBothAxesAndEachChannelAlone) {
   const Placement small = stretched({4, 4}, {1, 2});
   const Placement large = stretched({4, 4}, {2, 4});
   EXPECT_THAT(on_grid({1, 2, 3, 4}, 2, small, large),
@@ -62,8 +61,10 @@ TEST(OnGrid, FollowsTheImageThroughItsOffsets) {
 TEST(OnGrid, OfTheSamePlacementChangesNothingAndRefusesOthersImages) {
   const Placement same = stretched({5, 5}, {1, 2});
   EXPECT_THAT(on_grid({0.1f, 0.2f}, 1, same, same), ElementsAre(0.1f, 0.2f));
-  EXPECT_THROW(on_grid({1, 2, 3}, 1, same, same), std::invalid_argument);
-  EXPECT_THROW(on_grid({1, 2}, 1, same, stretched({5, 6}, {1, 2})), std::invalid_argument);
+  EXPECT_THROWS(on_grid({1, 2, 3}, 1, same, same), std::invalid_argument,
+                "expected 1 channels of 2 pixels of one source image, got 3");
+  EXPECT_THROWS(on_grid({1, 2}, 1, same, stretched({5, 6}, {1, 2})), std::invalid_argument,
+                "expected 1 channels of 2 pixels of one source image, got 2");
 }
 
 TEST(LabelledPixels, AreThoseOfBoxesWhoseCentreLiesInside) {

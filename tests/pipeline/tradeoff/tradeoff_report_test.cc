@@ -64,19 +64,13 @@ TEST(TrialSummary, HasMediansOverTheRoundsAndRatiosWithinThem) {
   EXPECT_EQ(summary.stored_bytes, 7);
 }
 
-TEST(ParetoFront, HasWhatNothingElseBeats) {
+TEST(ParetoFront, HasWhatNothingElseBeatsByAHundredth) {
   EXPECT_THAT(pareto_front(summaries(small_report())), ElementsAre(0, 2, 3));
   EXPECT_TRUE(pareto_front({}).empty());
-}
-
-TEST(ParetoFront, OfEqualsHasTheFirst) {
   TradeoffReport report;
   report.trials = {trial_of("a", 2, 0.1), trial_of("b", 2, 0.1)};
   EXPECT_THAT(pareto_front(summaries(report)), ElementsAre(0));
-}
-
-TEST(ParetoFront, TakesAHundredthOfTheErrorForNoDifference) {
-  TradeoffReport report;
+  report = TradeoffReport();
   report.trials = {trial_of("a", 2, 0.1), trial_of("b", 3, 0.1015), trial_of("c", 4, 0.102)};
   EXPECT_THAT(pareto_front(summaries(report)), ElementsAre(0, 2));  // from c on: b is as near
 }

@@ -13,6 +13,7 @@
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/small_job.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -164,7 +165,7 @@ TEST(MeasureTradeoff, StopsOnRequest) {
   for (const int part : {1, 2, 3}) {
     asked = 0;
     calls_until_stop = calls * part / 4;
-    EXPECT_THROW(measure_tradeoff(manifest, options), Stopped) << part;
+    EXPECT_THROWS(measure_tradeoff(manifest, options), Stopped, "stopped on request") << part;
   }
 }
 
@@ -173,13 +174,16 @@ TEST(MeasureTradeoff, RefusesWhatCannotBeCompared) {
   const JobManifest manifest = testing::make_small_job(folder, 3);
   TradeoffOptions options = small_options();
   options.axes.sizes = {0.5};  // 15x10 pixels
-  EXPECT_THROW(measure_tradeoff(manifest, options), UsageError);
+  EXPECT_THROWS(measure_tradeoff(manifest, options), UsageError,
+                "expected a configuration that can be run, got none");
   options.axes.sizes = {1};
   options.reference = {GeneratorKind::kNetwork, "untrained:1", Precision::kInt8, 1};
-  EXPECT_THROW(measure_tradeoff(manifest, options), UsageError);
+  EXPECT_THROWS(measure_tradeoff(manifest, options), UsageError,
+                "--reference: expected a configuration that can be run");
   options.reference.reset();
   options.axes.weights = {"none.safetensors"};
-  EXPECT_THROW(measure_tradeoff(manifest, options), InputError);
+  EXPECT_THROWS(measure_tradeoff(manifest, options), InputError,
+                "expected a readable file, got 'No such file or directory'");
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -61,29 +62,23 @@ TEST(OpenTrainingRecordings, ListsEveryRecordingOfNoUse) {
                 AllOf(HasSubstr("expected last_frame below the number of frames, 9, got 9"),
                       HasSubstr("got frames 8 to 8"), HasSubstr("bar.hdf5")));
   }
-  EXPECT_THROW(open_training_recordings(std::vector{late}, folder.path(), {57, 64}, 1), UsageError);
+  EXPECT_THROWS(open_training_recordings(std::vector{late}, folder.path(), {57, 64}, 1), UsageError,
+                "expected images of at least 64x57 (crop), got 64x56");
 }
 
-TEST(OpenTrainingRecordings, NeedFrames) {
+TEST(OpenTrainingRecordings, NeedFramesAndSayWhatIsAbsent) {
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "events.csv", "t,x,y,p\n1,2,3,1\n");
   RecordingSpec table;
   table.path = "events.csv";
   table.format = RecordingFormat::kTable;
   table.options.sensor = ImageSize{16, 16};
-  EXPECT_THAT(
-      [&] {
-        open_training_recordings(std::vector{table}, folder.path(), {16, 16}, 1);
-      },
-      ::testing::ThrowsMessage<UsageError>(
-          AllOf(HasSubstr("expected a recording with frames, got one without"),
-                HasSubstr("events.csv"))));
-}
-
-TEST(OpenTrainingRecordings, SaysWhatIsAbsent) {
+  EXPECT_THROWS(open_training_recordings(std::vector{table}, folder.path(), {16, 16}, 1),
+                UsageError, "expected a recording with frames, got one without", "events.csv");
   RecordingSpec absent;
   absent.path = "absent.hdf5";
-  EXPECT_THROW(open_training_recordings(std::vector{absent}, "/nowhere", {16, 16}, 1), InputError);
+  EXPECT_THROWS(open_training_recordings(std::vector{absent}, "/nowhere", {16, 16}, 1), InputError,
+                "expected a recording of an event camera, got a file that");
 }
 
 constexpr int kBins = 3;
@@ -178,7 +173,7 @@ TEST(CropReader, CountsEventsBetweenTheFramesTimesWhereItKnowsTheThreshold) {
   EXPECT_THAT(sample.volume, ::testing::Pointwise(::testing::FloatNear(1e-6f), expected));
 }
 
-TEST(CropReader, OfOneEventAndAThresholdIsWhereTheEventIs) {
+TEST(CropReader, WithAThresholdOfOneEventIsWhereItIsAndOfNoneEmpty) {
   // Without a threshold it spans the bins alone, and lies in the first.
   for (const bool known : {false, true}) {
     const FakeRecording recording = two_frames({{0, 0, 0.75, true}});
@@ -189,9 +184,6 @@ TEST(CropReader, OfOneEventAndAThresholdIsWhereTheEventIs) {
         known ? std::vector<float>{0, 0.5f, 0.5f, 0, 0, 0} : std::vector<float>{1, 0, 0, 0, 0, 0};
     EXPECT_EQ(sample.volume, expected);
   }
-}
-
-TEST(CropReader, OfNoEventsAndAThresholdIsEmpty) {
   const CropReader reader = sensor_reader_of(two_frames({{0, 0, 0.5, true}}));
   for (const std::int64_t first : {0, 1}) {
     const TrainingSample sample = reader.read(0, first, 1, {1, 1, {2, 2}});

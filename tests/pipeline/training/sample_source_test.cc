@@ -25,6 +25,7 @@
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -125,7 +126,7 @@ TEST(DrawSample, TakesOneFrameTwiceForTheStaticShare) {
   }
 }
 
-TEST(DrawSample, AnotherAttemptKeepsTheRecording) {
+TEST(DrawSample, AnotherAttemptKeepsTheRecordingAndNothingIsRefused) {
   const auto recordings = long_and_short();
   int moved = 0;
   for (int i = 0; i < 100; ++i) {
@@ -135,10 +136,8 @@ TEST(DrawSample, AnotherAttemptKeepsTheRecording) {
     moved += !same(first, second);
   }
   EXPECT_GT(moved, 50);
-}
-
-TEST(DrawSample, RefusesNothingToDrawFrom) {
-  EXPECT_THROW(draw({}, drawing_manifest(), 0), std::invalid_argument);
+  EXPECT_THROWS(draw({}, drawing_manifest(), 0), std::invalid_argument,
+                "expected a recording to draw from, got none");
 }
 
 TrainingManifest source_manifest() {
@@ -425,7 +424,8 @@ TEST_F(SimulatedSamples, LeaveTheOthersAsTheyAre) {
 
 TEST_F(SimulatedSamples, NeedTheirTextures) {
   manifest_.directory = folder_ / "absent";
-  EXPECT_THROW(source(0.5), InputError);
+  EXPECT_THROWS(source(0.5), InputError,
+                "filesystem error: recursive directory iterator cannot open");
 }
 
 /// With a teacher of the thresholds 0.05 to 1.
@@ -491,7 +491,8 @@ TEST_F(TaughtSamples, NeedATeacherThatHasLearntTheSame) {
   write_teacher();
   EXPECT_THAT(fault(), ::testing::HasSubstr("got ones that have learnt none"));
   testing::write_file(folder_ / "wide.safetensors", "no weights");
-  EXPECT_THROW(open_teacher(manifest_), InputError);
+  EXPECT_THROWS(open_teacher(manifest_), InputError,
+                "expected a header inside the file, got a length of");
 }
 
 BatchPrefetch::Batch batch_of(std::int64_t step) {
@@ -505,7 +506,8 @@ TEST(BatchPrefetch, GivesTheStepsInOrder) {
   for (const std::string step : {"3", "4", "5", "6"}) {
     EXPECT_EQ(batches.next().at(0).origin, step);
   }
-  EXPECT_THROW(batches.next(), std::out_of_range);
+  EXPECT_THROWS(batches.next(), std::out_of_range,
+                "expected a step before the last, got none left");
 }
 
 TEST(BatchPrefetch, StartsNoMoreThanItMay) {
@@ -520,7 +522,8 @@ TEST(BatchPrefetch, StartsNoMoreThanItMay) {
 
 TEST(BatchPrefetch, HasNothingForNoSteps) {
   BatchPrefetch batches(batch_of, 5, 5, 2);
-  EXPECT_THROW(batches.next(), std::out_of_range);
+  EXPECT_THROWS(batches.next(), std::out_of_range,
+                "expected a step before the last, got none left");
 }
 
 TEST(BatchPrefetch, RethrowsAtTheStepThatFailed) {
@@ -531,7 +534,7 @@ TEST(BatchPrefetch, RethrowsAtTheStepThatFailed) {
       },
       0, 3, 3);
   EXPECT_EQ(batches.next().at(0).origin, "0");
-  EXPECT_THROW(batches.next(), std::runtime_error);
+  EXPECT_THROWS(batches.next(), std::runtime_error, "torn file");
 }
 
 }  // namespace

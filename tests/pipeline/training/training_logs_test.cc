@@ -12,6 +12,7 @@
 #include "pipeline/training/loss_log.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -20,7 +21,7 @@ const CsvTable::Row kColumns{"step", "loss"};
 
 bool keep_all(const CsvTable::Row&) { return true; }
 
-TEST(CsvTable, BeginsWithItsColumns) {
+TEST(CsvTable, BeginsWithItsColumnsAndAnewWhereTheyDiffer) {
   const testing::TemporaryFolder folder;
   CsvTable table(folder / "t.csv", kColumns, keep_all);
   table.add({"0", "1.5"});
@@ -28,9 +29,11 @@ TEST(CsvTable, BeginsWithItsColumns) {
   table.flush();
   EXPECT_EQ(testing::read_file(folder / "t.csv"), "step,loss\n0,1.5\n1,\n");
   EXPECT_TRUE(table.kept().empty());
+  EXPECT_THROWS(CsvTable("/nowhere/t.csv", kColumns, keep_all), std::runtime_error,
+                "cannot create /nowhere");
 }
 
-TEST(CsvTable, CutsOffWhatIsNotToBeKept) {
+TEST(CsvTable, CutsOffWhatIsNotToBeKeptAndATornEnd) {
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "t.csv", "step,loss\n0,1\n1,2\n2,3\n3,4\n");
   CsvTable table(folder / "t.csv", kColumns,
@@ -39,10 +42,6 @@ TEST(CsvTable, CutsOffWhatIsNotToBeKept) {
   table.add({"2", "9"});
   table.flush();
   EXPECT_EQ(testing::read_file(folder / "t.csv"), "step,loss\n0,1\n1,2\n2,9\n");
-}
-
-TEST(CsvTable, CutsOffATornEnd) {
-  const testing::TemporaryFolder folder;
   for (const char* torn : {"step,loss\n0,1\n1,2", "step,loss\n0,1\n1\n2,3\n"}) {
     testing::write_file(folder / "t.csv", torn);
     const CsvTable table(folder / "t.csv", kColumns, keep_all);
@@ -56,10 +55,6 @@ TEST(CsvTable, BeginsAnewWhereTheColumnsDiffer) {
   const CsvTable table(folder / "t.csv", kColumns, keep_all);
   EXPECT_TRUE(table.kept().empty());
   EXPECT_EQ(testing::read_file(folder / "t.csv"), "step,loss\n");
-}
-
-TEST(CsvTable, NamesTheFileItCannotWrite) {
-  EXPECT_THROW(CsvTable("/nowhere/t.csv", kColumns, keep_all), std::runtime_error);
 }
 
 TEST(CsvNumber, HasSixDigitsAndIsEmptyForNaN) {

@@ -11,6 +11,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "tests/testing/texts.h"
+
 namespace eventgan {
 namespace {
 
@@ -176,7 +178,7 @@ TEST(DrawEvents, EachPixelsPhaseIsUniform) {
   for (const double count : events) EXPECT_NEAR(count / kSeeds, 0.3, bound);
 }
 
-TEST(DrawEvents, WhatIsNotFiniteStaysSo) {
+TEST(DrawEvents, WhatIsNotFiniteStaysSoAndHugeRatesStayWhole) {
   const VolumeShape shape{2, {1, 2}};
   std::vector<float> rates(shape.value_count(), 0.5f);
   rates[1] = std::numeric_limits<float>::quiet_NaN();
@@ -185,16 +187,14 @@ TEST(DrawEvents, WhatIsNotFiniteStaysSo) {
   EXPECT_FALSE(std::isfinite(events[1]));
   EXPECT_FALSE(std::isfinite(events[4]));
   EXPECT_TRUE(std::isfinite(events[0]));
+  rates = std::vector<float>(17);
+  EXPECT_THROWS(draw_events(rates, {9, {1, 1}}, CounterRandom(1)), std::invalid_argument,
+                "expected 18 values of a volume, got 17");
 }
 
 TEST(DrawEvents, HugeRatesStayWhole) {
   const VolumeShape shape{9, {1, 1}};
   EXPECT_THAT(drawn(std::vector<float>(18, 1e30f), shape, 1), Each(1e30f));
-}
-
-TEST(DrawEvents, RefusesAnotherSize) {
-  std::vector<float> rates(17);
-  EXPECT_THROW(draw_events(rates, {9, {1, 1}}, CounterRandom(1)), std::invalid_argument);
 }
 
 }  // namespace

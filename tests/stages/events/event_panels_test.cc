@@ -11,6 +11,7 @@
 #include "stages/events/images/detail/time_panel.h"
 #include "stages/events/images/preview_image.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -72,16 +73,13 @@ TEST(TimePanel, PolaritiesAreWeightedByTheirEvents) {
   }
 }
 
-TEST(TimePanel, BrightnessIsAbsolute) {
+TEST(TimePanel, BrightnessIsAbsoluteAndUnsoundValuesAreWhite) {
   EXPECT_EQ(brightest(pixel_of(4, 0)), 0);
   // 1 - exp(-0.02) = 2 % of at most 255: noise stays faint.
   EXPECT_LE(brightest(pixel_of(4, 0.02f)), 6);
   EXPECT_GT(brightest(pixel_of(4, 0.02f)), 0);
   EXPECT_GT(brightest(pixel_of(4, 5)), 200);
   EXPECT_GT(brightest(pixel_of(4, std::numeric_limits<float>::max())), 200);
-}
-
-TEST(TimePanel, UnsoundValuesAreWhite) {
   const cv::Vec3b white(255, 255, 255);
   EXPECT_EQ(pixel_of(3, std::numeric_limits<float>::quiet_NaN()), white);
   EXPECT_EQ(pixel_of(12, std::numeric_limits<float>::infinity()), white);
@@ -147,21 +145,21 @@ TEST(WriteComparisonPng, ShowsFramesVolumesAndEventsABin) {
   EXPECT_GT(plot(80, 15)[0], 100);
 }
 
-TEST(WriteComparisonPng, TakesPairsOfSeveralSizes) {
+TEST(WriteComparisonPng, TakesPairsOfSeveralSizesThatFit) {
   const testing::TemporaryFolder folder;
   write_comparison_png(std::vector{pair_of({3, 400}), pair_of({3, 3})}, folder / "pairs.png");
   EXPECT_EQ(cv::imread((folder / "pairs.png").string()).cols, 5 * 406 + 6);
-}
-
-TEST(WriteComparisonPng, RefusesWhatDoesNotFit) {
   ComparedPair pair = pair_of({4, 4});
   pair.volumes[1].volume.pop_back();
-  EXPECT_THROW(write_comparison_png(std::vector{pair}, "/tmp/never.png"), std::invalid_argument);
+  EXPECT_THROWS(write_comparison_png(std::vector{pair}, "/tmp/never.png"), std::invalid_argument,
+                "expected two frames and volumes of one size, got others");
   pair.volumes.clear();
-  EXPECT_THROW(write_comparison_png(std::vector{pair}, "/tmp/never.png"), std::invalid_argument);
-  EXPECT_THROW(write_comparison_png({}, "/tmp/never.png"), std::invalid_argument);
-  EXPECT_THROW(write_comparison_png(std::vector{pair_of({4, 4})}, "/nowhere/pairs.png"),
-               std::runtime_error);
+  EXPECT_THROWS(write_comparison_png(std::vector{pair}, "/tmp/never.png"), std::invalid_argument,
+                "expected two frames and volumes of one size, got others");
+  EXPECT_THROWS(write_comparison_png({}, "/tmp/never.png"), std::invalid_argument,
+                "expected pairs to compare, got none");
+  EXPECT_THROWS(write_comparison_png(std::vector{pair_of({4, 4})}, "/nowhere/pairs.png"),
+                std::runtime_error, "cannot create /nowhere");
 }
 
 }  // namespace

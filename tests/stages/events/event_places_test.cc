@@ -21,11 +21,8 @@ std::vector<float> volume() {
   return values;
 }
 
-TEST(EventPlaces, SumsOfChannels) {
+TEST(EventPlaces, AreSumsOfChannelsAndTheMaskHasPixelsThatSumToEnough) {
   EXPECT_THAT(channel_sums(volume(), kShape), ElementsAre(1.125, 2.125, 3.125, 4.125));
-}
-
-TEST(EventPlaces, TheMaskHasPixelsThatSumToEnough) {
   EXPECT_THAT(event_mask(volume(), kShape, 0.5), ElementsAre(1, 1, 1, 1, 0, 1));
   EXPECT_THAT(event_mask(volume(), kShape, 1.5), ElementsAre(0, 1, 1, 1, 0, 0));
 }

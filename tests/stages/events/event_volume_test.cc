@@ -8,6 +8,7 @@
 
 #include "tests/testing/golden_numbers.h"
 #include "tests/testing/shared_data.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -47,7 +48,7 @@ TEST(EventVolume, TimeIsSharedLinearlyBetweenTheTwoNearestBins) {
   EXPECT_FLOAT_EQ(volume[index(8, 0, 0)], 1.0f);
 }
 
-TEST(EventVolume, NoBinCountIndexesBeyondTheLastBin) {
+TEST(EventVolume, NoBinCountIndexesBeyondTheLastBinNorCountsBeyondFloat32) {
   // Times whose scaled value may round up past the last bin; the sum proves that no event is lost.
   for (int bins = 1; bins <= 64; ++bins) {
     const VolumeShape shape{bins, {1, 1}};
@@ -56,22 +57,23 @@ TEST(EventVolume, NoBinCountIndexesBeyondTheLastBin) {
     const auto volume = event_volume(events, shape);
     EXPECT_NEAR(std::accumulate(volume.begin(), volume.end(), 0.0), 31.0, 1e-4) << bins;
   }
+  // 1 added to 2^24 is 2^24 in float32; 2^24 + 8 is a float32 again.
+  const std::vector<Event> events((1 << 24) + 8, Event{0, 0, 0, true});
+  EXPECT_EQ(event_volume(events, {1, {1, 1}})[0], float((1 << 24) + 8));
 }
 
-TEST(EventVolume, RefusesEventsOutsideTheImageAndTimesThatAreNotFinite) {
+TEST(EventVolume, RefusesEventsOutsideOrOutOfTimeOrder) {
   for (const Event bad : {Event{5, 0, 0, true}, Event{-1, 0, 0, true}, Event{0, 4, 0, true},
                           Event{0, 0, std::numeric_limits<double>::quiet_NaN(), true}}) {
-    EXPECT_THROW(event_volume({&bad, 1}, kShape), std::invalid_argument);
+    EXPECT_THROWS(event_volume({&bad, 1}, kShape), std::invalid_argument,
+                  "expected an event with a finite time inside 5x4 pixels");
   }
-}
-
-TEST(EventVolume, RefusesEventsThatAreNotInTimeOrderOrTooFarApart) {
-  EXPECT_THROW(
+  EXPECT_THROWS(
       event_volume(std::vector<Event>{{0, 0, 1, true}, {0, 0, 0.5, true}, {0, 0, 2, true}}, kShape),
-      std::invalid_argument);
+      std::invalid_argument, "expected events in time order, got t=0.500000 after");
   // 8 (t_N - t_1) of more than 1.8e308 would make t* = infinity / infinity.
-  EXPECT_THROW(event_volume(std::vector<Event>{{0, 0, -1e308, true}, {0, 0, 1e308, true}}, kShape),
-               std::invalid_argument);
+  EXPECT_THROWS(event_volume(std::vector<Event>{{0, 0, -1e308, true}, {0, 0, 1e308, true}}, kShape),
+                std::invalid_argument, "expected times whose differences are finite");
   const auto volume =
       event_volume(std::vector<Event>{{0, 0, 0, true}, {0, 0, 2e307, true}}, kShape);
   EXPECT_EQ(volume[index(8, 0, 0)], 1.0f);
@@ -89,12 +91,6 @@ TEST(EventVolume, AShortRecordingLateOnAClockKeepsItsTimes) {
       late, ::testing::Pointwise(::testing::FloatNear(40 * 0.0012f), event_volume(events, kShape)));
 }
 
-TEST(EventVolume, CountsBeyondWhatFloat32CanCountTo) {
-  // 1 added to 2^24 is 2^24 in float32; 2^24 + 8 is a float32 again.
-  const std::vector<Event> events((1 << 24) + 8, Event{0, 0, 0, true});
-  EXPECT_EQ(event_volume(events, {1, {1, 1}})[0], float((1 << 24) + 8));
-}
-
 TEST(EventVolume, OfAPartOfTheEventsHasTheTimesOfAll) {
   const std::vector<Event> events{{0, 0, 2, true}, {0, 0, 4, true}};
   // t* = 2 (t - 1) / 4: 0.5 and 1.5.
@@ -104,7 +100,8 @@ TEST(EventVolume, OfAPartOfTheEventsHasTheTimesOfAll) {
             event_volume(events, {3, {1, 1}}));
   EXPECT_EQ(event_volume({}, {3, {1, 1}}, std::array{2.0, 4.0}), std::vector<float>(6));
   for (const std::array<double, 2> times_s : {std::array{2.5, 5.0}, std::array{1.0, 3.0}}) {
-    EXPECT_THROW(event_volume(events, {3, {1, 1}}, times_s), std::invalid_argument);
+    EXPECT_THROWS(event_volume(events, {3, {1, 1}}, times_s), std::invalid_argument,
+                  "expected events from t=");
   }
 }
 
@@ -114,19 +111,13 @@ TEST(PlacedEvents, ComeToThePixelThatTheirCentreFallsIn) {
   place_events({{2, 4}, {1, 6}, {1, 6}, 0, 0}, events);
   EXPECT_EQ(events, (std::vector<Event>{
                         {0, 0, 1, true}, {2, 0, 2, false}, {3, 0, 2, true}, {5, 0, 3, true}}));
-}
-
-TEST(PlacedEvents, LieInsideTheBordersAndAreCutWithTheImage) {
   std::vector<Event> letterboxed{{0, 0, 1, true}, {3, 1, 2, true}};
   place_events({{2, 4}, {2, 4}, {6, 4}, 0, 2}, letterboxed);  // two rows of border above
   EXPECT_EQ(letterboxed, (std::vector<Event>{{0, 2, 1, true}, {3, 3, 2, true}}));
   std::vector<Event> cut{{0, 0, 1, true}, {1, 0, 1, true}, {2, 1, 2, true}, {3, 1, 3, true}};
   place_events({{2, 4}, {2, 4}, {2, 2}, -1, 0}, cut);  // a column less on either side
   EXPECT_EQ(cut, (std::vector<Event>{{0, 0, 1, true}, {1, 1, 2, true}}));
-}
-
-TEST(PlacedEvents, StayWhereTheyAreInASizeOfTheirOwn) {
-  std::vector<Event> events{{8191, 8191, 1, true}, {0, 0, 1, true}};
+  events = std::vector<Event>{{8191, 8191, 1, true}, {0, 0, 1, true}};
   place_events({{8192, 8192}, {8192, 8192}, {8192, 8192}, 0, 0}, events);
   EXPECT_EQ(events, (std::vector<Event>{{8191, 8191, 1, true}, {0, 0, 1, true}}));
 }
@@ -152,22 +143,16 @@ TEST(EventVolume, EqualsThePublishedCode) {
 
 TEST(TimeImage, IsTheMeanTimeWeightedByTheVolume) {
   // 3 bins at 0.1, 0.55, 1; one pixel with 1 in the first and 3 in the last: (0.1 + 3) / 4 = 0.775.
-  const std::vector<float> volume{1, 0, 3, 0, 2, 0};
-  const TimeImage image = time_image(volume, {3, {1, 1}});
+  std::vector<float> volume{1, 0, 3, 0, 2, 0};
+  TimeImage image = time_image(volume, {3, {1, 1}});
   EXPECT_NEAR(image.positive[0], 0.775f, 1e-5f);
   EXPECT_NEAR(image.negative[0], 0.55f, 1e-5f);
-}
-
-TEST(TimeImage, WithoutEventsIsZero) {
-  const std::vector<float> volume(2 * 9 * 6, 0.0f);
-  const TimeImage image = time_image(volume, {9, {2, 3}});
+  volume = std::vector<float>(2 * 9 * 6, 0.0f);
+  image = time_image(volume, {9, {2, 3}});
   EXPECT_EQ(image.positive.size(), 6u);
   EXPECT_THAT(image.positive, ::testing::Each(0.0f));
   EXPECT_THAT(image.negative, ::testing::Each(0.0f));
-}
-
-TEST(TimeImage, OfOneBinIsTheFirstTime) {
-  const std::vector<float> volume{5, 0};
+  volume = std::vector<float>{5, 0};
   EXPECT_NEAR(time_image(volume, {1, {1, 1}}).positive[0], 0.1f, 1e-6f);
 }
 

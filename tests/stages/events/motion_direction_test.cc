@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "stages/events/event_volume.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -90,39 +91,29 @@ DirectionScore score_of(const std::vector<float>& volume, Velocity flow,
 
 class MotionDirectionAngles : public ::testing::TestWithParam<int> {};
 
-TEST_P(MotionDirectionAngles, AMovingDiscShowsWhereItGoes) {
+TEST_P(MotionDirectionAngles, AMovingDiscShowsWhereItGoesAndAnEdgeNothing) {
   const Velocity velocity = towards(GetParam());
   const std::vector<float> volume = moving_disc(velocity);
-  const DirectionScore score = score_of(volume, velocity);
+  DirectionScore score = score_of(volume, velocity);
   EXPECT_GT(score.pixels, 150);  // of about 2 x 24 x 6 that are swept
   EXPECT_EQ(score.fraction(), 1);
   EXPECT_EQ(score_of(volume, towards(GetParam() + 90)).within, 0);
-}
-
-TEST_P(MotionDirectionAngles, PlayedBackwardsItShowsTheOpposite) {
-  const Velocity velocity = towards(GetParam());
-  const DirectionScore score = score_of(backwards(moving_disc(velocity)), velocity);
+  score = score_of(backwards(moving_disc(velocity)), velocity);
   EXPECT_GT(score.pixels, 150);
   EXPECT_EQ(score.within, 0);
-}
-
-TEST_P(MotionDirectionAngles, AStraightEdgeDeterminesNoDirection) {
   EXPECT_EQ(score_of(moving_edge(GetParam()), towards(GetParam())).pixels, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(EightDirections, MotionDirectionAngles,
                          ::testing::Values(0, 45, 90, 135, 180, 225, 270, 315));
 
-TEST(MotionDirection, ToleranceIsAnAngle) {
-  const std::vector<float> volume = moving_disc(towards(0));
+TEST(MotionDirection, ToleranceIsAnAngleAndFaintNoiseIsNotCounted) {
+  std::vector<float> volume = moving_disc(towards(0));
   DirectionSettings wide;
   wide.tolerance_deg = 75;
   EXPECT_EQ(score_of(volume, towards(55), wide).fraction(), 1);
   EXPECT_EQ(score_of(volume, towards(55)).fraction(), 0);
-}
-
-TEST(MotionDirection, FaintNoiseIsNotCounted) {
-  std::vector<float> volume = moving_disc(towards(45));
+  volume = moving_disc(towards(45));
   const DirectionScore clean = score_of(volume, towards(45));
   for (std::size_t i = 0; i < volume.size(); i += 8) volume[i] += 1e-3f;
   const DirectionScore noisy = score_of(volume, towards(45));
@@ -130,8 +121,8 @@ TEST(MotionDirection, FaintNoiseIsNotCounted) {
   EXPECT_EQ(noisy.fraction(), 1);
 }
 
-TEST(MotionDirection, StillEmptyAndUnknownHaveNoPixels) {
-  const std::vector<float> volume = moving_disc(towards(0));
+TEST(MotionDirection, StillEmptyUnknownAndSmallHaveNoPixels) {
+  std::vector<float> volume = moving_disc(towards(0));
   EXPECT_EQ(score_of(volume, {0, 0}).pixels, 0);
   EXPECT_EQ(score_of(volume, {0.5, 0.5}).pixels, 0);
   EXPECT_EQ(score_of(volume, {std::numeric_limits<double>::quiet_NaN(), 3}).pixels, 0);
@@ -140,10 +131,7 @@ TEST(MotionDirection, StillEmptyAndUnknownHaveNoPixels) {
       score_of(std::vector<float>(kMovedShape.value_count(), 0.0f), towards(0));
   EXPECT_EQ(empty.pixels, 0);
   EXPECT_EQ(empty.fraction(), 0);
-}
-
-TEST(MotionDirection, ImagesSmallerThanTheWindow) {
-  const std::vector<float> volume(2 * 9 * 2 * 3, 1.0f);
+  volume = std::vector<float>(2 * 9 * 2 * 3, 1.0f);
   const std::vector<float> flow(6, 2.0f);
   EXPECT_EQ(motion_direction(volume, {9, {2, 3}}, flow, flow).pixels, 0);
 }
@@ -152,15 +140,21 @@ TEST(MotionDirection, RefusesSizesThatDiffer) {
   const VolumeShape shape{1, {1, 2}};
   const std::vector<float> volume(4, 0.0f);
   const std::vector<float> flow(2, 1.0f);
-  EXPECT_THROW(motion_direction({}, shape, flow, flow), std::invalid_argument);
-  EXPECT_THROW(motion_direction(volume, shape, {}, flow), std::invalid_argument);
-  EXPECT_THROW(motion_direction(volume, shape, flow, volume), std::invalid_argument);
-  EXPECT_THROW(motion_direction({}, {1, {0, 0}}, {}, {}), std::invalid_argument);
+  EXPECT_THROWS(motion_direction({}, shape, flow, flow), std::invalid_argument,
+                "expected a volume [2, H, W] and flows of 2x1 pixels, got 0");
+  EXPECT_THROWS(motion_direction(volume, shape, {}, flow), std::invalid_argument,
+                "expected a volume [2, H, W] and flows of 2x1 pixels, got 4");
+  EXPECT_THROWS(motion_direction(volume, shape, flow, volume), std::invalid_argument,
+                "expected a volume [2, H, W] and flows of 2x1 pixels, got 4");
+  EXPECT_THROWS(motion_direction({}, {1, {0, 0}}, {}, {}), std::invalid_argument,
+                "expected a volume [2, H, W] and flows of 0x0 pixels, got 0");
   DirectionSettings even;
   even.window = 4;
-  EXPECT_THROW(motion_direction(volume, shape, flow, flow, even), std::invalid_argument);
+  EXPECT_THROWS(motion_direction(volume, shape, flow, flow, even), std::invalid_argument,
+                "expected an odd window, got 4");
   const std::vector<float> unsound{0, std::numeric_limits<float>::quiet_NaN(), 0, 0};
-  EXPECT_THROW(motion_direction(unsound, shape, flow, flow), std::invalid_argument);
+  EXPECT_THROWS(motion_direction(unsound, shape, flow, flow), std::invalid_argument,
+                "expected finite values >= 0, got nan");
 }
 
 }  // namespace

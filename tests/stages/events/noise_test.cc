@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/testing/texts.h"
+
 namespace eventgan {
 namespace {
 
@@ -99,19 +101,13 @@ TEST(Noise, IsPoissonInEveryVoxelFewOrMany) {
   }
 }
 
-TEST(Noise, IsAddedToWhatIsThere) {
+TEST(Noise, IsAddedToWhatIsThereAndFollowsFromThePair) {
   const std::vector<float> alone = noise(kShotAndLeak, 1);
   std::vector<float> volume(kCameraShape.value_count(), 0.25f);
   add_noise(kShotAndLeak, 1, kCameraShape, {CounterRandom(2), CounterRandom(1)}, volume);
   for (std::size_t i = 0; i < volume.size(); ++i) ASSERT_EQ(volume[i], alone[i] + 0.25f);
-}
-
-TEST(Noise, OfNoRateIsNone) {
   EXPECT_THAT(noise({}, 10), Each(0.0f));
   EXPECT_THAT(noise({.shot_hz = {1000, 1000}, .hot_pixels = {1, 1}}, 0), Each(0.0f));
-}
-
-TEST(Noise, FollowsFromThePair) {
   EXPECT_EQ(noise(kShotAndLeak, 1, 1), noise(kShotAndLeak, 1, 1));
   EXPECT_EQ(noise(kShotAndLeak, 1, 1, 2), noise(kShotAndLeak, 1, 1, 3)) << "no hot pixels";
   EXPECT_NE(noise(kShotAndLeak, 1, 1), noise(kShotAndLeak, 1, 2));
@@ -138,7 +134,7 @@ TEST(Noise, RatesAreDrawnUniformlyForEachPair) {
 
 constexpr NoiseSpec kHotNoise{.hot_pixels = {0.1, 0.1}};
 
-TEST(HotPixels, AreACamerasAndNotAPairs) {
+TEST(HotPixels, AreACamerasAndOfASmallerShareAmongThoseOfALarger) {
   // Over 10 s the slowest has 50 events: none is silent.
   const std::vector<bool> hot = struck(noise(kHotNoise, 10, 1));
   EXPECT_EQ(struck(noise(kHotNoise, 10, 7)), hot);
@@ -146,9 +142,6 @@ TEST(HotPixels, AreACamerasAndNotAPairs) {
   EXPECT_NE(struck(noise(kHotNoise, 10, 1, /*camera=*/3)), hot);
   const double count = static_cast<double>(std::ranges::count(hot, true));
   EXPECT_NEAR(count, 0.1 * kCameraPixels, 5 * std::sqrt(0.1 * 0.9 * kCameraPixels));
-}
-
-TEST(HotPixels, OfASmallerShareAreAmongThoseOfALarger) {
   const std::vector<bool> more = struck(noise(kHotNoise, 10));
   const std::vector<bool> few = struck(noise({.hot_pixels = {0.02, 0.02}}, 10));
   EXPECT_GT(std::ranges::count(few, true), 0);
@@ -194,7 +187,7 @@ TEST(Noise, OfOnePixelAndOneBin) {
   EXPECT_THAT(noise({}, 1, 1, 2, {1, {0, 0}}), ::testing::IsEmpty());
 }
 
-TEST(Noise, OfEnormousRatesIsFinite) {
+TEST(Noise, OfEnormousRatesIsFiniteAndNeedsAVolumeOfItsShape) {
   const NoiseSpec spec{.shot_hz = {kMostNoise_hz, kMostNoise_hz},
                        .leak_hz = {kMostNoise_hz, kMostNoise_hz},
                        .hot_pixels = {1, 1}};
@@ -204,13 +197,10 @@ TEST(Noise, OfEnormousRatesIsFinite) {
       ASSERT_GT(value, 0);
     }
   }
-}
-
-TEST(Noise, NeedsAVolumeOfItsShape) {
   std::vector<float> volume(7);
-  EXPECT_THROW(
+  EXPECT_THROWS(
       add_noise(kShotAndLeak, 1, kCameraShape, {CounterRandom(2), CounterRandom(1)}, volume),
-      std::invalid_argument);
+      std::invalid_argument, "expected a volume of 109080 values, got 7");
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "stages/events/images/skeleton.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -72,18 +73,17 @@ int connected(const std::vector<Limb>& limbs, int from, std::size_t joints) {
   return std::accumulate(reached.begin(), reached.end(), 0);
 }
 
-TEST(Skeleton, MpiiIsOneTree) {
+TEST(Skeleton, OfKnownNamesIsOneTree) {
   const auto limbs = limbs_of(kMpii);
   EXPECT_EQ(limbs.size(), 15u);  // a tree of 16 joints
   EXPECT_EQ(connected(limbs, 6, 16), 16);
-}
-
-TEST(Skeleton, Human36mWith17JointsIsOneTree) {
   for (const auto& names : {kHuman36m17, kHuman36m17Short}) {
     const auto limbs = limbs_of(names);
     EXPECT_EQ(limbs.size(), 16u);
     EXPECT_EQ(connected(limbs, 0, 17), 17);
   }
+  EXPECT_TRUE(limbs_of({}).empty());
+  EXPECT_TRUE(limbs_of({"joint 0", "joint 1", "pelvis"}).empty());
 }
 
 TEST(Skeleton, Human36mWith32JointsHasToesAndCollarbones) {
@@ -103,11 +103,6 @@ TEST(Skeleton, SidesAreThePersonsOwn) {
                                                      : BodySide::kMiddle;
     EXPECT_EQ(limb.side, expected) << to;
   }
-}
-
-TEST(Skeleton, UnknownNamesHaveNoLimbs) {
-  EXPECT_TRUE(limbs_of({}).empty());
-  EXPECT_TRUE(limbs_of({"joint 0", "joint 1", "pelvis"}).empty());
 }
 
 // Stacked, four times as large: side by side they could be three times, (1420 - 18) / 2 / 180.
@@ -335,7 +330,7 @@ TEST(PreviewImage, ASheetHasRowsOfTiles) {
   EXPECT_EQ(sheet.at<cv::Vec3b>(19, 9)[0], 50);
   EXPECT_EQ(sheet.at<cv::Vec3b>(29, 10)[0], 100);
   EXPECT_EQ(sheet.at<cv::Vec3b>(34, 0)[0], 150);
-  EXPECT_THROW(draw_sheet({}, 2), std::invalid_argument);
+  EXPECT_THROWS(draw_sheet({}, 2), std::invalid_argument, "expected tiles, got none");
 }
 
 TEST(PreviewImage, ABoxThatFillsTheVolumeShowsAllFourSides) {
@@ -375,17 +370,14 @@ TEST(PreviewImage, JointsStandAtTheirPlaceAndHiddenOnesAreHollow) {
   }
 }
 
-TEST(PreviewImage, LimbsJoinKnownJointsOnly) {
+TEST(PreviewImage, LimbsJoinKnownJointsAndFarLabelsDoNoHarm) {
   PreviewContent content = content_with(90);
   content.schema.joint_names = {"r_ankle", "r_knee", "r_hip"};
   add_person(content, {{{20, 60}, 1}, {{120, 60}, 1}, {kMissingPoint, 0}});
   const cv::Mat marks = labels_only(content, 1);
   EXPECT_NE(marks.at<std::uint8_t>(4 * 60 + 1, 4 * 70), 0) << "shin";
   EXPECT_EQ(cv::countNonZero(marks(cv::Rect(0, 0, 60, 60))), 0) << "no thigh towards (-1, -1)";
-}
-
-TEST(PreviewImage, FarAwayLabelsDoNoHarm) {
-  PreviewContent content = content_with(90);
+  content = content_with(90);
   add_person(content, {{{1e12, -1e12}, 1}, {{20, 20}, 1}});
   content.schema.joint_names = {"r_ankle", "r_knee"};
   add_box(content, {-5, -5, -5, -5}, false);
@@ -404,20 +396,19 @@ TEST(PreviewImage, WhatIsMissingIsSaid) {
   }
 }
 
-TEST(PreviewImage, LongTitlesAreCut) {
+TEST(PreviewImage, LongTitlesAreCutAndSizesThatDifferAreRefused) {
   PreviewContent content = content_with(90);
   content.title.assign(2000, 'W');
   const cv::Mat image = drawn(content);
   EXPECT_EQ(image.at<cv::Vec3b>(12, image.cols - 2), image.at<cv::Vec3b>(1, 1));
-}
-
-TEST(PreviewImage, SizesThatDifferAreRefused) {
-  PreviewContent content = content_with(90);
+  content = content_with(90);
   content.next_bgr.pop_back();
-  EXPECT_THROW(drawn(content), std::invalid_argument);
+  EXPECT_THROWS(drawn(content), std::invalid_argument,
+                "expected frames, volume and labels of one sample, got sizes");
   content = content_with(90);
   content.annotation.boxes.resize(1);
-  EXPECT_THROW(drawn(content), std::invalid_argument);
+  EXPECT_THROWS(drawn(content), std::invalid_argument,
+                "expected frames, volume and labels of one sample, got sizes");
 }
 
 }  // namespace

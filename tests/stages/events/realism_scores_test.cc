@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "stages/events/realism/detail/motion_direction.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -66,16 +67,13 @@ TEST(TimeSlope, LooksOnlyAtPixelsWithEvents) {
   EXPECT_EQ(slope.known(0, 1), 255);
 }
 
-TEST(TimeSlope, FaintVolumeIsNoEvent) {
+TEST(TimeSlope, OfFaintVolumesOneBinOrOnePixelIsFlat) {
   std::vector<float> volume = sloped_volume(kSlopeShape);
   for (float& value : volume) value *= 0.05f;
   EXPECT_EQ(cv::countNonZero(time_slope(volume, kSlopeShape, 0.1).event), 0);
   const std::vector<float> empty(kSlopeShape.value_count(), 0.0f);
   EXPECT_EQ(cv::countNonZero(time_slope(empty, kSlopeShape, 0).event), 0);
-}
-
-TEST(TimeSlope, OfOneBinOrOnePixelIsFlat) {
-  const std::vector<float> volume(2 * 6, 1.0f);
+  volume = std::vector<float>(2 * 6, 1.0f);
   EXPECT_EQ(cv::countNonZero(time_slope(volume, {1, {2, 3}}, 0.1).x), 0);
   const std::vector<float> pixel(6, 1.0f);
   EXPECT_EQ(cv::countNonZero(time_slope(pixel, {3, {1, 1}}, 0.1).known), 0);
@@ -139,43 +137,37 @@ TEST(RealismScores, F1CountsHitsMissesAndFalseEvents) {
   EXPECT_DOUBLE_EQ(scores_of(ours.values, real.values, ours.shape).f1_raw, 0.4);
 }
 
-TEST(RealismScores, AShiftInsideABlockIsNoDifferenceAfterPooling) {
+TEST(RealismScores, ShiftsWithinABlockAreNoDifferenceAfterPooling) {
   Voxels ours({1, {4, 4}});
   Voxels real({1, {4, 4}});
   ours.at(1, 2, 2) = 1;
   real.at(1, 3, 3) = 1;
-  const RealismScores scores = scores_of(ours.values, real.values, ours.shape);
+  RealismScores scores = scores_of(ours.values, real.values, ours.shape);
   EXPECT_EQ(scores.f1_raw, 0);
   EXPECT_EQ(scores.pool_mse_2, 0);
-}
-
-TEST(RealismScores, BlocksCutByTheBorderAreTheMeanOfWhatTheyHave) {
-  Voxels ours({1, {3, 3}});
-  const Voxels real({1, {3, 3}});
+  ours = Voxels({1, {3, 3}});
+  real = Voxels({1, {3, 3}});
   ours.at(0, 2, 2) = 1;
-  const RealismScores scores = scores_of(ours.values, real.values, ours.shape);
+  scores = scores_of(ours.values, real.values, ours.shape);
   // Side 2: the last block is that pixel alone, one of 2 x 4 blocks. Side 4: the mean of 9 pixels.
   EXPECT_DOUBLE_EQ(scores.pool_mse_2, 1.0 / 8);
   EXPECT_DOUBLE_EQ(scores.pool_mse_4, 1.0 / 81 / 2);
 }
 
-TEST(RealismScores, SwappedPolarityMatchesOnceItIsSummedOver) {
+TEST(RealismScores, AnotherPolarityOrTimeMatchesOnceItIsSummedOver) {
   Voxels ours({2, {2, 2}});
   Voxels real({2, {2, 2}});
   ours.at(1, 0, 1) = 1;
   real.at(3, 0, 1) = 1;
-  const RealismScores scores = scores_of(ours.values, real.values, ours.shape);
+  RealismScores scores = scores_of(ours.values, real.values, ours.shape);
   EXPECT_EQ(scores.f1_raw, 0);
   EXPECT_EQ(scores.f1_time, 0);
   EXPECT_EQ(scores.f1_time_polarity, 1);
-}
-
-TEST(RealismScores, AnotherTimeMatchesOnceTimeIsSummedOver) {
-  Voxels ours({2, {2, 2}});
-  Voxels real({2, {2, 2}});
+  ours = Voxels({2, {2, 2}});
+  real = Voxels({2, {2, 2}});
   ours.at(0, 1, 1) = 1;
   real.at(1, 1, 1) = 1;
-  const RealismScores scores = scores_of(ours.values, real.values, ours.shape);
+  scores = scores_of(ours.values, real.values, ours.shape);
   EXPECT_EQ(scores.f1_raw, 0);
   EXPECT_EQ(scores.f1_time, 1);
 }
@@ -270,8 +262,8 @@ TEST(RealismScores, AmountsAreOfTheComparedVolume) {
   EXPECT_DOUBLE_EQ(scores.positive_share, 1.0 / 3);
 }
 
-TEST(RealismScores, TwoEmptyVolumesMatchAndHaveNoCorrelation) {
-  const Voxels empty({9, {3, 5}});
+TEST(RealismScores, EmptyVolumesMatchEachOtherAndMissAllEvents) {
+  Voxels empty({9, {3, 5}});
   const RealismScores scores = scores_of(empty.values, empty.values, empty.shape);
   EXPECT_EQ(scores.f1_raw, 1);
   EXPECT_EQ(scores.f1_time, 1);
@@ -281,10 +273,7 @@ TEST(RealismScores, TwoEmptyVolumesMatchAndHaveNoCorrelation) {
   EXPECT_THAT(scores.time_correlation, IsNan());
   EXPECT_THAT(scores.polarity_correlation, IsNan());
   EXPECT_THAT(scores.positive_share, IsNan());
-}
-
-TEST(RealismScores, AnEmptyVolumeMissesAllEvents) {
-  const Voxels empty({1, {2, 2}});
+  empty = Voxels({1, {2, 2}});
   Voxels real({1, {2, 2}});
   real.at(0, 0, 0) = 1;
   for (const bool ours_empty : {true, false}) {
@@ -300,16 +289,22 @@ TEST(RealismScores, RefuseWhatIsNoVolumeOfTheFrames) {
   const VolumeShape shape{1, {1, 2}};
   const std::vector<float> volume(4, 0.0f);
   const GreyImage frame = dark(shape.size);
-  EXPECT_THROW(realism_scores({}, volume, shape, frame, frame), std::invalid_argument);
-  EXPECT_THROW(realism_scores(volume, {}, shape, frame, frame), std::invalid_argument);
-  EXPECT_THROW(realism_scores(volume, volume, shape, frame, dark({2, 1})), std::invalid_argument);
-  EXPECT_THROW(realism_scores({}, {}, {1, {0, 0}}, dark({0, 0}), dark({0, 0})),
-               std::invalid_argument);
-  EXPECT_THROW(realism_scores({}, {}, {0, shape.size}, frame, frame), std::invalid_argument);
+  EXPECT_THROWS(realism_scores({}, volume, shape, frame, frame), std::invalid_argument,
+                "expected a volume [2, H, W] of 2x1 pixels, got 0 values");
+  EXPECT_THROWS(realism_scores(volume, {}, shape, frame, frame), std::invalid_argument,
+                "expected a volume [2, H, W] of 2x1 pixels, got 0 values");
+  EXPECT_THROWS(realism_scores(volume, volume, shape, frame, dark({2, 1})), std::invalid_argument,
+                "expected a frame of 2x1 pixels, got 2 pixels");
+  EXPECT_THROWS(realism_scores({}, {}, {1, {0, 0}}, dark({0, 0}), dark({0, 0})),
+                std::invalid_argument, "expected a volume [2, H, W] of 0x0 pixels, got 0 values");
+  EXPECT_THROWS(realism_scores({}, {}, {0, shape.size}, frame, frame), std::invalid_argument,
+                "expected a volume [0, H, W] of 2x1 pixels, got 0 values");
   for (const float bad : {kNaN, std::numeric_limits<float>::infinity(), -1.0f}) {
     const std::vector<float> unsound{0, bad, 0, 0};
-    EXPECT_THROW(realism_scores(unsound, volume, shape, frame, frame), std::invalid_argument);
-    EXPECT_THROW(realism_scores(volume, unsound, shape, frame, frame), std::invalid_argument);
+    EXPECT_THROWS(realism_scores(unsound, volume, shape, frame, frame), std::invalid_argument,
+                  "expected finite values >= 0");
+    EXPECT_THROWS(realism_scores(volume, unsound, shape, frame, frame), std::invalid_argument,
+                  "expected finite values >= 0");
   }
 }
 
@@ -327,7 +322,8 @@ TEST(MatchScores, AreThoseThatNeedNoFrames) {
                                match.events_per_pixel, match.positive_share}) {
     EXPECT_THAT(without, IsNan());
   }
-  EXPECT_THROW(match_scores(volume, std::span(real).first(4), shape), std::invalid_argument);
+  EXPECT_THROWS(match_scores(volume, std::span(real).first(4), shape), std::invalid_argument,
+                "expected a volume [4, H, W] of 2x1 pixels, got 4 values");
 }
 
 TEST(EventsOverTime, AreSumsPerPolarityOfValuesUpToOne) {
@@ -371,21 +367,16 @@ TEST(MeanScores, LeaveOutWhatHasNoMeaning) {
   scores[1].time_correlation = 0.2;
   scores[2].time_correlation = 0.4;
   for (RealismScores& pair : scores) pair.positive_share = kNoScore;
-  const RealismScores mean = mean_scores(scores);
+  RealismScores mean = mean_scores(scores);
   EXPECT_NEAR(mean.time_correlation, 0.3, 1e-15);
   EXPECT_THAT(mean.positive_share, IsNan());
-}
-
-TEST(MeanScores, OfNoPairsAreNaN) {
-  const RealismScores mean = mean_scores({});
+  mean = mean_scores({});
   EXPECT_THAT(mean.f1_raw, IsNan());
   EXPECT_THAT(mean.events_per_channel, IsEmpty());
-}
-
-TEST(MeanScores, RefuseDifferentNumbersOfChannels) {
-  std::vector<RealismScores> scores(2);
+  scores = std::vector<RealismScores>(2);
   scores[1].events_per_channel = {1};
-  EXPECT_THROW(mean_scores(scores), std::invalid_argument);
+  EXPECT_THROWS(mean_scores(scores), std::invalid_argument,
+                "expected scores with one number of channels, got 0 and 1");
 }
 
 TEST(ShareDistance, IsOfTheSharesAlone) {
@@ -402,7 +393,8 @@ TEST(ShareDistance, IsOfTheSharesAlone) {
   real.events_per_pixel = 0;
   EXPECT_THAT(share_distance(scores, real), IsNan());
   EXPECT_THAT(share_distance({}, {}), IsNan());
-  EXPECT_THROW(share_distance(scores, {}), std::invalid_argument);
+  EXPECT_THROWS(share_distance(scores, {}), std::invalid_argument,
+                "expected scores with one number of channels, got 0 and 2");
 }
 
 TEST(MeanBounds, AreTwoStandardErrorsFromTheMean) {

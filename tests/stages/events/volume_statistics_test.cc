@@ -14,6 +14,7 @@
 
 #include "tests/testing/golden_numbers.h"
 #include "tests/testing/shared_data.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -63,14 +64,11 @@ TEST(KthLargest, IsTheOneThatSortingFinds) {
   }
 }
 
-TEST(KthLargest, TellsNeighboursApart) {
+TEST(KthLargest, TellsNeighboursEqualAndExtremeNumbersApart) {
   // Numbers that share the upper half of their bits, one bit apart.
   std::vector<float> values{1.0f};
   while (values.size() < 700) values.push_back(std::nextafter(values.back(), 2.0f));
   expect_every_kth(values);
-}
-
-TEST(KthLargest, OfEqualAndOfExtremeNumbers) {
   expect_every_kth(std::vector<float>(1000, 0.25f));
   expect_every_kth(std::vector<float>(300, kDenormal));
   expect_every_kth({0, kDenormal, 0, kLargest, -0.0f, std::numeric_limits<float>::min()});
@@ -91,7 +89,7 @@ TEST(ScanValues, CountsAddsAndFindsTheLargest) {
   }
 }
 
-TEST(ScanValues, AddsInTheOrderItStates) {
+TEST(ScanValues, AddsInTheOrderItStatesWithoutLoss) {
   std::mt19937 random(9);
   std::vector<float> values(1003);
   for (float& value : values) value = std::ldexp(1.0f, static_cast<int>(random() % 100) - 50);
@@ -100,11 +98,8 @@ TEST(ScanValues, AddsInTheOrderItStates) {
   double sum = 0;
   for (const double part : partial) sum += part;
   EXPECT_EQ(scan_values(values).sum, sum);
-}
-
-TEST(ScanValues, AddsTenMillionValuesWithoutLoss) {
   // In float32 a sum near 1e6 moves in steps of 0.06, so that adding 0.1 is wrong by a tenth.
-  const std::vector<float> values(10'000'000, 0.1f);
+  values = std::vector<float>(10'000'000, 0.1f);
   EXPECT_NEAR(scan_values(values).sum, 1e7 * double(0.1f), 1e-5);
 }
 
@@ -217,8 +212,10 @@ TEST(Eta98, OfEqualDenormalAndLargestNumbers) {
 }
 
 TEST(Eta98, RefusesWhatNoVolumeHolds) {
-  EXPECT_THROW(eta98(std::vector<float>{1, std::nanf("")}), std::invalid_argument);
-  EXPECT_THROW(eta98(std::vector<float>{1, -1}), std::invalid_argument);
+  EXPECT_THROWS(eta98(std::vector<float>{1, std::nanf("")}), std::invalid_argument,
+                "expected finite values >= 0, got others");
+  EXPECT_THROWS(eta98(std::vector<float>{1, -1}), std::invalid_argument,
+                "expected finite values >= 0, got others");
 }
 
 TEST(VolumeStatistics, AroundThePartThatIsGivenAllIsZero) {
@@ -229,9 +226,6 @@ TEST(VolumeStatistics, AroundThePartThatIsGivenAllIsZero) {
   EXPECT_EQ(statistics.sum_positive, 3.0);
   EXPECT_EQ(statistics.sum_negative, 4.0);
   EXPECT_EQ(statistics.eta98, 2.0f);
-}
-
-TEST(VolumeStatistics, OfNoValuesAtAll) {
   EXPECT_EQ(volume_statistics({}, {1, {2, 2}}).value().flags, kFlagEmpty);
   EXPECT_EQ(volume_statistics({}, {1, {0, 0}}).value().nonzero_fraction, 0.0f);
 }
@@ -245,17 +239,14 @@ TEST(VolumeStatistics, ThereAreNoneOfAnUnsoundVolume) {
   }
 }
 
-TEST(Normalize, ClipsAndDividesAndLeavesAnEmptyVolumeAlone) {
+TEST(Normalize, ClipsAndDividesTheSmallestNumbersToo) {
   std::vector<float> volume{0, 1, 2, 8};
   normalize(volume, 4.0f);
   EXPECT_THAT(volume, ::testing::ElementsAre(0, 0.25f, 0.5f, 1));
   std::vector<float> empty(5, 0.0f);
   normalize(empty, 0.0f);
   EXPECT_THAT(empty, ::testing::Each(0.0f));
-}
-
-TEST(Normalize, OfTheSmallestNumbersIsFinite) {
-  std::vector<float> volume(4, std::numeric_limits<float>::denorm_min());
+  volume = std::vector<float>(4, std::numeric_limits<float>::denorm_min());
   normalize(volume, eta98(volume));
   EXPECT_THAT(volume, ::testing::Each(1.0f));
 }

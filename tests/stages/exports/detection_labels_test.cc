@@ -15,26 +15,27 @@ namespace {
 
 using Json = nlohmann::json;
 
-TEST(YoloLine, IsCentreAndSizeAsShares) {
+TEST(YoloLine, IsCentreAndSizeAsSharesWithinZeroToOne) {
   // 10..30 of 80 px: centre 20/80, size 20/80; 8..24 of 64 px: centre 16/64, size 16/64.
   EXPECT_EQ(yolo_line(3, {10, 8, 30, 24}, {64, 80}),
             "3 0.250000000 0.250000000 0.250000000 0.250000000");
   EXPECT_EQ(yolo_line(0, {0, 0, 80, 64}, {64, 80}),
             "0 0.500000000 0.500000000 1.000000000 1.000000000");
-}
-
-TEST(YoloLine, NeverLeavesZeroToOne) {
   EXPECT_EQ(yolo_line(0, {-1e-9, 0, 80.00000001, 64}, {64, 80}),
             "0 0.500000000 0.500000000 1.000000000 1.000000000");
 }
 
-TEST(YoloDataYaml, NamesClassesChannelsAndLists) {
+TEST(YoloYaml, NamesClassesChannelsListsAndHowToMirror) {
   EXPECT_EQ(yolo_data_yaml({"Car", "a \"b\""}, 18, {"train", "val"}),
             "train: train.txt\nval: val.txt\nnc: 2\nchannels: 18\n"
             "names: [\"Car\",\"a \\\"b\\\"\"]\n");
   EXPECT_EQ(yolo_data_yaml({"Car"}, 3, {"test", "train"}),
             "test: test.txt\ntrain: train.txt\nval: train.txt\nnc: 1\nchannels: 3\n"
             "names: [\"Car\"]\n");
+  EXPECT_EQ(yolo_pose_yaml({"l_eye", "r_eye"}, 18, {"val"}),
+            "val: val.txt\nnc: 1\nchannels: 18\nnames: [\"person\"]\nkpt_shape: [2, 3]\n"
+            "kpt_names: {0: [\"l_eye\",\"r_eye\"]}\nflip_idx: [1,0]\n");
+  EXPECT_EQ(yolo_pose_yaml({"a"}, 18, {}).find("flip_idx"), std::string::npos);
 }
 
 TEST(YoloPoseLine, HasEachJointOrZeros) {
@@ -48,35 +49,20 @@ TEST(YoloPoseLine, HasEachJointOrZeros) {
   EXPECT_FALSE(is_within(joints[4], {64, 80}));
 }
 
-TEST(FlipIndices, SwapTheSides) {
+TEST(FlipIndices, SwapTheSidesUnlessNamesDoNotTell) {
+  using Names = std::vector<std::string>;
   using Places = std::vector<int>;
-  EXPECT_EQ(flip_indices({"nose", "left_eye", "right_eye"}), (Places{0, 2, 1}));
-  EXPECT_EQ(flip_indices({"RKnee", "Root", "LKnee", "Left"}), std::nullopt);
-  EXPECT_EQ(flip_indices({"RKnee", "Root", "LKnee"}), (Places{2, 1, 0}));
-  EXPECT_EQ(flip_indices({"r_hip", "l_hip", "head_top"}), (Places{1, 0, 2}));
-  EXPECT_EQ(flip_indices({"hip_R", "hip_L"}), (Places{1, 0}));
-}
-
-TEST(FlipIndices, AreNoneWhereNamesDoNotTell) {
-  EXPECT_EQ(flip_indices({}), std::nullopt);
-  EXPECT_EQ(flip_indices({"a", "b"}), std::nullopt);
-  EXPECT_EQ(flip_indices({"left_eye", "nose"}), std::nullopt);
-  EXPECT_EQ(flip_indices({"left_eye", "right_eye", "right_eye"}), std::nullopt);
-}
-
-TEST(YoloPoseYaml, HasTheShapeAndHowToMirror) {
-  EXPECT_EQ(yolo_pose_yaml({"l_eye", "r_eye"}, 18, {"val"}),
-            "val: val.txt\nnc: 1\nchannels: 18\nnames: [\"person\"]\nkpt_shape: [2, 3]\n"
-            "kpt_names: {0: [\"l_eye\",\"r_eye\"]}\nflip_idx: [1,0]\n");
-  EXPECT_EQ(yolo_pose_yaml({"a"}, 18, {}).find("flip_idx"), std::string::npos);
-}
-
-TEST(CocoImage, HasSizeAndId) {
-  EXPECT_EQ(Json::parse(coco_image(5, "v/a.npy", {60, 80}, "S1/a")), (Json{{"id", 5},
-                                                                           {"file_name", "v/a.npy"},
-                                                                           {"width", 80},
-                                                                           {"height", 60},
-                                                                           {"sample_id", "S1/a"}}));
+  const std::pair<Names, std::optional<Places>> cases[] = {
+      {{"nose", "left_eye", "right_eye"}, Places{0, 2, 1}},
+      {{"RKnee", "Root", "LKnee"}, Places{2, 1, 0}},
+      {{"r_hip", "l_hip", "head_top"}, Places{1, 0, 2}},
+      {{"hip_R", "hip_L"}, Places{1, 0}},
+      {{"RKnee", "Root", "LKnee", "Left"}, {}},
+      {{}, {}},
+      {{"a", "b"}, {}},
+      {{"left_eye", "nose"}, {}},
+      {{"left_eye", "right_eye", "right_eye"}, {}}};
+  for (const auto& [names, places] : cases) EXPECT_EQ(flip_indices(names), places);
 }
 
 TEST(CocoBox, IsLeftTopWidthHeight) {
@@ -179,11 +165,6 @@ TEST(YoloOutlineLine, BridgesLeadToPartsAndHolesAndBack) {
                      {26, 27});
 }
 
-TEST(YoloOutlineLine, OverlappingPartsAreFilledOnce) {
-  expect_same_pixels({{{{1, 1}, {9, 1}, {9, 9}, {1, 9}}, {{5, 5}, {13, 5}, {13, 12}, {5, 12}}}},
-                     {14, 15});
-}
-
 /// Squares clockwise (+1) or the other way (-1), of one ring or of several.
 std::vector<Point> square(int direction) {
   std::vector<Point> ring{{0, 0}, {10, 0}, {10, 10}, {0, 10}, {0, 0}};
@@ -206,25 +187,21 @@ std::vector<Point> pentagram() {
   return ring;
 }
 
-TEST(YoloOutlineLine, ARingThatOverlapsItselfIsFilledOnce) {
+TEST(YoloOutlineLine, PartsThatOverlapAreFilledOnceAndRingsThatCancelEachOtherAreNot) {
+  expect_same_pixels({{{{1, 1}, {9, 1}, {9, 9}, {1, 9}}, {{5, 5}, {13, 5}, {13, 12}, {5, 12}}}},
+                     {14, 15});
   expect_same_pixels({{square_twice()}}, {12, 12});
   expect_same_pixels({{pentagram()}}, {90, 90});
-}
-
-TEST(YoloOutlineLine, OfRingsThatCancelEachOtherCoversNothing) {
   expect_same_pixels({{square_twice(), square(-1), square(-1)}}, {12, 12});
 }
 
-TEST(CocoBox, ARingThatOverlapsItselfIsRunLengths) {
+TEST(CocoBox, RingsThatOverlapThemselvesAreRunLengthsAndPartsPolygons) {
   for (const auto& ring : {square_twice(), pentagram()}) {
     const ImageSize size{90, 90};
     const Json json = Json::parse(coco_box({1, 1, 1}, {0, 0, 90, 90}, false, {{ring}}, size));
     const auto runs = run_lengths(json["segmentation"]["counts"].get<std::string>());
     EXPECT_EQ(mask_of(*runs, size), mask_of(Outline{{ring}}, size));
   }
-}
-
-TEST(CocoBox, PartsThatOverlapAreTwoPolygons) {
   const Outline outline{{{{0, 0}, {4, 0}, {4, 4}, {0, 4}}, {{2, 2}, {6, 2}, {6, 6}, {2, 6}}}};
   const Json json = Json::parse(coco_box({1, 1, 1}, {0, 0, 6, 6}, false, outline, {6, 6}));
   EXPECT_EQ(json["segmentation"].size(), 2u);
@@ -276,7 +253,9 @@ TEST(CocoPerson, JointsThatACropCutsAwayAreNotAnnotated) {
   EXPECT_EQ(json["iscrowd"], 1);
 }
 
-TEST(CocoPersonCategory, CountsJointsFromOne) {
+TEST(CocoCategory, IsNamedAndCountsJointsFromOne) {
+  EXPECT_EQ(Json::parse(coco_image(5, "v/a.npy", {60, 80}, "S1/a")), Json::parse(R"({
+      "id": 5, "file_name": "v/a.npy", "width": 80, "height": 60, "sample_id": "S1/a"})"));
   const Json json = Json::parse(coco_person_category(1, "person", {"a", "b", "c"}, {{0, 2}}));
   EXPECT_EQ(json["skeleton"], Json::parse("[[1, 3]]"));
   EXPECT_EQ(json["keypoints"], Json({"a", "b", "c"}));

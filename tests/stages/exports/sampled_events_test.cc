@@ -8,6 +8,7 @@
 
 #include "manifests/values/faults.h"
 #include "stages/events/event_volume.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -32,23 +33,22 @@ float largest_difference(const std::vector<float>& a, const std::vector<float>& 
   return largest;
 }
 
-TEST(SampleEvents, RoundedCountsOfWholeNumbersGiveTheVolumeBack) {
-  for (const int most : {1, 4, 30}) {
-    const std::vector<float> volume = whole_numbers(most);
-    const std::vector<Event> events =
-        sample_events(volume, kShape, 0.1, EventCounts::kRounded, CounterRandom(1));
-    EXPECT_LT(largest_difference(event_volume(events, kShape), volume), 1e-4f * (1 + most));
-  }
-}
-
 TEST(SampleEvents, RoundedCountsAreWithinHalfAnEvent) {
+  const auto difference = [](const std::vector<float>& volume) {
+    return largest_difference(
+        event_volume(sample_events(volume, kShape, 0.1, EventCounts::kRounded, CounterRandom(1)),
+                     kShape),
+        volume);
+  };
+  for (const int most : {1, 4, 30}) {
+    EXPECT_LT(difference(whole_numbers(most)), 1e-4f * (1 + most)) << "whole numbers come back";
+  }
   std::vector<float> volume = whole_numbers(3);
   const CounterRandom random(9);
   for (std::size_t i = 1; i + 1 < volume.size(); ++i) {
     volume[i] += static_cast<float>(random.uniform(i));
   }
-  const auto events = sample_events(volume, kShape, 0.1, EventCounts::kRounded, CounterRandom(1));
-  EXPECT_LT(largest_difference(event_volume(events, kShape), volume), 0.5f + 1e-3f);
+  EXPECT_LT(difference(volume), 0.5f + 1e-3f);
 }
 
 TEST(SampleEvents, PoissonCountsGiveTheVolumeInTheMean) {
@@ -76,7 +76,7 @@ TEST(SampleEvents, PoissonCountsGiveTheVolumeInTheMean) {
   }
 }
 
-TEST(SampleEvents, AreInOrderAndWithinTheTime) {
+TEST(SampleEvents, AreInOrderWithinTheTimeAndFollowTheSeed) {
   const auto events =
       sample_events(whole_numbers(4), kShape, 0.3, EventCounts::kRounded, CounterRandom(1));
   EXPECT_TRUE(std::ranges::is_sorted(events, {}, &Event::t_s));
@@ -88,9 +88,6 @@ TEST(SampleEvents, AreInOrderAndWithinTheTime) {
   };
   EXPECT_GT(std::ranges::count_if(events, is_between),
             static_cast<std::ptrdiff_t>(events.size() / 4));
-}
-
-TEST(SampleEvents, FollowTheSeed) {
   const std::vector<float> volume = whole_numbers(4);
   const auto draw = [&](std::uint64_t seed) {
     return sample_events(volume, kShape, 1, EventCounts::kPoisson, CounterRandom(seed));
@@ -99,7 +96,7 @@ TEST(SampleEvents, FollowTheSeed) {
   EXPECT_NE(draw(1), draw(2));
 }
 
-TEST(SampleEvents, OneBinAndNoEvents) {
+TEST(SampleEvents, OfOneBinAndNoEventsAreALineEach) {
   const VolumeShape shape{1, {1, 1}};
   const std::vector<float> volume{2, 0};
   const auto events = sample_events(volume, shape, 1, EventCounts::kRounded, CounterRandom(1));
@@ -107,6 +104,8 @@ TEST(SampleEvents, OneBinAndNoEvents) {
   EXPECT_TRUE(
       sample_events(std::vector<float>{0, 0}, shape, 1, EventCounts::kPoisson, CounterRandom(1))
           .empty());
+  EXPECT_EQ(events_text(std::vector<Event>{{3, 4, 0.25, true}, {0, 1, 1, false}}),
+            "0.250000000 3 4 1\n1.000000000 0 1 0\n");
 }
 
 TEST(SampleEvents, RefuseMoreThanCanBeMade) {
@@ -114,14 +113,10 @@ TEST(SampleEvents, RefuseMoreThanCanBeMade) {
   for (const std::vector<float>& volume : std::vector<std::vector<float>>{
            {1e30f, 0}, {8.6e9f, 0}, {6e8f, 6e8f}, {0, std::numeric_limits<float>::max()}}) {
     for (const EventCounts counts : {EventCounts::kPoisson, EventCounts::kRounded}) {
-      EXPECT_THROW(sample_events(volume, shape, 1, counts, CounterRandom(1)), UsageError);
+      EXPECT_THROWS(sample_events(volume, shape, 1, counts, CounterRandom(1)), UsageError,
+                    "expected values of at most 1e+09 events altogether");
     }
   }
-}
-
-TEST(EventsText, IsALineEach) {
-  EXPECT_EQ(events_text(std::vector<Event>{{3, 4, 0.25, true}, {0, 1, 1, false}}),
-            "0.250000000 3 4 1\n1.000000000 0 1 0\n");
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -26,7 +27,8 @@ TEST(VolumeFile, RowsThatAreNotGivenAreZeros) {
   VolumeFile file(folder / "d.hdf5", VolumeLayout::kDavis, 3, kRowShape, sizeof(float));
   const std::vector<float> row = row_of(1);
   file.write_row(2, std::as_bytes(std::span(row)));
-  EXPECT_THROW(file.write_row(2, std::as_bytes(std::span(row))), std::logic_error);
+  EXPECT_THROWS(file.write_row(2, std::as_bytes(std::span(row))), std::logic_error,
+                "expected each row once, got row 2 again");
   file.commit();
   const Hdf5Arrays read = read_hdf5_arrays(folder / "d.hdf5");
   const TypedArray& events = read.arrays.at("davis/events");

@@ -9,6 +9,7 @@
 #include "stages/generator/onednn/onednn_generator.h"
 #include "stages/generator/torch/torch_generator.h"
 #include "tests/stages/generator/engine_trials.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -82,7 +83,8 @@ TEST_P(BatchedGenerator, TellsEachPairItsThreshold) {
     });
   }
   threads.clear();
-  EXPECT_THROW(volume_of(*make(untrained_weights(4, 3, 5)), 0.2), std::invalid_argument);
+  EXPECT_THROWS(volume_of(*make(untrained_weights(4, 3, 5)), 0.2), std::invalid_argument,
+                "expected none for these weights, got a contrast threshold");
 }
 
 TEST_P(BatchedGenerator, GivesTheSameBytesWhateverElseIsInTheBatch) {
@@ -148,8 +150,10 @@ TEST_P(BatchedGenerator, SaysWhatItIsAndRefusesWhatItIsNot) {
               ::testing::StartsWith(GetParam() == Device::kCuda ? "torch float32 on cuda: "
                                                                 : "torch float32 on cpu, "));
   std::vector<float> frames(2 * 6), volume(6 * 5);
-  EXPECT_THROW(generator->generate({frames, {2, 3}}, volume), std::invalid_argument);
-  EXPECT_THROW(make(untrained_weights(2, 3, 5), Precision::kInt8), std::invalid_argument);
+  EXPECT_THROWS(generator->generate({frames, {2, 3}}, volume), std::invalid_argument,
+                "expected frames [2, H, W] and a volume [6, H, W] of 3x2");
+  EXPECT_THROWS(make(untrained_weights(2, 3, 5), Precision::kInt8), std::invalid_argument,
+                "expected float32 or bfloat16 for LibTorch, got int8");
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, BatchedGenerator, ::testing::Values(Device::kCpu, Device::kCuda),
@@ -164,9 +168,9 @@ TEST(CudaSupport, SaysWhatIsMissingOrWhatThereIs) {
   EXPECT_EQ(support.device, "");
   EXPECT_THAT(support.lack,
               ::testing::AnyOf("LibTorch was built without CUDA", "LibTorch finds no CUDA device"));
-  EXPECT_THROW(
+  EXPECT_THROWS(
       make_batched_generator(untrained_weights(1, 1, 1), Precision::kFloat32, Device::kCuda),
-      std::runtime_error);
+      std::runtime_error, "expected a CUDA device for float32, got none: LibTorch was");
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 
 #include "stages/generator/weights.h"
 #include "tests/stages/generator/engine_trials.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -71,11 +72,16 @@ TEST(CalibrationSums, MergingIsAdding) {
 
 TEST(CalibrationSums, RefuseOtherWidthsAndWhatIsNotFinite) {
   CalibrationSums sums = empty_calibration_sums(2);
-  EXPECT_THROW(merge(sums, empty_calibration_sums(1)), std::invalid_argument);
-  EXPECT_THROW(add_tensor(head(sums), std::vector<float>{1, 2, 3}), std::invalid_argument);
-  EXPECT_THROW(add_tensor(head(sums), {}), std::invalid_argument);
-  EXPECT_THROW(add_tensor(head(sums), std::vector<float>{1, std::nanf("")}), std::runtime_error);
-  EXPECT_THROW(add_tensor(head(sums), std::vector<float>{-INFINITY, 1}), std::runtime_error);
+  EXPECT_THROWS(merge(sums, empty_calibration_sums(1)), std::invalid_argument,
+                "expected sums of one base width, got those of two");
+  EXPECT_THROWS(add_tensor(head(sums), std::vector<float>{1, 2, 3}), std::invalid_argument,
+                "expected 2 channels of head, got 3 values");
+  EXPECT_THROWS(add_tensor(head(sums), {}), std::invalid_argument,
+                "expected 2 channels of head, got 0 values");
+  EXPECT_THROWS(add_tensor(head(sums), std::vector<float>{1, std::nanf("")}), std::runtime_error,
+                "expected finite values of head, got NaN or infinity");
+  EXPECT_THROWS(add_tensor(head(sums), std::vector<float>{-INFINITY, 1}), std::runtime_error,
+                "expected finite values of head, got NaN or infinity");
 }
 
 template <class Change>
@@ -93,7 +99,8 @@ void expect_refused(const std::string& reason, const Change& change) {
 
 TEST(CheckCalibration, TakesAWholeOneAndRefusesTheRest) {
   EXPECT_NO_THROW(check_calibration(testing::sample_calibration(2, 1), 2, "NAME"));
-  EXPECT_THROW(check_calibration(testing::sample_calibration(2, 1), 3, "NAME"), std::runtime_error);
+  EXPECT_THROWS(check_calibration(testing::sample_calibration(2, 1), 3, "NAME"), std::runtime_error,
+                "expected 3 values for head, got 2, in NAME");
   expect_refused("at least 1 pair, got 0", [](auto& c) { c.pairs = 0; });
   expect_refused("expected 12 calibrated tensors, got 11", [](auto& c) { c.tensors.pop_back(); });
   expect_refused("statistics for head", [](auto& c) { c.tensors[0].name = "tail"; });

@@ -18,6 +18,7 @@
 #include "tests/stages/generator/plain_network.h"
 #include "tests/testing/golden_numbers.h"
 #include "tests/testing/shared_data.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -63,7 +64,7 @@ TEST(FitCalibration, GuessesTheLostPartOfOneChannelFromTheOther) {
   EXPECT_NEAR(head.offset[1], -0.01 * head.mean[0] - 0.03 - slope * head.mean[0], 1e-6);
 }
 
-TEST(FitCalibration, ConstantTensorsHaveAnOffsetAlone) {
+TEST(FitCalibration, TensorsOfOneValueOrOfOnePixelAreHarmless) {
   const auto value = [](int, int channel) { return channel == 0 ? 3.7 : -0.01 * channel; };
   const Calibration calibration = fit_calibration(sums_of(2, 1000, value), "");
   for (const TensorStatistics& tensor : calibration.tensors) {
@@ -72,13 +73,14 @@ TEST(FitCalibration, ConstantTensorsHaveAnOffsetAlone) {
       EXPECT_NEAR(tensor.offset[c], -0.01 * double(c), 1e-6) << tensor.name;
     }
   }
-}
-
-TEST(FitCalibration, TensorsOfZerosOrOfOnePixelAreHarmless) {
   for (const double constant : {0.0, 2.0, -2.0}) {
     const auto sums = sums_of(1, 1, [&](int, int) { return constant; });
     EXPECT_NO_THROW(fit_calibration(sums, ""));
   }
+  EXPECT_THROWS(fit_calibration({}, ""), std::invalid_argument,
+                "expected sums of at least 1 pair, got none");
+  EXPECT_THROWS(fit_calibration(empty_calibration_sums(1), ""), std::invalid_argument,
+                "expected sums of at least 1 pair, got none");
 }
 
 TEST(FitCalibration, IsTheSameEachTime) {
@@ -90,11 +92,6 @@ TEST(FitCalibration, IsTheSameEachTime) {
     EXPECT_EQ(one.tensors[i].mixing, other.tensors[i].mixing);
     EXPECT_EQ(one.tensors[i].offset, other.tensors[i].offset);
   }
-}
-
-TEST(FitCalibration, NeedsAPair) {
-  EXPECT_THROW(fit_calibration({}, ""), std::invalid_argument);
-  EXPECT_THROW(fit_calibration(empty_calibration_sums(1), ""), std::invalid_argument);
 }
 
 constexpr ImageSize kCalibratedSize{33, 46};
@@ -137,11 +134,8 @@ void expect_the_plain_networks(const Weights& weights) {
   }
 }
 
-TEST(Calibrator, SeesWhatThePlainNetworkHolds) {
+TEST(Calibrator, SeesWhatNetworksHold) {
   expect_the_plain_networks(untrained_weights(2, 3, 5));
-}
-
-TEST(Calibrator, SeesWhatANetworkThatKnowsItsSensorHolds) {
   for (const int base_channels : {2, 8}) {
     expect_the_plain_networks(testing::untrained_sensor_weights(base_channels, 3, 5));
   }
@@ -157,8 +151,8 @@ TEST(Calibrator, TakesTheThresholdThatAPairTells) {
   EXPECT_EQ(calibration(weights, ContrastThreshold{weights.thresholds->geometric_mean()}),
             calibration(weights, std::nullopt));
   EXPECT_NE(calibration(weights, ContrastThreshold{0.1}), calibration(weights, std::nullopt));
-  EXPECT_THROW(calibration(untrained_weights(2, 3, 5), ContrastThreshold{0.1}),
-               std::invalid_argument);
+  EXPECT_THROWS(calibration(untrained_weights(2, 3, 5), ContrastThreshold{0.1}),
+                std::invalid_argument, "expected none for these weights, got a contrast threshold");
 }
 
 TEST(Calibrator, TheSamePairsGiveTheSameCalibration) {
@@ -238,14 +232,19 @@ TEST(Calibrator, TakesImagesOfOnePixel) {
 
 TEST(Calibrator, RefusesWhatItCannotUseAndAddsNothingOfIt) {
   Calibrator calibrator(untrained_weights(1, 3, 5));
-  EXPECT_THROW(calibrator.calibration("no pair"), std::invalid_argument);
-  EXPECT_THROW(calibrator.add({frames(1), {33, 45}}), std::invalid_argument);
-  EXPECT_THROW(calibrator.add({}), std::invalid_argument);
+  EXPECT_THROWS(calibrator.calibration("no pair"), std::invalid_argument,
+                "expected sums of at least 1 pair, got none");
+  EXPECT_THROWS(calibrator.add({frames(1), {33, 45}}), std::invalid_argument,
+                "expected frames [2, H, W] and a volume [6, H, W] of 45x33");
+  EXPECT_THROWS(calibrator.add({}), std::invalid_argument,
+                "expected frames [2, H, W] and a volume [6, H, W] of 0x0");
   auto broken = frames(1);
   broken[100] = std::nanf("");
-  EXPECT_THROW(calibrator.add({broken, kCalibratedSize}), std::runtime_error);
+  EXPECT_THROWS(calibrator.add({broken, kCalibratedSize}), std::runtime_error,
+                "expected finite values of the frames, got NaN or infinity");
   EXPECT_EQ(calibrator.pairs(), 0);
-  EXPECT_THROW(calibrator.calibration("no pair"), std::invalid_argument);
+  EXPECT_THROWS(calibrator.calibration("no pair"), std::invalid_argument,
+                "expected sums of at least 1 pair, got none");
 }
 
 }  // namespace

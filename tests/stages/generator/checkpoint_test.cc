@@ -12,6 +12,7 @@
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 #include "tests/testing/zip_file.h"
 
 namespace eventgan {
@@ -53,14 +54,11 @@ class ZipCheckpointFile : public ::testing::Test {
   const std::string floats_ = raw_bytes<float>({0, 1, 2, 3, 4, 5});
 };
 
-TEST_F(ZipCheckpointFile, ReadsATensorOfANamedNetwork) {
-  const auto state = read(generator_of(pickled_tensor({})), floats_);
+TEST_F(ZipCheckpointFile, ReadsANamedNetworkOrABareStateDictOfCompressedMembers) {
+  auto state = read(generator_of(pickled_tensor({})), floats_);
   EXPECT_EQ(state.at("w").shape, (std::vector<std::int64_t>{2, 3}));
   EXPECT_THAT(state.at("w").values, ElementsAre(0, 1, 2, 3, 4, 5));
-}
-
-TEST_F(ZipCheckpointFile, ReadsABareStateDictAndCompressedMembers) {
-  const auto state =
+  state =
       read(pickled_dict(pickled_text("head.conv2d.weight") + pickled_tensor({})), floats_, true);
   EXPECT_EQ(state.count("head.conv2d.weight"), 1u);
 }
@@ -138,15 +136,12 @@ TEST_F(ZipCheckpointFile, RefusesTensorsOutsideTheirStorage) {
   EXPECT_THAT(refused(t), HasSubstr("data/1"));
 }
 
-TEST_F(ZipCheckpointFile, AStrideAlongASideOf1MayBeAnything) {
+TEST_F(ZipCheckpointFile, RefusesAStorageShorterThanItsCountButNoStrideAlongASideOf1) {
   PickledTensor t;
   t.shape = {1, 6};
   t.stride = {1000000, 1};
   EXPECT_EQ(read(generator_of(pickled_tensor(t)), floats_).at("w").values.size(), 6u);
-}
-
-TEST_F(ZipCheckpointFile, RefusesAStorageThatIsShorterThanItsCount) {
-  PickledTensor t;
+  t = PickledTensor();
   t.count = 7;
   EXPECT_THAT(refusal(generator_of(pickled_tensor(t)), floats_),
               HasSubstr("expected a storage of 7 values of 4 bytes, got 24 bytes"));
@@ -189,20 +184,21 @@ TEST_F(ZipCheckpointFile, ListsOnlySomeOfManyKeysAndOnlyPrintableText) {
   EXPECT_THAT(refusal(pickled_dict(""), floats_), HasSubstr("got no keys"));
 }
 
-TEST_F(ZipCheckpointFile, ExecutesNothing) {
+TEST_F(ZipCheckpointFile, RefusesFilesThatAreNoCheckpointAndExecutesNothing) {
   EXPECT_THAT(
       refusal(pickled_global("os", "system") + testing::pickled_tuple(pickled_text("true")) + "R",
               floats_),
       HasSubstr("os.system"));
-}
-
-TEST_F(ZipCheckpointFile, RefusesFilesThatAreNoCheckpoint) {
   testing::write_zip(folder_ / "other.zip", {{"readme.txt", "hello"}});
-  EXPECT_THROW(read_checkpoint(folder_ / "other.zip", "gen"), InputError);
-  EXPECT_THROW(read_checkpoint(folder_ / "absent.pt", "gen"), InputError);
-  EXPECT_THROW(read_checkpoint(folder_.path(), "gen"), InputError);
+  EXPECT_THROWS(read_checkpoint(folder_ / "other.zip", "gen"), InputError,
+                "expected a PyTorch checkpoint with data.pkl inside");
+  EXPECT_THROWS(read_checkpoint(folder_ / "absent.pt", "gen"), InputError,
+                "expected a readable file, got 'No such file or directory'");
+  EXPECT_THROWS(read_checkpoint(folder_.path(), "gen"), InputError,
+                "expected a readable file, got 'Is a directory'");
   testing::write_file(folder_ / "empty.pt", "");
-  EXPECT_THROW(read_checkpoint(folder_ / "empty.pt", "gen"), InputError);
+  EXPECT_THROWS(read_checkpoint(folder_ / "empty.pt", "gen"), InputError,
+                "expected a PyTorch checkpoint (a zip file or the format");
 }
 
 TEST_F(ZipCheckpointFile, NamesTheTarFormat) {
@@ -226,9 +222,9 @@ INSTANTIATE_TEST_SUITE_P(Formats, CheckpointGolden,
                            return std::string(format.param).substr(11, 3);
                          });
 
-TEST_P(CheckpointGolden, EqualsTheStateDict) {
+TEST_P(CheckpointGolden, EqualsTheStateDictOfBothNetworks) {
   EVENTGAN_SHARED_DATA_OR_SKIP(data);
-  const StateDict state = read_checkpoint(data / "golden" / GetParam(), "gen");
+  StateDict state = read_checkpoint(data / "golden" / GetParam(), "gen");
   const auto golden = data / "golden" / "golden.h5";
   const auto names = testing::member_names(golden, "generator/state");
   ASSERT_FALSE(names.empty());
@@ -237,11 +233,7 @@ TEST_P(CheckpointGolden, EqualsTheStateDict) {
     const auto expected = testing::read_array(golden, "generator/state/" + name);
     EXPECT_EQ(state.at(name).values, expected.values) << name;
   }
-}
-
-TEST_P(CheckpointGolden, ReadsTheOtherNetworkToo) {
-  EVENTGAN_SHARED_DATA_OR_SKIP(data);
-  const StateDict state = read_checkpoint(data / "golden" / GetParam(), "dis");
+  state = read_checkpoint(data / "golden" / GetParam(), "dis");
   EXPECT_EQ(state.at("disc.model.0.weight").shape, (std::vector<std::int64_t>{16, 20, 4, 4}));
 }
 

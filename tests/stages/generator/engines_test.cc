@@ -20,6 +20,7 @@
 #include "tests/stages/generator/plain_network.h"
 #include "tests/testing/golden_numbers.h"
 #include "tests/testing/shared_data.h"
+#include "tests/testing/texts.h"
 
 // What every engine must do in every precision that it has.
 
@@ -227,12 +228,12 @@ TEST_P(Engines, RefusesAThresholdThatItDoesNotKnow) {
   const auto two = engine(untrained_weights(2, 3, 5));
   const auto three = engine(testing::untrained_sensor_weights(2, 3, 5));
   EXPECT_EQ(two->thresholds(), std::nullopt);
-  EXPECT_THROW(two->generate({frames, size, ContrastThreshold{0.2}}, volume),
-               std::invalid_argument);
-  EXPECT_THROW(two->generate_tiles({frames, size, ContrastThreshold{0.2}}, wanted, volume),
-               std::invalid_argument);
-  EXPECT_THROW(three->generate({frames, size, ContrastThreshold{0}}, volume),
-               std::invalid_argument);
+  EXPECT_THROWS(two->generate({frames, size, ContrastThreshold{0.2}}, volume),
+                std::invalid_argument, "expected none for these weights, got a contrast threshold");
+  EXPECT_THROWS(two->generate_tiles({frames, size, ContrastThreshold{0.2}}, wanted, volume),
+                std::invalid_argument, "expected none for these weights, got a contrast threshold");
+  EXPECT_THROWS(three->generate({frames, size, ContrastThreshold{0}}, volume),
+                std::invalid_argument, "expected a contrast threshold above 0 for these weights");
 }
 
 TEST_P(Engines, GivesZerosIfNothingIsWanted) {
@@ -242,9 +243,9 @@ TEST_P(Engines, GivesZerosIfNothingIsWanted) {
   generator->generate_tiles({natural_frames(nothing.size, 1), nothing.size}, nothing, volume);
   EXPECT_EQ(volume, std::vector<float>(volume.size(), 0.0f));
   volume.pop_back();
-  EXPECT_THROW(
+  EXPECT_THROWS(
       generator->generate_tiles({natural_frames(nothing.size, 1), nothing.size}, nothing, volume),
-      std::invalid_argument);
+      std::invalid_argument, "expected frames [2, H, W] and a volume [6, H, W] of 40x17");
 }
 
 TEST_P(Engines, EqualsTheReferenceWithShippedWeightsAtTheUsualSize) {
@@ -350,10 +351,13 @@ TEST_P(Engines, SeesInfinityInAnyChannelAndAtAnyPixel) {
 TEST_P(Engines, RefusesSpansOfOtherSizes) {
   const auto generator = engine(untrained_weights(2, 9, 1));
   std::vector<float> frames(2 * 6), volume(18 * 6);
-  EXPECT_THROW(generator->generate({frames, {3, 3}}, volume), std::invalid_argument);
-  EXPECT_THROW(generator->generate({frames, {0, 0}}, volume), std::invalid_argument);
+  EXPECT_THROWS(generator->generate({frames, {3, 3}}, volume), std::invalid_argument,
+                "expected frames [2, H, W] and a volume [18, H, W] of 3x3");
+  EXPECT_THROWS(generator->generate({frames, {0, 0}}, volume), std::invalid_argument,
+                "expected frames [2, H, W] and a volume [18, H, W] of 0x0");
   volume.pop_back();
-  EXPECT_THROW(generator->generate({frames, {2, 3}}, volume), std::invalid_argument);
+  EXPECT_THROWS(generator->generate({frames, {2, 3}}, volume), std::invalid_argument,
+                "expected frames [2, H, W] and a volume [18, H, W] of 3x2");
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Engines,

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "stages/generator/weights.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -106,9 +107,8 @@ TEST(FoldGenerator, AConvolutionsOwnBiasGoesThroughBatchNorm) {
 TEST(FoldGenerator, RefusesALayerWithNeitherBatchNormNorBias) {
   StateDict state = folded_state(true);
   state.erase("decoders.1.conv2d.bias");
-  EXPECT_THAT([&] { fold_generator(state, "test"); },
-              ::testing::ThrowsMessage<std::runtime_error>(
-                  ::testing::HasSubstr("decoders.1.norm_layer.weight or decoders.1.conv2d.bias")));
+  EXPECT_THROWS(fold_generator(state, "test"), std::runtime_error,
+                "decoders.1.norm_layer.weight or decoders.1.conv2d.bias");
 }
 
 TEST(FoldGenerator, RefusesWhatBelongsToNoLayer) {
@@ -120,10 +120,9 @@ TEST(FoldGenerator, RefusesWhatBelongsToNoLayer) {
         "encoders.1.conv2d.weight_v", "pred.norm_layer.running_mean"}) {
     StateDict larger = state;
     larger[key] = {{1}, {1}};
-    EXPECT_THAT([&] { fold_generator(larger, "FILE"); },
-                ::testing::ThrowsMessage<std::runtime_error>(
-                    ::testing::HasSubstr("expected no other tensors than the generator's, got " +
-                                         std::string(key) + ", in FILE")))
+    EXPECT_THROWS(
+        fold_generator(larger, "FILE"), std::runtime_error,
+        "expected no other tensors than the generator's, got " + std::string(key) + ", in FILE")
         << key;
   }
 }
@@ -135,15 +134,10 @@ TEST(FoldGenerator, OfANetworkThatKnowsItsSensorHasThreeInputs) {
   EXPECT_EQ(layer(weights, "head").in_channels, 3);
   EXPECT_THAT(layer(weights, "head").weight, ::testing::Each(0.25f));
   EXPECT_EQ(layer(weights, "head").weight.size(), 2u * 3 * 9);
-  EXPECT_THAT(
-      [&] {
-        fold_generator(plain_state(2, 0.25f), "FILE", ThresholdRange{0.1, 0.4});
-      },
-      ::testing::ThrowsMessage<std::runtime_error>(
-          ::testing::HasSubstr("expected a generator of 3 inputs to 2 x bins channels")));
-  EXPECT_THAT([&] { fold_generator(plain_state(2, 0.25f, 3), "FILE"); },
-              ::testing::ThrowsMessage<std::runtime_error>(
-                  ::testing::HasSubstr("expected a generator of 2 inputs to 2 x bins channels")));
+  EXPECT_THROWS(fold_generator(plain_state(2, 0.25f), "FILE", ThresholdRange{0.1, 0.4}),
+                std::runtime_error, "expected a generator of 3 inputs to 2 x bins channels");
+  EXPECT_THROWS(fold_generator(plain_state(2, 0.25f, 3), "FILE"), std::runtime_error,
+                "expected a generator of 2 inputs to 2 x bins channels");
 }
 
 TEST(FoldGenerator, NamesWhatIsMissing) {
@@ -162,12 +156,16 @@ TEST(FoldGenerator, NamesWhatIsMissing) {
 TEST(FoldGenerator, RefusesAnotherShapeAndNumbersThatAreNotFinite) {
   StateDict wrong = plain_state(1, 1.0f);
   wrong["encoders.0.conv2d.weight"].values.pop_back();
-  EXPECT_THROW(fold_generator(wrong, "test"), std::runtime_error);
+  EXPECT_THROWS(fold_generator(wrong, "test"), std::runtime_error,
+                "expected 18 values of encoders.0.conv2d.weight, got 17");
   wrong = plain_state(1, 1.0f);
   std::swap(wrong["encoders.0.conv2d.weight"].shape[0], wrong["encoders.0.conv2d.weight"].shape[1]);
-  EXPECT_THROW(fold_generator(wrong, "test"), std::runtime_error);
-  EXPECT_THROW(fold_generator(plain_state(1, NAN), "test"), std::runtime_error);
-  EXPECT_THROW(fold_generator({}, "test"), std::runtime_error);
+  EXPECT_THROWS(fold_generator(wrong, "test"), std::runtime_error,
+                "expected shape [2, 1, 3, 3] of encoders.0.conv2d.weight");
+  EXPECT_THROWS(fold_generator(plain_state(1, NAN), "test"), std::runtime_error,
+                "expected finite numbers, got NaN or infinity in head");
+  EXPECT_THROWS(fold_generator({}, "test"), std::runtime_error,
+                "expected key head.conv2d.weight, got none, in test");
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "stages/generator/quantized_network.h"
 #include "stages/generator/weights.h"
 #include "tests/stages/generator/engine_trials.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -84,8 +85,8 @@ TEST(OnednnGenerator, SaysWhatChangesItsBytes) {
 
 TEST(OnednnGenerator, RefusesInt8WithoutCalibration) {
   if (!onednn_support(Precision::kInt8).able) GTEST_SKIP() << "no int8 here";
-  EXPECT_THROW(make_onednn_generator(untrained_weights(2, 9, 1), Precision::kInt8),
-               std::invalid_argument);
+  EXPECT_THROWS(make_onednn_generator(untrained_weights(2, 9, 1), Precision::kInt8),
+                std::invalid_argument, "expected weights with a calibration for int8, got none");
 }
 
 /// One pixel of an image, so that all weights meet all activations.

@@ -18,6 +18,7 @@
 #include "stages/generator/quantized_network.h"
 #include "stages/generator/weights.h"
 #include "tests/stages/generator/engine_trials.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -99,7 +100,8 @@ TEST(LayerNumbers, OfInt8AreWholeNumbersOfTheWholeRange) {
 }
 
 TEST(LayerNumbers, OfInt8NeedACalibration) {
-  EXPECT_THROW(int8_numbers(untrained_weights(2, 3, 7), kLargestWeight), std::invalid_argument);
+  EXPECT_THROWS(int8_numbers(untrained_weights(2, 3, 7), kLargestWeight), std::invalid_argument,
+                "expected weights with a calibration for int8, got none");
 }
 
 TEST(LayerNumbers, OfInt8ThatLeaveFloat32AreRefusedByTheirLayersName) {
@@ -125,7 +127,8 @@ TEST(LayerNumbers, OfInt8ThatCouldMakeInfinitiesOfTwoSignsAreRefused) {
   std::ranges::fill(head.weight, 1.8e37f);
   EXPECT_NO_THROW(int8_numbers(weights, kLargestWeight));
   std::ranges::fill(head.weight, 2e37f);
-  EXPECT_THROW(int8_numbers(weights, kLargestWeight), std::invalid_argument);
+  EXPECT_THROWS(int8_numbers(weights, kLargestWeight), std::invalid_argument,
+                "expected finite numbers in steps of the tensors, got others");
 }
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();

@@ -12,24 +12,22 @@
 #include "stages/generator/weights.h"
 #include "tests/stages/generator/engine_trials.h"
 #include "tests/stages/generator/plain_network.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
 
 using ::testing::ElementsAre;
 
-TEST(QuantizedKernel, RoundsEachOutputByItsOwnLargestWeight) {
+TEST(QuantizedKernel, RoundsEachOutputByItsOwnLargestWeightHalvesToEven) {
   // Two outputs, two inputs, one tap; steps 1/127·1.27 = 0.01 and 0.
-  const std::vector<float> kernel = {-1.27f, 0.024f, 0, 0};
+  std::vector<float> kernel = {-1.27f, 0.024f, 0, 0};
   const QuantizedKernel rounded = quantize_kernel(kernel, 2, 0.5f, std::vector<float>{3, 10});
   EXPECT_THAT(rounded.values, ElementsAre(-127, 2, 0, 0));
   EXPECT_THAT(rounded.scales, ElementsAre(::testing::FloatNear(0.005f, 1e-9f), 0.5f));
   // What rounding takes away, 0.004, sees a mean of 10.
   EXPECT_THAT(rounded.bias_correction, ElementsAre(::testing::FloatNear(0.04f, 1e-6f), 0));
-}
-
-TEST(QuantizedKernel, RoundsHalvesToEven) {
-  const std::vector<float> kernel = {127, 2.5f, 3.5f, -2.5f};
+  kernel = {127, 2.5f, 3.5f, -2.5f};
   EXPECT_THAT(quantize_kernel(kernel, 1, 1, std::vector<float>{0}).values,
               ElementsAre(127, 2, 4, -2));
 }
@@ -61,8 +59,8 @@ TEST(QuantizedKernel, TakesTheSmallestAndLargestNumbers) {
       quantize_kernel(std::vector<float>{smallest, 0, largest, 1}, 2, 1, std::vector<float>{0, 0});
   EXPECT_THAT(rounded.values, ElementsAre(0, 0, 127, 0));
   EXPECT_THAT(rounded.scales, ElementsAre(1, largest / 127));
-  EXPECT_THROW(quantize_kernel(std::vector<float>{largest}, 1, 1000, std::vector<float>{0}),
-               std::invalid_argument);
+  EXPECT_THROWS(quantize_kernel(std::vector<float>{largest}, 1, 1000, std::vector<float>{0}),
+                std::invalid_argument, "expected finite scales, got NaN or infinity");
 }
 
 TEST(QuantizedKernel, RefusesRowsWhoseSumsMayLeave32Bits) {
@@ -71,7 +69,8 @@ TEST(QuantizedKernel, RefusesRowsWhoseSumsMayLeave32Bits) {
   const std::vector<float> mean(kMost + 1, 0.0f);
   for (const float weight : {1.0f, -1.0f}) {
     std::vector<float> kernel(kMost + 1, weight);
-    EXPECT_THROW(quantize_kernel(kernel, 1, 1, mean), std::invalid_argument);
+    EXPECT_THROWS(quantize_kernel(kernel, 1, 1, mean), std::invalid_argument,
+                  "expected 8-bit sums of at most 2^31 - 1, got up to");
     EXPECT_NO_THROW(quantize_kernel(kernel, 1, 1, mean, kLargestWeightWithoutVnni));
     kernel[5] = 0;
     EXPECT_NO_THROW(quantize_kernel(kernel, 1, 1, mean));
@@ -84,16 +83,26 @@ TEST(QuantizedKernel, RefusesWhatIsNoKernel) {
   const std::vector<float> mean = {0, 0};
   const std::vector<float> kernel = {1, 2, 3, 4};
   const float nan = std::nanf("");
-  EXPECT_THROW(quantize_kernel(kernel, 0, 1, mean), std::invalid_argument);
-  EXPECT_THROW(quantize_kernel(kernel, 3, 1, mean), std::invalid_argument);
-  EXPECT_THROW(quantize_kernel({}, 1, 1, mean), std::invalid_argument);
-  EXPECT_THROW(quantize_kernel(kernel, 2, 1, {}), std::invalid_argument);
-  EXPECT_THROW(quantize_kernel(kernel, 2, 0, mean), std::invalid_argument);
-  EXPECT_THROW(quantize_kernel(kernel, 2, nan, mean), std::invalid_argument);
-  EXPECT_THROW(quantize_kernel(kernel, 2, 1, mean, 0), std::invalid_argument);
-  EXPECT_THROW(quantize_kernel(kernel, 2, 1, mean, 128), std::invalid_argument);
-  EXPECT_THROW(quantize_kernel(std::vector<float>{1, nan}, 1, 1, mean), std::invalid_argument);
-  EXPECT_THROW(quantize_kernel(kernel, 2, 1, std::vector<float>{0, nan}), std::invalid_argument);
+  EXPECT_THROWS(quantize_kernel(kernel, 0, 1, mean), std::invalid_argument,
+                "expected a kernel [0, 2, taps], got 4 values");
+  EXPECT_THROWS(quantize_kernel(kernel, 3, 1, mean), std::invalid_argument,
+                "expected a kernel [3, 2, taps], got 4 values");
+  EXPECT_THROWS(quantize_kernel({}, 1, 1, mean), std::invalid_argument,
+                "expected a kernel [1, 2, taps], got 0 values");
+  EXPECT_THROWS(quantize_kernel(kernel, 2, 1, {}), std::invalid_argument,
+                "expected a kernel [2, 0, taps], got 4 values");
+  EXPECT_THROWS(quantize_kernel(kernel, 2, 0, mean), std::invalid_argument,
+                "expected an input scale above 0, got 0.000000");
+  EXPECT_THROWS(quantize_kernel(kernel, 2, nan, mean), std::invalid_argument,
+                "expected an input scale above 0, got nan");
+  EXPECT_THROWS(quantize_kernel(kernel, 2, 1, mean, 0), std::invalid_argument,
+                "expected a largest weight in 1..127, got 0");
+  EXPECT_THROWS(quantize_kernel(kernel, 2, 1, mean, 128), std::invalid_argument,
+                "expected a largest weight in 1..127, got 128");
+  EXPECT_THROWS(quantize_kernel(std::vector<float>{1, nan}, 1, 1, mean), std::invalid_argument,
+                "expected finite weights, got NaN or infinity");
+  EXPECT_THROWS(quantize_kernel(kernel, 2, 1, std::vector<float>{0, nan}), std::invalid_argument,
+                "expected finite means, got NaN or infinity");
 }
 
 constexpr ImageSize kSize{17, 22};
@@ -238,8 +247,8 @@ TEST(QuantizeNetwork, DeadTensorsHaveNoRoomAndDeadChannelsAreHarmless) {
 }
 
 TEST(QuantizeNetwork, RefusesACalibrationOfAnotherNetwork) {
-  EXPECT_THROW(quantize_network(untrained_weights(2, 3, 7), testing::sample_calibration(1, 1)),
-               std::runtime_error);
+  EXPECT_THROWS(quantize_network(untrained_weights(2, 3, 7), testing::sample_calibration(1, 1)),
+                std::runtime_error, "expected 2 values for head, got 1, in the calibration");
 }
 
 }  // namespace

@@ -53,14 +53,11 @@ TEST(TiledWork, GoesBackThroughTheNetwork) {
   EXPECT_LT(work.share, 0.15);
 }
 
-TEST(TiledWork, EndsAtTheImage) {
+TEST(TiledWork, EndsAtTheImageAndOfAWholeOneIsMoreThanItsOwn) {
   const TiledWork work = tiled_work(tiles({33, 17}, 0, 2, 0, 1));
   EXPECT_EQ(rectangle(work.bottleneck[0], 2), (std::array{0, 2, 0, 1}));
   EXPECT_EQ(rectangle(work.bottleneck[4], 2), (std::array{0, 2, 0, 1}));
   EXPECT_GT(work.share, 1);
-}
-
-TEST(TiledWork, OfAWholeImageIsMoreThanItsOwn) {
   // Whole tiles, each with its surroundings, of all layers.
   EXPECT_GT(tiled_work(tiles({320, 480}, 0, 19, 0, 29)).share, 1);
 }

@@ -16,6 +16,7 @@
 #include "tests/stages/generator/engine_trials.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -77,7 +78,7 @@ TEST(Safetensors, RefusesMalformedFiles) {
       with_header(tensor("F32", "\"x\"", "[0,4]"), data),
   };
   for (const std::string& bytes : bad) {
-    EXPECT_THROW(parse_safetensors(bytes, "test"), std::runtime_error)
+    EXPECT_THROWS(parse_safetensors(bytes, "test"), std::runtime_error, "expected")
         << bytes.substr(8 < bytes.size() ? 8 : 0);
   }
 }
@@ -98,19 +99,15 @@ TEST(Safetensors, RefusesHeadersThatWouldGrow) {
   EXPECT_THAT(message(with_header(" {}", "")), ::testing::HasSubstr("begins with {"));
 }
 
-TEST(Safetensors, WritesTensorsThatAreElsewhere) {
+TEST(Safetensors, WritesTensorsThatAreElsewhereAndSaysWhichFileIsMissing) {
   const std::vector<float> values = {1, 2};
   EXPECT_EQ(serialize_safetensors({{"a", {{2}, values}}}, {{"k", "v"}}),
             serialize_safetensors({{{"a", {{2}, values}}}, {{"k", "v"}}}));
+  EXPECT_THROWS(read_safetensors("/nowhere/w.safetensors"), std::runtime_error,
+                "/nowhere/w.safetensors");
 }
 
-TEST(Safetensors, SaysWhichFileIsMissing) {
-  EXPECT_THAT(
-      [] { read_safetensors("/nowhere/w.safetensors"); },
-      ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr("/nowhere/w.safetensors")));
-}
-
-TEST(WeightsFile, RoundTrips) {
+TEST(WeightsFile, RoundTripsAndParsesBytes) {
   const testing::TemporaryFolder folder;
   Weights weights = untrained_weights(2, 9, 3);
   weights.metadata["origin_sha256"] = "abc";
@@ -120,12 +117,10 @@ TEST(WeightsFile, RoundTrips) {
   EXPECT_EQ(back.bins, 9);
   EXPECT_EQ(back.metadata, weights.metadata);
   EXPECT_EQ(serialize_weights(back), serialize_weights(weights));
-}
-
-TEST(WeightsFile, ParsesBytes) {
   const std::string bytes = serialize_weights(untrained_weights(1, 9, 3));
   EXPECT_EQ(serialize_weights(parse_weights(bytes, "NAME")), bytes);
-  EXPECT_THROW(parse_weights(bytes.substr(1), "NAME"), InputError);
+  EXPECT_THROWS(parse_weights(bytes.substr(1), "NAME"), InputError,
+                "expected a header inside the file, got a length of");
 }
 
 TEST(WeightsFile, TellsWhatGapsItWasTrainedOn) {
@@ -138,7 +133,9 @@ TEST(WeightsFile, TellsWhatGapsItWasTrainedOn) {
   for (const char* wrong : {"", "5", "1-", "-5", "0-5", "3-2", "1-5x", "1..5", "1-99999999999"}) {
     SafetensorsFile content = parse_safetensors(serialize_weights(weights), "");
     content.metadata["training_gaps"] = wrong;
-    EXPECT_THROW(parse_weights(serialize_safetensors(content), "NAME"), InputError) << wrong;
+    EXPECT_THROWS(parse_weights(serialize_safetensors(content), "NAME"), InputError,
+                  "expected metadata training_gaps FIRST-LAST such as 1-5")
+        << wrong;
   }
 }
 
@@ -174,27 +171,24 @@ TEST(WeightsFile, TellsWhatThresholdsItKnows) {
             std::nullopt);
 }
 
-TEST(WeightsFile, RefusesThresholdsThatAreNone) {
+TEST(WeightsFile, RefusesThresholdsThatAreNoneOrOfANetworkOfOtherInputs) {
   SafetensorsFile content =
       parse_safetensors(serialize_weights(testing::untrained_sensor_weights(1, 3, 1)), "");
   for (const char* wrong : {"", "some", "0.1", "0.1-", "-0.4", "0.4-0.1", "0-0.4", "-0.1-0.4",
                             "0.1--0.4", "nan-0.4", "0.1-nan", "0.1-inf", "inf-inf", "0.1-0.4x",
                             " 0.1-0.4", "0.1..0.4", "0.1-1e400", "0.1-1e6"}) {
     content.metadata["thresholds"] = wrong;
-    EXPECT_THAT([&] { parse_weights(serialize_safetensors(content), "NAME"); },
-                ::testing::Throws<InputError>())
+    EXPECT_THROWS(parse_weights(serialize_safetensors(content), "NAME"), InputError,
+                  "expected metadata thresholds LOWEST-HIGHEST such as")
         << wrong;
   }
-}
-
-TEST(WeightsFile, RefusesANetworkOfOtherInputsThanItsThresholdsSay) {
-  SafetensorsFile content =
-      parse_safetensors(serialize_weights(testing::untrained_sensor_weights(1, 3, 1)), "");
   content.metadata.erase("thresholds");
-  EXPECT_THROW(parse_weights(serialize_safetensors(content), "NAME"), InputError);
+  EXPECT_THROWS(parse_weights(serialize_safetensors(content), "NAME"), InputError,
+                "expected another shape of tensor head.weight");
   content = parse_safetensors(serialize_weights(untrained_weights(1, 3, 1)), "");
   content.metadata["thresholds"] = "0.1-0.4";
-  EXPECT_THROW(parse_weights(serialize_safetensors(content), "NAME"), InputError);
+  EXPECT_THROWS(parse_weights(serialize_safetensors(content), "NAME"), InputError,
+                "expected another shape of tensor head.weight");
 }
 
 TEST(WeightsFile, SaysOfAPyTorchCheckpointHowItIsImported) {
@@ -228,31 +222,31 @@ TEST(WeightsFile, RefusesOtherSafetensorsAndMissingFiles) {
   const testing::TemporaryFolder folder;
   SafetensorsFile content =
       parse_safetensors(serialize_weights(untrained_weights(1, 9, 3)), "test");
-  const auto refused = [&](const SafetensorsFile& changed) {
+  const std::pair<void (*)(SafetensorsFile&), const char*> cases[] = {
+      {[](SafetensorsFile& one) { one.metadata["format"] = "other"; },
+       "expected metadata format eventgan-generator version 1, got \"other\""},
+      {[](SafetensorsFile& one) { one.metadata["base_channels"] = "2"; },
+       "expected another shape of tensor head.weight"},
+      {[](SafetensorsFile& one) { one.metadata["base_channels"] = "-1"; },
+       "expected metadata base_channels in 1..1024, got \"-1\""},
+      {[](SafetensorsFile& one) { one.tensors.erase("pred.bias"); },
+       "expected tensor pred.bias, got none"},
+      {[](SafetensorsFile& one) {
+         one.tensors["extra"] = {{1}, {0}};
+       },
+       "expected no other tensors, got extra"},
+      {[](SafetensorsFile& one) { one.tensors["pred.bias"].values[0] = 1.0f / 0.0f; },
+       "expected finite numbers, got NaN or infinity in pred"},
+      {[](SafetensorsFile& one) { one.tensors["pred.bias"].values[0] = std::nanf(""); },
+       "expected finite numbers, got NaN or infinity in pred"}};
+  for (const auto& [change, words] : cases) {
+    auto changed = content;
+    change(changed);
     testing::write_file(folder / "w.safetensors", serialize_safetensors(changed));
-    EXPECT_THROW(read_weights(folder / "w.safetensors"), InputError);
-  };
-  auto changed = content;
-  changed.metadata["format"] = "other";
-  refused(changed);
-  changed = content;
-  changed.metadata["base_channels"] = "2";
-  refused(changed);
-  changed = content;
-  changed.metadata["base_channels"] = "-1";
-  refused(changed);
-  changed = content;
-  changed.tensors.erase("pred.bias");
-  refused(changed);
-  changed = content;
-  changed.tensors["extra"] = {{1}, {0}};
-  refused(changed);
-  changed = content;
-  changed.tensors["pred.bias"].values[0] = 1.0f / 0.0f;
-  refused(changed);
-  changed.tensors["pred.bias"].values[0] = std::numeric_limits<float>::quiet_NaN();
-  refused(changed);
-  EXPECT_THROW(read_weights(folder / "none.safetensors"), InputError);
+    EXPECT_THROWS(read_weights(folder / "w.safetensors"), InputError, words);
+  }
+  EXPECT_THROWS(read_weights(folder / "none.safetensors"), InputError,
+                "expected a readable file, got 'No such file or directory'");
 }
 
 Weights calibrated_weights() {
@@ -290,37 +284,39 @@ TEST(CalibrationFields, AreAbsentWithoutACalibration) {
 
 TEST(CalibrationFields, RefuseHalfACalibration) {
   const SafetensorsFile whole = parse_safetensors(serialize_weights(calibrated_weights()), "test");
-  const auto refused = [](const SafetensorsFile& changed) {
-    EXPECT_THROW(parse_weights(serialize_safetensors(changed), "NAME"), InputError);
+  const auto refused = [](const SafetensorsFile& changed, const std::string& words) {
+    EXPECT_THROWS(parse_weights(serialize_safetensors(changed), "NAME"), InputError, words);
   };
-  for (const char* key : {"calibration.pairs", "calibration.origin"}) {
+  for (const auto& [key, words] :
+       {std::pair("calibration.pairs", "expected no other tensors, got calibration.decoders"),
+        {"calibration.origin", "expected metadata calibration.origin, got none"}}) {
     SafetensorsFile changed = whole;
     changed.metadata.erase(key);
-    refused(changed);
+    refused(changed, words);
   }
-  for (const char* pairs : {"0", "-3", "", "many", "1.5", "99999999999"}) {
+  for (const std::string pairs : {"0", "-3", "", "many", "1.5", "99999999999"}) {
     SafetensorsFile changed = whole;
     changed.metadata["calibration.pairs"] = pairs;
-    refused(changed);
+    refused(changed, "expected metadata calibration.pairs in 1..2147483647, got \"" + pairs + '"');
   }
-  for (const char* tensor : {"calibration.head.mixing", "calibration.resblocks.0.mean",
-                             "calibration.decoders.2.highest", "calibration.encoders.3.offset"}) {
+  for (const std::string tensor :
+       {"calibration.head.mixing", "calibration.resblocks.0.mean", "calibration.decoders.2.highest",
+        "calibration.encoders.3.offset"}) {
     SafetensorsFile changed = whole;
     changed.tensors.erase(tensor);
-    refused(changed);
-    changed = whole;
+    refused(changed, "expected tensor " + tensor + ", got none");
     changed.tensors[tensor] = {{1}, {0}};
-    refused(changed);
+    refused(changed, "expected another shape of tensor " + tensor);
     changed = whole;
-    changed.tensors[tensor].values[0] = std::numeric_limits<float>::quiet_NaN();
-    refused(changed);
+    changed.tensors[tensor].values[0] = std::nanf("");
+    refused(changed, "expected finite numbers for ");
   }
   SafetensorsFile changed = whole;
   changed.tensors["calibration.resblocks.0.mixing"] = {{1}, {0}};
-  refused(changed);
+  refused(changed, "expected no other tensors, got calibration.resblocks.0.mixing");
   changed = whole;
   changed.tensors["calibration.head.highest"].values[1] = -1;
-  refused(changed);
+  refused(changed, "expected a highest value and a mean of at least 0 for head, got a negative");
 }
 
 std::filesystem::path repository_file(int width) {
@@ -335,12 +331,22 @@ std::vector<int> widths_and_sensor() {
   return widths;
 }
 
-TEST(ShippedWeights, AreTheRepositorysFilesByteForByte) {
+TEST(ShippedWeights, AreTheRepositorysFilesOfTheirWidth) {
   for (const int width : widths_and_sensor()) {
     const auto bytes = shipped_weights_bytes(width);
     const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     EXPECT_TRUE(text == testing::read_file(repository_file(width))) << width;
   }
+  for (const int width : shipped_widths()) {
+    const Weights weights = read_shipped_weights(width);
+    EXPECT_EQ(weights.base_channels, width);
+    EXPECT_EQ(weights.bins, 9);
+    EXPECT_EQ(weights.training_gaps, (GapRange{1, 6}));  // manifests/weights/train-8.json
+  }
+  EXPECT_THROWS(shipped_weights_bytes(7777), InputError,
+                "expected a base width of the shipped weights (8, 16)");
+  EXPECT_THROWS(read_shipped_weights(-8), InputError,
+                "expected a base width of the shipped weights (8, 16)");
 }
 
 TEST(ShippedWeights, AreAllThatTheRepositoryHas) {
@@ -364,30 +370,16 @@ TEST(ShippedWeights, HaveASetThatKnowsItsSensor) {
   EXPECT_NE(weights.calibration, nullptr);
 }
 
-TEST(ShippedWeights, AreNetworksOfTheirWidth) {
-  for (const int width : shipped_widths()) {
-    const Weights weights = read_shipped_weights(width);
-    EXPECT_EQ(weights.base_channels, width);
-    EXPECT_EQ(weights.bins, 9);
-    EXPECT_EQ(weights.training_gaps, (GapRange{1, 6}));  // manifests/weights/train-8.json
-  }
-}
-
 TEST(ShippedWeights, TheDefaultIsTheLargestOfAtMost16) {
   int expected = 0;
   for (const int width : shipped_widths()) {
     if (width <= 16) expected = std::max(expected, width);
   }
   if (expected == 0) {
-    EXPECT_THROW(default_shipped_width(), InputError);
+    EXPECT_THROWS(default_shipped_width(), InputError, "expected shipped weights of a base width");
   } else {
     EXPECT_EQ(default_shipped_width(), expected);
   }
-}
-
-TEST(ShippedWeights, RefusesOtherWidths) {
-  EXPECT_THROW(shipped_weights_bytes(7777), InputError);
-  EXPECT_THROW(read_shipped_weights(-8), InputError);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "stages/generator/decoder_kernels.h"
 #include "stages/generator/generator.h"
 #include "tests/stages/generator/engine_trials.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -28,16 +29,13 @@ TEST(NetworkLayout, HasThePublishedNumberOfParameters) {
   EXPECT_NEAR(double(weights + biases + normalised) / 1e6, 13.36, 0.005);
 }
 
-TEST(NetworkLayout, ScalesWithTheBaseWidth) {
+TEST(NetworkLayout, ScalesWithTheBaseWidthAndOfThreeInputsHasAnotherHead) {
   const auto layout = network_layout(8, 9);
   EXPECT_EQ(layout.size(), 14u);
   EXPECT_EQ(layout.front().out_channels, 8);
   EXPECT_EQ(layout[9].name, "decoders.0");
   EXPECT_EQ(layout[9].in_channels, 192);  // 16 b from below and 8 b from the skip
   EXPECT_EQ(layout.back().out_channels, 18);
-}
-
-TEST(NetworkLayout, OfThreeInputsHasAnotherHeadAndNoMore) {
   const auto two = network_layout(8, 9), three = network_layout(8, 9, 3);
   EXPECT_EQ(two.front().in_channels, 2);
   EXPECT_EQ(three.front().in_channels, 3);
@@ -80,16 +78,11 @@ TEST(NetworkPlanes, RefuseAThresholdThatIsNoneOrThatNobodyLearnt) {
   };
   for (const ContrastThreshold wrong :
        {ContrastThreshold{0}, {-0.2}, {NAN}, {0.2, 0}, {0.2, -1}, {0.2, NAN}}) {
-    EXPECT_THAT(
-        [&] {
-          planes(wrong, ThresholdRange{0.1, 0.4});
-        },
-        ::testing::ThrowsMessage<std::invalid_argument>(
-            ::testing::HasSubstr("expected a contrast threshold above 0")))
+    EXPECT_THROWS(planes(wrong, ThresholdRange{0.1, 0.4}), std::invalid_argument,
+                  "expected a contrast threshold above 0")
         << wrong.mean << " " << wrong.ratio;
   }
-  EXPECT_THAT([&] { planes({0.2}, std::nullopt); }, ::testing::ThrowsMessage<std::invalid_argument>(
-                                                        ::testing::HasSubstr("expected none")));
+  EXPECT_THROWS(planes({0.2}, std::nullopt), std::invalid_argument, "expected none");
 }
 
 TEST(HalfSize, RoundsUp) {
@@ -100,13 +93,16 @@ TEST(HalfSize, RoundsUp) {
 TEST(CheckWeights, FindsAMissingLayerAndNan) {
   Weights weights = untrained_weights(1, 9, 1);
   weights.convolutions[2].weight[0] = NAN;
-  EXPECT_THROW(check_weights(weights, "test"), std::runtime_error);
+  EXPECT_THROWS(check_weights(weights, "test"), std::runtime_error,
+                "expected finite numbers, got NaN or infinity in encoders.1");
   weights = untrained_weights(1, 9, 1);
   weights.convolutions.pop_back();
-  EXPECT_THROW(check_weights(weights, "test"), std::runtime_error);
+  EXPECT_THROWS(check_weights(weights, "test"), std::runtime_error,
+                "expected 14 convolutions, got 13, in test");
   weights = untrained_weights(1, 9, 1);
   std::swap(weights.convolutions[2], weights.convolutions[3]);
-  EXPECT_THROW(check_weights(weights, "test"), std::runtime_error);
+  EXPECT_THROWS(check_weights(weights, "test"), std::runtime_error,
+                "expected encoders.1 [4, 2, 3, 3], got encoders.2 [8, 4, 3");
 }
 
 TEST(CheckWeights, WantsAsManyInputsAsTheThresholdsSay) {
@@ -115,10 +111,12 @@ TEST(CheckWeights, WantsAsManyInputsAsTheThresholdsSay) {
   EXPECT_NO_THROW(check_weights(weights, "test"));
   weights.thresholds.reset();
   EXPECT_EQ(weights.inputs(), 2);
-  EXPECT_THROW(check_weights(weights, "test"), std::runtime_error);
+  EXPECT_THROWS(check_weights(weights, "test"), std::runtime_error,
+                "expected head [2, 2, 3, 3], got head [2, 3, 3, 3], in test");
   weights = untrained_weights(2, 3, 1);
   weights.thresholds = ThresholdRange{0.1, 0.4};
-  EXPECT_THROW(check_weights(weights, "test"), std::runtime_error);
+  EXPECT_THROWS(check_weights(weights, "test"), std::runtime_error,
+                "expected head [2, 3, 3, 3], got head [2, 2, 3, 3], in test");
 }
 
 TEST(ActivationBytes, AddUpTheTensorsBetweenTheLayers) {
@@ -129,14 +127,11 @@ TEST(ActivationBytes, AddUpTheTensorsBetweenTheLayers) {
   EXPECT_EQ(activation_bytes({32, 48}, 2, 1), values + 2 * 1536 * 4);
 }
 
-TEST(UntrainedWeights, SameSeedSameNumbers) {
+TEST(UntrainedWeights, OfTheSameSeedAreTheSameNumbersInTheLayout) {
   EXPECT_EQ(untrained_weights(2, 9, 1).convolutions[3].weight,
             untrained_weights(2, 9, 1).convolutions[3].weight);
   EXPECT_NE(untrained_weights(2, 9, 1).convolutions[3].weight,
             untrained_weights(2, 9, 2).convolutions[3].weight);
-}
-
-TEST(UntrainedWeights, HaveTheLayoutAndTheDeviationOfHeInitialisation) {
   const Weights weights = untrained_weights(8, 9, 1);
   EXPECT_NO_THROW(check_weights(weights, "test"));
   const Convolution& layer = weights.convolutions[5];  // resblocks.0.conv1: fan-in 128 x 9
@@ -147,17 +142,17 @@ TEST(UntrainedWeights, HaveTheLayoutAndTheDeviationOfHeInitialisation) {
   EXPECT_NEAR(deviation, std::sqrt(2.0 / (128 * 9)), 0.01 * deviation);
 }
 
-TEST(CheckGeneratorSpans, TakesFramesAndVolumeOfOneSize) {
+TEST(CheckGeneratorSpans, TakesFramesAndVolumeOfOneSizeAlone) {
   const std::vector<float> frames(2 * 6), volume(18 * 6);
   EXPECT_NO_THROW(check_generator_spans({frames, {2, 3}}, volume, 9));
-}
-
-TEST(CheckGeneratorSpans, RefusesOthers) {
-  const std::vector<float> frames(2 * 6), volume(18 * 6);
-  EXPECT_THROW(check_generator_spans({frames, {3, 3}}, volume, 9), std::invalid_argument);
-  EXPECT_THROW(check_generator_spans({frames, {2, 3}}, volume, 8), std::invalid_argument);
-  EXPECT_THROW(check_generator_spans({}, {}, 9), std::invalid_argument);
-  EXPECT_THROW(check_generator_spans({frames, {-2, -3}}, volume, 9), std::invalid_argument);
+  EXPECT_THROWS(check_generator_spans({frames, {3, 3}}, volume, 9), std::invalid_argument,
+                "expected frames [2, H, W] and a volume [18, H, W] of 3x3");
+  EXPECT_THROWS(check_generator_spans({frames, {2, 3}}, volume, 8), std::invalid_argument,
+                "expected frames [2, H, W] and a volume [16, H, W] of 3x2");
+  EXPECT_THROWS(check_generator_spans({}, {}, 9), std::invalid_argument,
+                "expected frames [2, H, W] and a volume [18, H, W] of 0x0");
+  EXPECT_THROWS(check_generator_spans({frames, {-2, -3}}, volume, 9), std::invalid_argument,
+                "expected frames [2, H, W] and a volume [18, H, W] of -3x-2");
 }
 
 constexpr int kOut = 2;

@@ -29,54 +29,29 @@ std::vector<Placement> random_placements() {
 /// Points of and around the largest source image.
 std::vector<double> coordinates() { return {-1000.5, -1, -0.5, 0, 0.25, 17, 1241, 1999.5, 3000}; }
 
-TEST(Geometry, PointsComeBack) {
+void expect_near(const Point& got, const Point& expected) {
+  EXPECT_NEAR(got.x, expected.x, 1e-9);
+  EXPECT_NEAR(got.y, expected.y, 1e-9);
+}
+
+TEST(Geometry, PointsAndBoxesComeBackAndMapByTheRecordedMatrix) {
   for (const Placement& placement : random_placements()) {
     for (const double x : coordinates()) {
       const Point point{x, 375 - x};
-      const Point back = to_source(placement, to_volume(placement, point));
-      EXPECT_NEAR(back.x, point.x, 1e-9);
-      EXPECT_NEAR(back.y, point.y, 1e-9);
-    }
-  }
-}
-
-TEST(Geometry, BoxesComeBack) {
-  for (const Placement& placement : random_placements()) {
-    for (const double x : coordinates()) {
+      expect_near(to_source(placement, to_volume(placement, point)), point);
       const Rectangle box{x, -x, x + 100.25, 50 - x};
       const Rectangle back = to_source(placement, to_volume(placement, box));
-      EXPECT_NEAR(back.left, box.left, 1e-9);
-      EXPECT_NEAR(back.top, box.top, 1e-9);
-      EXPECT_NEAR(back.right, box.right, 1e-9);
-      EXPECT_NEAR(back.bottom, box.bottom, 1e-9);
+      expect_near({back.left, back.top}, {box.left, box.top});
+      expect_near({back.right, back.bottom}, {box.right, box.bottom});
+      // The edge at x lies half a pixel before the centre of pixel x: at the point x - 0.5.
+      const Rectangle edges = to_volume(placement, Rectangle{x, x, x + 1, x + 1});
+      expect_near(to_volume(placement, Point{x - 0.5, x - 0.5}),
+                  {edges.left - 0.5, edges.top - 0.5});
     }
-  }
-}
-
-// The edge at e lies half a pixel before the centre of pixel e, that is at the point e - 0.5.
-TEST(Geometry, AnEdgeMapsAsThePointHalfAPixelBeforeIt) {
-  for (const Placement& placement : random_placements()) {
-    for (const double e : coordinates()) {
-      const Rectangle box = to_volume(placement, Rectangle{e, e, e + 1, e + 1});
-      const Point corner = to_volume(placement, Point{e - 0.5, e - 0.5});
-      EXPECT_NEAR(box.left - 0.5, corner.x, 1e-9);
-      EXPECT_NEAR(box.top - 0.5, corner.y, 1e-9);
-    }
-  }
-}
-
-TEST(Geometry, PointsMapByTheRecordedMatrix) {
-  for (const Placement& placement : random_placements()) {
     const auto m = placement.source_to_volume();
-    const Point mapped = to_volume(placement, Point{12.5, 99});
-    EXPECT_NEAR(mapped.x, m[0] * 12.5 + m[1] * 99 + m[2], 1e-9);
-    EXPECT_NEAR(mapped.y, m[3] * 12.5 + m[4] * 99 + m[5], 1e-9);
+    expect_near(to_volume(placement, Point{12.5, 99}),
+                {m[0] * 12.5 + m[1] * 99 + m[2], m[3] * 12.5 + m[4] * 99 + m[5]});
   }
-}
-
-TEST(Geometry, AStretchedImageFillsTheVolume) {
-  const Placement placement{{375, 1242}, {260, 861}, {260, 861}, 0, 0};
-  EXPECT_EQ(to_volume(placement, Rectangle{0, 0, 1242, 375}), (Rectangle{0, 0, 861, 260}));
 }
 
 TEST(Geometry, NumbersWorkedOutByHand) {
@@ -86,6 +61,8 @@ TEST(Geometry, NumbersWorkedOutByHand) {
   EXPECT_EQ(to_volume(placement, Point{10, 10}), (Point{23.5, 0.75}));
   // left 10 2 + 3 = 23, top 10 0.5 - 4 = 1, right 12 2 + 3 = 27, bottom 14 0.5 - 4 = 3.
   EXPECT_EQ(to_volume(placement, Rectangle{10, 10, 12, 14}), (Rectangle{23, 1, 27, 3}));
+  const Placement stretched{{375, 1242}, {260, 861}, {260, 861}, 0, 0};
+  EXPECT_EQ(to_volume(stretched, Rectangle{0, 0, 1242, 375}), (Rectangle{0, 0, 861, 260}));
 }
 
 // Projecting and then mapping must equal projecting with the mapped camera.
@@ -123,21 +100,13 @@ TEST(Clip, CutsToTheImageAndIsNeverInsideOut) {
   }
 }
 
-TEST(Clip, LeavesABoxInsideAsItIs) {
-  const Rectangle box{0, 1.5, 100, 49.25};
-  EXPECT_EQ(clip(box, {0, 0, 100, 50}), box);
-}
-
-TEST(Clip, ABoxOutsideBecomesEmptyAtTheNearestBorder) {
-  EXPECT_EQ(clip(Rectangle{-20, 10, -5, 30}, {0, 0, 100, 50}), (Rectangle{0, 10, 0, 30}));
-  EXPECT_EQ(clip(Rectangle{120, 60, 130, 70}, {0, 0, 100, 50}), (Rectangle{100, 50, 100, 50}));
-}
-
-TEST(IsEmpty, IsTrueWithoutArea) {
+TEST(Clip, LeavesABoxInsideAndPutsOneOutsideAtTheNearestBorder) {
+  const Rectangle image{0, 0, 100, 50}, inside{0, 1.5, 100, 49.25};
+  EXPECT_EQ(clip(inside, image), inside);
+  EXPECT_EQ(clip(Rectangle{-20, 10, -5, 30}, image), (Rectangle{0, 10, 0, 30}));
+  EXPECT_EQ(clip(Rectangle{120, 60, 130, 70}, image), (Rectangle{100, 50, 100, 50}));
   EXPECT_FALSE(is_empty({0, 0, 1, 1}));
-  EXPECT_TRUE(is_empty({5, 0, 5, 1}));
-  EXPECT_TRUE(is_empty({0, 5, 1, 5}));
-  EXPECT_TRUE(is_empty({2, 0, 1, 1}));
+  EXPECT_TRUE(is_empty({5, 0, 5, 1}) && is_empty({0, 5, 1, 5}) && is_empty({2, 0, 1, 1}));
 }
 
 }  // namespace

@@ -54,34 +54,33 @@ std::string fault(const Annotation& annotation) {
 std::string fault(const Box& one) { return fault(Annotation{"", {one}, {}}); }
 std::string fault(const Person& one) { return fault(Annotation{"", {}, {one}}); }
 
-TEST(MapLabels, AnEmptyAnnotationHasNoLabels) {
+TEST(MapLabels, KeepsTheOrderAndMapsEachBoxUncutAndCut) {
   EXPECT_TRUE(mapped({}, kHalf).boxes.empty());
   EXPECT_TRUE(mapped({}, kHalf).persons.empty());
-}
-
-TEST(MapLabels, KeepsTheOrderAndMapsEachBox) {
-  const auto labels = mapped({"", {box(0, 0, 1242, 375), box(621, 0, 622, 375)}, {}}, kHalf);
-  ASSERT_EQ(labels.boxes.size(), 2u);
-  EXPECT_EQ(labels.boxes[0].clipped, (Rectangle{0, 0, 621, 188}));
-  EXPECT_EQ(labels.boxes[1].unclipped, (Rectangle{310.5, 0, 311, 188}));
-  EXPECT_FALSE(labels.boxes[0].ignore);
-}
-
-TEST(MapLabels, ACropCutsABoxAndKeepsItUncut) {
-  const auto labels = mapped({"", {box(400, 150, 431, 200)}, {}}, kMiddle);
-  // 400 - 421 = -21, 431 - 421 = 10; 150 - 100 = 50, 200 - 100 = 100.
-  EXPECT_EQ(labels.boxes[0].unclipped, (Rectangle{-21, 50, 10, 100}));
-  EXPECT_EQ(labels.boxes[0].clipped, (Rectangle{0, 50, 10, 100}));
-  EXPECT_FALSE(labels.boxes[0].ignore);
-}
-
-TEST(MapLabels, ABoxThatACropLeavesNothingOfStaysAndIsIgnored) {
-  const auto labels = mapped({"", {box(10, 150, 40, 200), box(500, 150, 540, 200)}, {}}, kMiddle);
-  ASSERT_EQ(labels.boxes.size(), 2u);
-  EXPECT_TRUE(is_empty(labels.boxes[0].clipped));
-  EXPECT_TRUE(labels.boxes[0].ignore);
-  EXPECT_EQ(labels.boxes[0].unclipped, (Rectangle{-411, 50, -381, 100}));
-  EXPECT_FALSE(labels.boxes[1].ignore);
+  const std::vector<VolumeBox> halves =
+      mapped({"", {box(0, 0, 1242, 375), box(621, 0, 622, 375), box(-1e6, 0, 1e6, 375)}, {}}, kHalf)
+          .boxes;
+  ASSERT_EQ(halves.size(), 3u);
+  EXPECT_EQ(halves[0].clipped, (Rectangle{0, 0, 621, 188}));
+  EXPECT_EQ(halves[1].unclipped, (Rectangle{310.5, 0, 311, 188}));
+  EXPECT_EQ(halves[2].clipped, (Rectangle{0, 0, 621, 188}));
+  EXPECT_EQ(halves[2].unclipped, (Rectangle{-5e5, 0, 5e5, 188}));
+  for (const VolumeBox& one : halves) EXPECT_FALSE(one.ignore);
+  // A crop: 400 - 421 = -21, 431 - 421 = 10; 150 - 100 = 50, 200 - 100 = 100. Of the second box it
+  // leaves nothing.
+  const std::vector<VolumeBox> cut =
+      mapped({"", {box(400, 150, 431, 200), box(10, 150, 40, 200), box(500, 150, 540, 200)}, {}},
+             kMiddle)
+          .boxes;
+  EXPECT_EQ(cut[0].unclipped, (Rectangle{-21, 50, 10, 100}));
+  EXPECT_EQ(cut[0].clipped, (Rectangle{0, 50, 10, 100}));
+  EXPECT_TRUE(is_empty(cut[1].clipped));
+  EXPECT_EQ(cut[1].unclipped, (Rectangle{-411, 50, -381, 100}));
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(cut[i].ignore, i == 1);
+  // Without area a box is kept and ignored.
+  for (const Box& one : {box(10, 20, 10, 40), box(10, 20, 30, 20)}) {
+    EXPECT_TRUE(mapped({"", {one}, {}}, kHalf).boxes[0].ignore);
+  }
 }
 
 TEST(MapLabels, WhatAStillsBordersHideIsCutEvenWhereALetterboxHasRoom) {
@@ -110,60 +109,66 @@ TEST(MapLabels, ABoxThatReachesIntoALetterboxesBorderIsCutAtTheImage) {
   EXPECT_EQ(labels.boxes[0].clipped, (Rectangle{0, 5, 30, 35}));
 }
 
-TEST(MapLabels, DontCareStaysIgnored) {
-  Box dont_care = box(10, 10, 20, 20);
-  dont_care.ignore = true;
-  EXPECT_TRUE(mapped({"", {dont_care}, {}}, kHalf).boxes[0].ignore);
+template <class Label>
+Label with(Label label, void (*change)(Label&)) {
+  change(label);
+  return label;
 }
 
-TEST(MapLabels, ABoxToIgnoreMayLieOutsideTheImageButMustBeABox) {
-  Box dont_care = box(1300, 20, 1400, 90);
+/// A label and words of its fault; none if there is none.
+template <class Label>
+using Faults = std::pair<Label, const char*>;
+
+template <class Label>
+void expect_faults(const std::vector<Faults<Label>>& cases) {
+  for (const auto& [label, words] : cases) {
+    const std::string got = fault(label);
+    EXPECT_THAT(got, HasSubstr(words));
+    EXPECT_EQ(got.empty(), *words == '\0') << got;
+  }
+}
+
+TEST(MapLabels, WhatABoxMustBeIsChecked) {
+  const Box good = box(10, 10, 20, 30);
+  Box dont_care = box(10, 10, 20, 20);
   dont_care.ignore = true;
+  expect_faults<Box>({
+      {box(937, 197, 1241, 374), ""},
+      {box(-2.5, -1, 1243, 376), ""},  // slightly beyond the border
+      {box(100, 100, 100, 120), ""},   // no width, but inside
+      {box(-1e6, -1e6, 1e6, 1e6), ""},
+      {box(1300, 20, 1400, 90),
+       "expected an overlap with the image of 1242x375 pixels, got left 1300, top 20, right 1400, "
+       "bottom 90, in box 1 of 1, in label_2/001497.txt"},
+      {box(-10, 20, 0, 90), "expected an overlap"},
+      {box(10, 375, 20, 380), "expected an overlap"},
+      {box(10, -5, 20, -1), "expected an overlap"},
+      {box(1e5, 0, 2e5, 375), "expected an overlap"},
+      {box(20, 10, 10, 30), "expected left <= right"},
+      {box(10, 30, 20, 10), "expected left <= right and top <= bottom"},
+      {box(10, kNan, 20, 30), "expected edges within 1e6 pixels"},
+      {box(10, 10, kInfinity, 30), "expected edges within 1e6 pixels"},
+      {box(10, 10, 1e300, 20),
+       "expected edges within 1e6 pixels, got left 10, top 10, right 1e+300, bottom 20, in box 1"},
+      {box(-1000001, 10, 20, 20), "expected edges within 1e6 pixels"},
+      {with<Box>(good, [](Box& one) { one.box3d[5] = kInfinity; }),
+       "expected a finite box in 3-D, got inf, in box 1 of 1, in label_2/001497.txt"},
+      {with<Box>(good, [](Box& one) { one.alpha = std::nanf(""); }), "finite alpha, got nan"},
+      {with<Box>(good, [](Box& one) { one.truncation = static_cast<float>(1e300); }),
+       "finite truncation, got inf"},
+      {dont_care, ""},
+      {with<Box>(dont_care, [](Box& one) { one.xyxy.right = 0; }), "expected left <= right"},
+      {with<Box>(dont_care, [](Box& one) { one.xyxy.left = kNan; }), "edges within 1e6 pixels"},
+      {with<Box>(dont_care, [](Box& one) { one.xyxy.right = 1e7; }), "edges within 1e6 pixels"},
+  });
+  EXPECT_THAT(fault(Annotation{"", {box(0, 0, 1, 1), box(1300, 20, 1400, 90)}, {}}),
+              HasSubstr("in box 2 of 2"));
+  dont_care.xyxy = {1300, 20, 1400, 90};  // may lie outside
   const auto labels = mapped({"", {dont_care}, {}}, kHalf);
   ASSERT_EQ(labels.boxes.size(), 1u);
   EXPECT_TRUE(labels.boxes[0].ignore);
   EXPECT_TRUE(is_empty(labels.boxes[0].clipped));
   EXPECT_EQ(labels.boxes[0].unclipped.left, 650);  // 1300 x 621/1242
-  dont_care.xyxy = {20, 10, 10, 30};
-  EXPECT_THAT(fault(dont_care), HasSubstr("expected left <= right"));
-  dont_care.xyxy = {kNan, 10, 20, 30};
-  EXPECT_THAT(fault(dont_care), HasSubstr("expected edges within 1e6 pixels"));
-}
-
-TEST(MapLabels, BoxesAtAndSlightlyBeyondTheBorderAreFine) {
-  EXPECT_EQ(fault(box(937, 197, 1241, 374)), "");
-  EXPECT_EQ(fault(box(-2.5, -1, 1243, 376)), "");
-  EXPECT_EQ(fault(box(100, 100, 100, 120)), "");  // no width, but inside
-}
-
-TEST(MapLabels, ABoxOutsideTheImageIsAFaultThatNamesIt) {
-  const std::string reason = fault(Annotation{"", {box(0, 0, 1, 1), box(1300, 20, 1400, 90)}, {}});
-  EXPECT_EQ(reason,
-            "expected an overlap with the image of 1242x375 pixels, got left 1300, top 20, "
-            "right 1400, bottom 90, in box 2 of 2, in label_2/001497.txt");
-  EXPECT_NE(fault(box(-10, 20, 0, 90)), "");
-  EXPECT_NE(fault(box(10, 375, 20, 380)), "");
-  EXPECT_NE(fault(box(10, -5, 20, -1)), "");
-}
-
-TEST(MapLabels, AnInvertedBoxIsAFault) {
-  EXPECT_THAT(fault(box(20, 10, 10, 30)), HasSubstr("expected left <= right"));
-  EXPECT_THAT(fault(box(10, 30, 20, 10)), HasSubstr("expected left <= right and top <= bottom"));
-}
-
-TEST(MapLabels, NumbersOfABoxMustBeFinite) {
-  EXPECT_THAT(fault(box(10, kNan, 20, 30)), HasSubstr("expected edges within 1e6 pixels"));
-  EXPECT_NE(fault(box(10, 10, std::numeric_limits<double>::infinity(), 30)), "");
-  Box one = box(10, 10, 20, 30);
-  one.box3d[5] = kInfinity;
-  EXPECT_EQ(fault(one),
-            "expected a finite box in 3-D, got inf, in box 1 of 1, in label_2/001497.txt");
-  one = box(10, 10, 20, 30);
-  one.alpha = std::nanf("");
-  EXPECT_THAT(fault(one), HasSubstr("finite alpha, got nan"));
-  one = box(10, 10, 20, 30);
-  one.truncation = static_cast<float>(1e300);
-  EXPECT_THAT(fault(one), HasSubstr("finite truncation, got inf"));
 }
 
 TEST(MapLabels, MissingPointsStayAndOthersMove) {
@@ -195,83 +200,70 @@ TEST(MapLabels, ScaleHeadBoxCentreAndCameraFollowTheImage) {
   EXPECT_DOUBLE_EQ(mapped({"", {}, {one}}, kHalf).persons[0].scale, 3 * std::sqrt(0.5 * 188 / 375));
 }
 
-TEST(MapLabels, APersonWithAllJointsOutsideIsAFault) {
-  EXPECT_EQ(fault(person({{kMissingPoint, 0}, {{1300, 10}, 1}, {{10, 400}, 1}})),
-            "expected a joint inside the image of 1242x375 pixels, got all annotated ones "
-            "outside it, the first at (1300, 10), in person 1 of 1, in label_2/001497.txt");
-}
-
-TEST(MapLabels, OneJointInsideIsEnough) {
-  EXPECT_EQ(fault(person({{{1300, 10}, 1}, {{1241.5, 374.5}, 0}})), "");  // the very corner
-  EXPECT_NE(fault(person({{{1241.6, 10}, 1}})), "");
-}
-
-TEST(MapLabels, APersonWithoutJointsIsFineWhereverItsCentreIs) {
-  EXPECT_EQ(fault(person({})), "");
-  Person only_centre = person({{kMissingPoint, 0}});
-  only_centre.center = {-50, 9000};
-  EXPECT_EQ(fault(only_centre), "");
-}
-
-TEST(MapLabels, NumbersOfAPersonMustBeFinite) {
+TEST(MapLabels, WhatAPersonMustBeIsChecked) {
   const Person good = person({{{10, 10}, 1}});
-  ASSERT_EQ(fault(good), "");
-  Person one = good;
-  one.joints.push_back({{kNan, 3}, 1});
-  EXPECT_THAT(fault(one), HasSubstr("expected joints within 1e6 pixels"));
-  one = good;
-  one.center = {3, kNan};
-  EXPECT_THAT(fault(one), HasSubstr("centre"));
-  one = good;
-  one.scale = kNan;
-  EXPECT_THAT(fault(one), HasSubstr("scale"));
-  one = good;
-  one.head_box = Rectangle{0, 0, kNan, 1};
-  EXPECT_THAT(fault(one), HasSubstr("head box"));
-  one = good;
-  one.joints3d_mm = {std::array{0.0, 0.0, 1.0}, std::array{0.0, kNan, 1.0}};
-  EXPECT_THAT(fault(one), HasSubstr("expected finite joints in 3-D, got (0, nan, 1) mm"));
-  one.joints3d_mm = {std::array{0.0, 0.0, 1.0}, std::nullopt};
-  EXPECT_EQ(fault(one), "") << "unknown";
-  one = good;
-  one.camera = Intrinsics{1, 1, kNan, 1};
-  EXPECT_THAT(fault(one), HasSubstr("camera"));
-  one = good;
-  one.distortion = LensDistortion{.k1 = -0.2, .p2 = kNan};
-  EXPECT_THAT(fault(one), HasSubstr("expected a finite lens distortion, got k1 -0.2"));
-}
-
-TEST(MapLabels, PlacesLieWithinAMillionPixels) {
-  const auto reason = [&](const Annotation& annotation) -> std::string {
-    const auto labels = map_labels(annotation, {{100, 100}, {400, 400}, {400, 400}, 0, 0}, "a.txt");
-    return is_fault(labels) ? labels.fault().reason : "";
-  };
-  EXPECT_EQ(reason({"", {box(1, 2, 3, 4), box(10, 10, 1e300, 20)}, {}}),
-            "expected edges within 1e6 pixels, got left 10, top 10, right 1e+300, bottom 20, in "
-            "box 2 of 2, in a.txt");
-  EXPECT_NE(reason({"", {box(-1000001, 10, 20, 20)}, {}}), "");
-  EXPECT_EQ(reason({"", {box(-1e6, -1e6, 1e6, 1e6)}, {}}), "");
-  Box dont_care = box(0, 0, 1e7, 20);
-  dont_care.ignore = true;
-  EXPECT_NE(reason({"", {dont_care}, {}}), "");
-
-  const Person good = person({{{10, 10}, 1}});
-  Person one = good;
-  one.joints.push_back({{3, -1e7}, 1});
-  EXPECT_EQ(reason({"", {}, {one}}),
-            "expected joints within 1e6 pixels, got (3, -1e+07), in person 1 of 1, in a.txt");
-  one = good;
-  one.center = {1e308, 5};
-  EXPECT_THAT(reason({"", {}, {one}}), HasSubstr("a centre within 1e6 pixels, got (1e+308, 5)"));
-  one = good;
-  one.scale = 1e7;
-  EXPECT_THAT(reason({"", {}, {one}}), HasSubstr("a scale of at most 1e6, got 1e+07"));
-  one = good;
-  one.head_box = Rectangle{-1e308, 0, 5, 5};
-  EXPECT_THAT(reason({"", {}, {one}}), HasSubstr("a head box within 1e6 pixels, got left -1e+308"));
-  one = good;
-  one.camera = Intrinsics{1000, 1e308, 50, 50};
-  EXPECT_THAT(reason({"", {}, {one}}), HasSubstr("a camera within 1e6 pixels, got f_x 1000"));
+  expect_faults<Person>({
+      {good, ""},
+      {person({}), ""},
+      {with<Person>(person({{kMissingPoint, 0}}),
+                    [](Person& one) {
+                      one.center = {-50, 9000};
+                    }),
+       ""},
+      {person({{{1300, 10}, 1}, {{1241.5, 374.5}, 0}}), ""},  // the very corner
+      {person({{{1241.6, 10}, 1}}), "expected a joint inside the image"},
+      {person({{kMissingPoint, 0}, {{1300, 10}, 1}, {{10, 400}, 1}}),
+       "expected a joint inside the image of 1242x375 pixels, got all annotated ones outside it, "
+       "the first at (1300, 10), in person 1 of 1, in label_2/001497.txt"},
+      {person({{{10, 10}, 1}, {{kNan, 3}, 1}}), "expected joints within 1e6 pixels"},
+      {person({{{10, 10}, 1}, {{3, -1e7}, 1}}),
+       "expected joints within 1e6 pixels, got (3, -1e+07), in person 1 of 1, in label_2"},
+      {with<Person>(good,
+                    [](Person& one) {
+                      one.center = {3, kNan};
+                    }),
+       "centre"},
+      {with<Person>(good,
+                    [](Person& one) {
+                      one.center = {1e308, 5};
+                    }),
+       "a centre within 1e6 pixels, got (1e+308, 5)"},
+      {with<Person>(good, [](Person& one) { one.scale = kNan; }), "scale"},
+      {with<Person>(good, [](Person& one) { one.scale = 1e7; }),
+       "a scale of at most 1e6, got 1e+07"},
+      {with<Person>(good,
+                    [](Person& one) {
+                      one.head_box = Rectangle{0, 0, kNan, 1};
+                    }),
+       "head box"},
+      {with<Person>(good,
+                    [](Person& one) {
+                      one.head_box = Rectangle{-1e308, 0, 5, 5};
+                    }),
+       "a head box within 1e6 pixels, got left -1e+308"},
+      {with<Person>(good,
+                    [](Person& one) {
+                      one.joints3d_mm = {{{0, 0, 1}}, {{0, kNan, 1}}};
+                    }),
+       "expected finite joints in 3-D, got (0, nan, 1) mm"},
+      {with<Person>(good,
+                    [](Person& one) {
+                      one.joints3d_mm = {{{0, 0, 1}}, std::nullopt};
+                    }),
+       ""},
+      {with<Person>(good,
+                    [](Person& one) {
+                      one.camera = Intrinsics{1, 1, kNan, 1};
+                    }),
+       "camera"},
+      {with<Person>(good,
+                    [](Person& one) {
+                      one.camera = Intrinsics{1000, 1e308, 50, 50};
+                    }),
+       "a camera within 1e6 pixels, got f_x 1000"},
+      {with<Person>(good, [](Person& one) { one.distortion = {.k1 = -0.2, .p2 = kNan}; }),
+       "expected a finite lens distortion, got k1 -0.2"},
+  });
 }
 
 /// How often an outline winds around a point: the sum of the angles under which it sees the edges.
@@ -356,10 +348,7 @@ TEST(MapLabels, AnOutlineThatACropLeavesNothingOfIsIgnoredWithItsBox) {
   EXPECT_EQ(got.outline, (Outline{{{{-21, 50}, {-1, 50}, {-1, 100}}}})) << "it is kept, uncut";
   one.outline.rings[0][1].x = 422;
   EXPECT_FALSE(mapped({"", {one}, {}}, kMiddle).boxes[0].ignore);
-}
-
-TEST(MapLabels, AnOutlineThatPassesACropsCornerIsIgnoredWithItsBox) {
-  Box one = box(400, 60, 460, 120);  // kMiddle shows it from (421, 100) on
+  one = box(400, 60, 460, 120);  // from (421, 100) on, whose corner the outline passes
   one.outline = {{{{400, 60}, {460, 60}, {400, 120}}}};
   EXPECT_TRUE(mapped({"", {one}, {}}, kMiddle).boxes[0].ignore);
   one.outline.rings[0][1].x = 490;
@@ -375,15 +364,12 @@ TEST(MapLabels, OutlinesOfTooManyCornersAreAFault) {
             "expected at most 1000000 corners of outlines, got 1000001, in label_2/001497.txt");
 }
 
-TEST(MapLabels, AnOutlineOfACornerThatIsNoPlaceIsAFault) {
+TEST(MapLabels, WhatAnOutlineMustBeIsChecked) {
   for (const double wrong : {kNan, HUGE_VAL, -1.1e6}) {
     EXPECT_THAT(fault(outlined({{{{0, 0}, {9, 0}, {9, wrong}}}})),
                 HasSubstr("expected an outline within 1e6 pixels, got (9, "));
   }
   EXPECT_EQ(fault(outlined({{{{0, 0}, {9, 0}, {9, -1e6}}}})), "");
-}
-
-TEST(MapLabels, AnOutlineApartFromItsBoxIsAFault) {
   EXPECT_EQ(fault(outlined({{{{31, 5}, {40, 5}, {40, 9}}}})),
             "expected an outline over its box, left 0, top 0, right 30, bottom 30, got one around "
             "left 31, top 5, right 40, bottom 9, in box 1 of 1, in label_2/001497.txt");
@@ -443,21 +429,6 @@ TEST(MapLabels, ScalesOfAThousandthAndAThousandAreExact) {
   const VolumeLabels large = mapped({"", {box(1, 0.5, 3, 1.5)}, {person({{{1, 2}, 1}})}}, larger);
   EXPECT_EQ(large.boxes[0].clipped, (Rectangle{1000, 500, 3000, 1500}));
   EXPECT_EQ(large.persons[0].joints[0], (Point{1499.5, 2499.5}));  // (x + 1/2) 1000 - 1/2
-}
-
-TEST(MapLabels, ABoxWithoutAreaIsKeptAndIgnored) {
-  const VolumeLabels labels = mapped({"", {box(10, 20, 10, 40), box(10, 20, 30, 20)}, {}}, kHalf);
-  for (const VolumeBox& one : labels.boxes) EXPECT_TRUE(one.ignore);
-  EXPECT_DOUBLE_EQ(labels.boxes[0].unclipped.left, labels.boxes[0].unclipped.right);
-}
-
-TEST(MapLabels, ABoxFarBeyondTheImageIsCutAndKeptUncut) {
-  // kHalf: x / 2.
-  const VolumeBox wide = mapped({"", {box(-1e6, 0, 1e6, 375)}, {}}, kHalf).boxes[0];
-  EXPECT_EQ(wide.clipped, (Rectangle{0, 0, 621, 188}));
-  EXPECT_EQ(wide.unclipped, (Rectangle{-5e5, 0, 5e5, 188}));
-  EXPECT_FALSE(wide.ignore);
-  EXPECT_THAT(fault(box(1e5, 0, 2e5, 375)), HasSubstr("expected an overlap with the image"));
 }
 
 }  // namespace

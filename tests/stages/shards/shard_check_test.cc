@@ -16,6 +16,7 @@
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -27,6 +28,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
+using testing::texts_with;
 
 const ShardContents kShard{
     {2, 0, 1}, {0, 0, 1}, {{"Car", 2}, {"Van", 1}}, {{1, 2}, {3, 1}}, {"/labels/poses/camera"}};
@@ -108,16 +110,13 @@ TEST_F(ShardCheck, SoundShardsHaveNoFaults) {
   EXPECT_THAT(faults(), IsEmpty());
 }
 
-TEST_F(ShardCheck, VolumesThatDoNotFitFloat16AreSoundIfMarked) {
+TEST_F(ShardCheck, VolumesThatDoNotFitFloat16OrVanishInItAreSoundIfMarked) {
   testing::ExampleShard example = testing::example_shard(StoredType::kFloat16);
   example.volumes[0][2] = 1e6f;  // in the place of another that was not zero
   example.samples[0].statistics.max = 1e6f;
   write(example);
   EXPECT_THAT(faults(), IsEmpty());
-}
-
-TEST_F(ShardCheck, AVolumeThatVanishedInFloat16IsSoundIfMarked) {
-  testing::ExampleShard example = testing::example_shard(StoredType::kFloat16);
+  example = testing::example_shard(StoredType::kFloat16);
   VolumeStatistics& statistics = example.samples[0].statistics;
   example.volumes[0].assign(example.volumes[0].size(), 1e-9f);
   const double half = static_cast<double>(example.volumes[0].size()) / 2;
@@ -134,8 +133,7 @@ TEST_F(ShardCheck, AValueOutsideTheGeneratedTilesIsAFault) {
   tiles[1] = 0;  // of sample 0: rows 0-3, columns 4-7
   overwrite("/events/tiles", H5T_NATIVE_UINT8, tiles);
   overwrite<float>("/events/statistics/generated_fraction", H5T_NATIVE_FLOAT, {0.75f, 1, 0, 1, 1});
-  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr("zeros outside the tiles"),
-                                          HasSubstr("(sample 0, 000000)"))));
+  EXPECT_THAT(faults(), texts_with({{"zeros outside the tiles", "(sample 0, 000000)"}}));
   overwrite<std::uint32_t>("/events/statistics/flags", H5T_NATIVE_UINT32, {kFlagNoise, 1, 0, 0, 0});
   EXPECT_THAT(faults(), IsEmpty()) << "noise is everywhere";
 }
@@ -144,7 +142,7 @@ TEST_F(ShardCheck, AThresholdIsANumberAboveZero) {
   write(testing::example_shard());
   for (const double wrong : {0.0, -0.2, HUGE_VAL}) {
     overwrite<double>("/pairs/threshold", H5T_NATIVE_DOUBLE, {NAN, NAN, NAN, NAN, wrong});
-    EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected a finite threshold > 0")));
+    EXPECT_THAT(faults(), texts_with({"expected a finite threshold > 0"}));
   }
 }
 
@@ -168,7 +166,7 @@ TEST_F(ShardCheck, AFlippedBitAnywhereIsFound) {
     std::string flipped = bytes;
     flipped[i] = static_cast<char>(flipped[i] ^ 4);
     testing::write_file(shard_, flipped);
-    ASSERT_THAT(faults(), ElementsAre(HasSubstr("expected SHA-256 " + record_.sha256))) << i;
+    ASSERT_THAT(faults(), texts_with({"expected SHA-256 " + record_.sha256})) << i;
   }
 }
 
@@ -218,24 +216,21 @@ TEST_F(ShardCheck, SeveralAtATimeFindTheSame) {
   EXPECT_THAT(found, Each(alone));
 }
 
-TEST_F(ShardCheck, ATruncatedOrMissingFileIsFound) {
+TEST_F(ShardCheck, ATruncatedMissingOrOtherFileIsFound) {
   write(testing::example_shard());
   std::filesystem::resize_file(shard_, 1000);
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected size in bytes " +
-                                              std::to_string(record_.size_bytes) + ", got 1000")));
+  EXPECT_THAT(faults(), texts_with({"expected size in bytes " + std::to_string(record_.size_bytes) +
+                                    ", got 1000"}));
   std::filesystem::remove(shard_);
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("No such file")));
-}
-
-TEST_F(ShardCheck, AFileThatIsNoShardIsFound) {
+  EXPECT_THAT(faults(), texts_with({"No such file"}));
   write(testing::example_shard());
   testing::write_file(shard_, "not HDF5");
   record_.size_bytes = 8;
   record_.sha256 = sha256_hex("not HDF5");
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("cannot open")));
+  EXPECT_THAT(faults(), texts_with({"cannot open"}));
 }
 
-TEST_F(ShardCheck, ACommitRecordOfAnotherShardIsFound) {
+TEST_F(ShardCheck, ACommitRecordOfOtherCountsOrRowsIsFound) {
   write(testing::example_shard());
   record_.plan_hash = std::string(64, 'c');
   record_.samples = 6;
@@ -243,27 +238,20 @@ TEST_F(ShardCheck, ACommitRecordOfAnotherShardIsFound) {
                               Contains(HasSubstr("expected number of samples 6, got 5"))));
   record_.shard = "demo-train-00001-of-00002.h5";
   EXPECT_THAT(faults(), Contains(HasSubstr("expected file name demo-train-00001-of-00002.h5")));
-}
-
-TEST_F(ShardCheck, CountsThatDifferAreFound) {
   write(testing::example_shard());
   record_.valid = 5;
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected number of valid samples 5, got 4")));
+  EXPECT_THAT(faults(), texts_with({"expected number of valid samples 5, got 4"}));
   record_.valid = 4;
   record_.quarantined[0].slot = 1;
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("those that the commit record lists")));
-}
-
-TEST_F(ShardCheck, RowsOtherThanTheCommitRecordSaysAreFound) {
+  EXPECT_THAT(faults(), texts_with({"those that the commit record lists"}));
   write(testing::example_shard());
   record_.contents.boxes[0] = 1;
   record_.contents.persons[4] = 2;
   record_.contents.classes["Car"] = 1;
   record_.contents.gaps = {{1, 5}};
   record_.contents.optional_columns.clear();
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("boxes in slot 0"), HasSubstr("persons in slot 4"),
-                                    HasSubstr("boxes by class"), HasSubstr("samples by gap 1: 5"),
-                                    HasSubstr("optional columns none")));
+  EXPECT_THAT(faults(), texts_with({"boxes in slot 0", "persons in slot 4", "boxes by class",
+                                    "samples by gap 1: 5", "optional columns none"}));
 }
 
 /// Puts another attribute of the same name in the place of a root's.
@@ -287,8 +275,7 @@ TEST_F(ShardCheck, FeaturesAreThoseOfTheColumns) {
   Names less = kFeatures;
   less.erase(less.begin());
   change([&](hid_t file) { replace(file, "features", less); });
-  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr("expected features tiles, times"),
-                                          HasSubstr("got times, origin"))));
+  EXPECT_THAT(faults(), texts_with({{"expected features tiles, times", "got times, origin"}}));
   write(testing::unlabelled_shard());
   EXPECT_THAT(ShardReader(shard_).header().features, ElementsAre("times", "origin"));
 }
@@ -310,22 +297,19 @@ TEST_F(ShardCheck, AnotherMinorVersionIsSoundAndItsUnknownFeaturesAreNamedOnce) 
       "and leaves out\n");
 }
 
-TEST_F(ShardCheck, AnotherMajorVersionIsRefused) {
+TEST_F(ShardCheck, AnotherMajorVersionAndMissingDatasetsAreFound) {
   write(testing::example_shard());
   change([&](hid_t file) { replace(file, "format_version", std::string("2.0")); });
   EXPECT_THAT(
       faults(),
-      ElementsAre(HasSubstr(
-          R"(expected format_version "1.0" (this program reads versions 1.x), got "2.0")")));
-}
-
-TEST_F(ShardCheck, MissingDatasetsAreFoundAllAtOnce) {
+      texts_with(
+          {R"(expected format_version "1.0" (this program reads versions 1.x), got "2.0")"}));
   write(testing::example_shard());
   change([](hid_t file) {
     H5Ldelete(file, "/pairs/gap_s", H5P_DEFAULT);
     H5Ldelete(file, "/labels/poses/visible", H5P_DEFAULT);
   });
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("/pairs/gap_s"), HasSubstr("/labels/poses/visible")));
+  EXPECT_THAT(faults(), texts_with({"/pairs/gap_s", "/labels/poses/visible"}));
 }
 
 /// Puts an empty dataset in the place of another.
@@ -345,19 +329,18 @@ TEST_F(ShardCheck, WrongShapesAndTypesAreFound) {
     replace(file, "/labels/poses/scale", H5T_IEEE_F32LE, {3});
   });
   EXPECT_THAT(faults(),
-              ElementsAre(HasSubstr("expected shape [3, 4] of /labels/boxes/xyxy, got [3, 5]"),
-                          HasSubstr("/labels/boxes/outline"),
-                          HasSubstr("expected type float64 of /labels/poses/scale"),
-                          HasSubstr("expected shape [5] of /valid, got [6]")));
+              texts_with({"expected shape [3, 4] of /labels/boxes/xyxy, got [3, 5]",
+                          "/labels/boxes/outline", "expected type float64 of /labels/poses/scale",
+                          "expected shape [5] of /valid, got [6]"}));
 }
 
 TEST_F(ShardCheck, OffsetsThatDoNotAscendToTheRowsAreFound) {
   // Right: 0 2 2 2 3 3.
   write(testing::example_shard());
   overwrite<std::int64_t>("/labels/boxes/offsets", H5T_NATIVE_INT64, {0, 2, 1, 2, 3, 3});
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected /labels/boxes/offsets to ascend from 0")));
+  EXPECT_THAT(faults(), texts_with({"expected /labels/boxes/offsets to ascend from 0"}));
   overwrite<std::int64_t>("/labels/boxes/offsets", H5T_NATIVE_INT64, {1, 2, 2, 2, 3, 3});
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected /labels/boxes/offsets to ascend from 0")));
+  EXPECT_THAT(faults(), texts_with({"expected /labels/boxes/offsets to ascend from 0"}));
   overwrite<std::int64_t>("/labels/boxes/offsets", H5T_NATIVE_INT64, {0, 2, 2, 2, 3, 4});
   EXPECT_THAT(faults(),
               Contains(HasSubstr("expected shape [4, 4] of /labels/boxes/xyxy, got [3, 4]")));
@@ -369,13 +352,11 @@ TEST_F(ShardCheck, MotionsOfNoStillAreFound) {
   std::vector<double> motions(20, none);
   motions[16] = 1;  // slot 4, the still: one number alone
   overwrite("/pairs/motion", H5T_NATIVE_DOUBLE, motions);
-  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr("expected finite numbers in motion"),
-                                          HasSubstr("(sample 4, 000004)"))));
+  EXPECT_THAT(faults(), texts_with({{"expected finite numbers in motion", "(sample 4, 000004)"}}));
   motions = std::vector<double>(20, none);
   for (const int slot : {0, 4}) std::fill_n(&motions[4 * slot], 4, slot / 4.0);  // scales 0 and 1
   overwrite("/pairs/motion", H5T_NATIVE_DOUBLE, motions);
-  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr("expected a motion of scale > 0"),
-                                          HasSubstr("(sample 0, 000000)"))));
+  EXPECT_THAT(faults(), texts_with({{"expected a motion of scale > 0", "(sample 0, 000000)"}}));
 }
 
 TEST_F(ShardCheck, AStillsBoxIsCutToWhatIsSeenOfTheImage) {
@@ -396,7 +377,7 @@ TEST_F(ShardCheck, AStillsBoxIsCutToWhatIsSeenOfTheImage) {
   EXPECT_THAT(faults(), IsEmpty());
   sample.labels.boxes[0].clipped.top = 0.5;
   write(example);
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("xyxy of box 0 to be xyxy_unclipped cut")));
+  EXPECT_THAT(faults(), texts_with({"xyxy of box 0 to be xyxy_unclipped cut"}));
 }
 
 TEST_F(ShardCheck, VolumesWithNanOrOtherValuesAreFound) {
@@ -414,35 +395,28 @@ TEST_F(ShardCheck, VolumesWithNanOrOtherValuesAreFound) {
   bad[2 * size + 5] = 1;                                    // slot 2, quarantined
   bad[3 * size] += 0.5f;                                    // slot 3
   overwrite("/events/volume", H5T_NATIVE_FLOAT, bad);
-  EXPECT_THAT(faults(),
-              ElementsAre(AllOf(HasSubstr("finite"), HasSubstr("(sample 0, 000000)")),
-                          AllOf(HasSubstr("finite"), HasSubstr("(sample 1, 000001)")),
-                          AllOf(HasSubstr("expected zeros"), HasSubstr("(sample 2, 000002)")),
-                          AllOf(HasSubstr("sum of positive"), HasSubstr("(sample 3, 000003)"))));
+  EXPECT_THAT(faults(), texts_with({{"finite", "(sample 0, 000000)"},
+                                    {"finite", "(sample 1, 000001)"},
+                                    {"expected zeros", "(sample 2, 000002)"},
+                                    {"sum of positive", "(sample 3, 000003)"}}));
   overwrite("/events/volume", H5T_NATIVE_FLOAT, all);
   EXPECT_THAT(faults(), IsEmpty());
 }
 
-TEST_F(ShardCheck, ALostChunkIsFound) {
+TEST_F(ShardCheck, ALostChunkAndLabelsInTheWrongPlaceAreFound) {
   testing::ExampleShard example = testing::example_shard();
   example.volumes[4].assign(example.volumes[4].size(), 0);  // statistics stay those of the full one
   write(example);
-  EXPECT_THAT(faults(),
-              ElementsAre(AllOf(HasSubstr("largest value"), HasSubstr("(sample 4, 000004)"))));
-}
-
-TEST_F(ShardCheck, LabelsInTheWrongPlaceAreFound) {
-  testing::ExampleShard example = testing::example_shard();
+  EXPECT_THAT(faults(), texts_with({{"largest value", "(sample 4, 000004)"}}));
+  example = testing::example_shard();
   example.samples[0].labels.boxes[0].unclipped.left += 0.5;
   example.samples[0].labels.persons[1].joints[2].y += 0.25;
   example.samples[3].labels.boxes[0].clipped = example.samples[3].labels.boxes[0].unclipped;
   example.samples[4].labels.persons[0].center = {3, 3};
   write(example);
-  EXPECT_THAT(
-      faults(),
-      ElementsAre(HasSubstr("xyxy of box 0 to be"), HasSubstr("xyxy_unclipped of box 0 where"),
-                  HasSubstr("joints[2] of person 1 where"), HasSubstr("xyxy of box 0 to be"),
-                  HasSubstr("center of person 0 where")));
+  EXPECT_THAT(faults(), texts_with({"xyxy of box 0 to be", "xyxy_unclipped of box 0 where",
+                                    "joints[2] of person 1 where", "xyxy of box 0 to be",
+                                    "center of person 0 where"}));
 }
 
 TEST_F(ShardCheck, WhatElseSourceToVolumeMapsIsFound) {
@@ -455,21 +429,24 @@ TEST_F(ShardCheck, WhatElseSourceToVolumeMapsIsFound) {
   person.box->right += 0.25;
   person.camera->focal_x *= 2;
   write(example);
-  EXPECT_THAT(
-      faults(),
-      ElementsAre(HasSubstr("projection where"), HasSubstr("scale_volume of person 1 where"),
-                  HasSubstr("head_box of person 1 if there is head_box_source"),
-                  HasSubstr("box of person 1 where source_to_volume puts box_source"),
-                  HasSubstr("camera of person 1 where")));
+  EXPECT_THAT(faults(), texts_with({"projection where", "scale_volume of person 1 where",
+                                    "head_box of person 1 if there is head_box_source",
+                                    "box of person 1 where source_to_volume puts box_source",
+                                    "camera of person 1 where"}));
 }
 
-TEST_F(ShardCheck, AGeneratedFractionThatIsNotTheTilesIsFound) {
+TEST_F(ShardCheck, AGeneratedFractionOrAClassThatIsNoneIsFound) {
   write(testing::example_shard());
   // Three of four tiles, nothing of the quarantined sample.
   overwrite<float>("/events/statistics/generated_fraction", H5T_NATIVE_FLOAT,
                    {0.75f, 0.5f, 0, 0.75f, 0.75f});
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected generated_fraction (sample 1, 000001) "
-                                              "0.750000, got 0.500000")));
+  EXPECT_THAT(faults(), texts_with({"expected generated_fraction (sample 1, 000001) "
+                                    "0.750000, got 0.500000"}));
+  write(testing::example_shard());
+  overwrite<std::int32_t>("/labels/boxes/class_id", H5T_NATIVE_INT32, {0, 2, -1});
+  EXPECT_THAT(faults(), texts_with({"class_id of box 1 to have a name, got 2",
+                                    "class_id of box 0 to have a name, got -1",
+                                    "expected boxes by class Car: 2, DontCare: 1, got Car: 1"}));
 }
 
 TEST_F(ShardCheck, OfAQuarantinedSampleTheSourcesProjectionMayStandAlone) {
@@ -479,20 +456,11 @@ TEST_F(ShardCheck, OfAQuarantinedSampleTheSourcesProjectionMayStandAlone) {
   EXPECT_THAT(faults(), IsEmpty());
 }
 
-TEST_F(ShardCheck, AClassWithoutANameIsFound) {
-  write(testing::example_shard());
-  overwrite<std::int32_t>("/labels/boxes/class_id", H5T_NATIVE_INT32, {0, 2, -1});
-  EXPECT_THAT(faults(),
-              ElementsAre(HasSubstr("class_id of box 1 to have a name, got 2"),
-                          HasSubstr("class_id of box 0 to have a name, got -1"),
-                          HasSubstr("expected boxes by class Car: 2, DontCare: 1, got Car: 1")));
-}
-
 TEST_F(ShardCheck, NanInALabelIsFound) {
   testing::ExampleShard example = testing::example_shard();
   example.samples[0].labels.boxes[1].clipped.top = std::numeric_limits<double>::quiet_NaN();
   write(example);
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("xyxy of box 1")));
+  EXPECT_THAT(faults(), texts_with({"xyxy of box 1"}));
 }
 
 TEST_F(ShardCheck, AnOutlineApartFromItsBoxIsFound) {
@@ -503,9 +471,9 @@ TEST_F(ShardCheck, AnOutlineApartFromItsBoxIsFound) {
   EXPECT_THAT(faults(), IsEmpty()) << "it touches it";
   outline = {{{{4.5, 0}, {6, 0}, {6, 1}}}};
   write(example);
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr(
-                            "expected outline of box 0 to lie over xyxy_unclipped, got another "
-                            "place (sample 0, 000000)")));
+  EXPECT_THAT(faults(),
+              texts_with({"expected outline of box 0 to lie over xyxy_unclipped, got another "
+                          "place (sample 0, 000000)"}));
 }
 
 TEST_F(ShardCheck, TextsThatAreNoOutlinesAreFound) {
@@ -520,9 +488,9 @@ TEST_F(ShardCheck, TextsThatAreNoOutlinesAreFound) {
       H5Tclose(type);
       H5Dclose(dataset);
     });
-    EXPECT_THAT(faults(), ElementsAre(HasSubstr(
-                              "expected outline of box 0 to be rings of corners as JSON, got "
-                              "another text (sample 0, 000000)")))
+    EXPECT_THAT(faults(),
+                texts_with({"expected outline of box 0 to be rings of corners as JSON, got "
+                            "another text (sample 0, 000000)"}))
         << text;
     EXPECT_TRUE(ShardReader(shard_).sample(0).labels.boxes[0].outline.empty());
   }
@@ -568,8 +536,7 @@ TEST_F(ShardCheck, InfinityInAnyLabelIsFound) {
     testing::ExampleShard example = testing::example_shard();
     change(example.samples[0].annotation, example.samples[0].labels);
     write(example);
-    EXPECT_THAT(faults(),
-                ElementsAre(HasSubstr("expected finite numbers in " + column + ", got ")));
+    EXPECT_THAT(faults(), texts_with({"expected finite numbers in " + column + ", got "}));
   }
 }
 

@@ -11,6 +11,7 @@
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 // A shard is read back as it was written: ShardWriter with ShardReader.
 
@@ -221,17 +222,11 @@ void expect_same_copy(const ExampleShard& example) {
   EXPECT_EQ(testing::read_file(copies / record.shard), testing::read_file(folder / record.shard));
 }
 
-TEST(ShardCopy, HasTheSameBytes) {
+TEST(ShardCopy, HasTheSameBytesWithoutLabelsToo) {
   for (const StoredType type : {StoredType::kFloat32, StoredType::kFloat16, StoredType::kUint8}) {
     for (const int level : {0, 1, 9}) expect_same_copy(testing::example_shard(type, level));
   }
-}
-
-TEST(ShardCopy, OfASourceWithoutLabelsHasTheSameBytes) {
   expect_same_copy(testing::unlabelled_shard());
-}
-
-TEST(ShardCopy, OfNothingButQuarantinedSamplesHasTheSameBytes) {
   ExampleShard example = testing::example_shard();
   example.samples = {example.samples[2], example.samples[2]};
   example.volumes = {{}, {}};
@@ -250,8 +245,8 @@ TEST(StoredChunk, IsWhatWasWritten) {
               codec.encode(example.volumes[static_cast<std::size_t>(slot)]).chunk);
   }
   EXPECT_TRUE(reader.stored_chunk(2).empty()) << "quarantined: nothing was written";
-  EXPECT_THROW(reader.stored_chunk(5), std::out_of_range);
-  EXPECT_THROW(reader.stored_chunk(-1), std::out_of_range);
+  EXPECT_THROWS(reader.stored_chunk(5), std::out_of_range, "expected a sample 0..4, got 5");
+  EXPECT_THROWS(reader.stored_chunk(-1), std::out_of_range, "expected a sample 0..4, got -1");
 }
 
 TEST(StoredChunk, OfDamagedBytesIsNotHandedOn) {
@@ -267,9 +262,7 @@ TEST(StoredChunk, OfDamagedBytesIsNotHandedOn) {
   testing::write_file(file, bytes);
   const ShardReader reader(file);
   EXPECT_FALSE(reader.stored_chunk(0).empty());
-  EXPECT_THAT([&] { reader.stored_chunk(1); },
-              ::testing::ThrowsMessage<std::runtime_error>(::testing::AllOf(
-                  ::testing::HasSubstr(file.string()), ::testing::HasSubstr("/events/volume[1]"))));
+  EXPECT_THROWS(reader.stored_chunk(1), std::runtime_error, file.string(), "/events/volume[1]");
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "stages/shards/shard_tables.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -80,7 +81,7 @@ TEST(ShardOverview, HasItsColumnsAndNoOthers) {
   EXPECT_TRUE(tables.poses.joints.empty());
 }
 
-TEST(ShardContents, OfAShardWithoutLabelsAreZeros) {
+TEST(ShardContents, OfAShardWithoutLabelsAreZerosAndOfNoRowsEmpty) {
   const testing::TemporaryFolder folder;
   const CommitRecord record = write_shard(folder.path(), testing::unlabelled_shard());
   EXPECT_EQ(record.contents.boxes, std::vector<std::int32_t>{0});
@@ -90,9 +91,6 @@ TEST(ShardContents, OfAShardWithoutLabelsAreZeros) {
   EXPECT_THAT(record.contents.optional_columns,
               ElementsAre("/pairs/prev_time_s", "/pairs/next_time_s", "/pairs/subject",
                           "/pairs/camera", "/pairs/drive"));
-}
-
-TEST(ShardContents, OfNoRowsAreEmpty) {
   EXPECT_EQ(contents_of(ShardTables{}, ShardHeader{}), ShardContents{});
 }
 
@@ -118,13 +116,10 @@ TEST_F(ShardSummary, Counts) {
   EXPECT_EQ(shard["quarantined"], nlohmann::json::array({"000002"}));
 }
 
-TEST_F(ShardSummary, FlagsHaveNames) {
+TEST_F(ShardSummary, TextSaysWhatIsInTheShardAndFlagsHaveNames) {
   EXPECT_TRUE(flag_names(0).empty());
   EXPECT_THAT(flag_names((1u << 6) - 1), ElementsAre("empty", "extrapolated", "saturated",
                                                      "vanished", "beyond_calibration", "noise"));
-}
-
-TEST_F(ShardSummary, TextSaysWhatIsInTheShard) {
   const std::string text = describe_shard(reader_);
   EXPECT_THAT(text, HasSubstr("demo-train-00000-of-00001.h5\n"));
   EXPECT_THAT(text, HasSubstr("5, valid 4"));
@@ -147,8 +142,8 @@ TEST_F(ShardSummary, TextSaysWhatIsInASample) {
               HasSubstr("motion         -1.5 0.25 0.75 1.0078125 px, px, degrees, factor\n"));
   EXPECT_THAT(describe_sample(reader_, 1), Not(HasSubstr("nan")));
   EXPECT_THAT(describe_sample(reader_, 2), HasSubstr("no: quarantined"));
-  EXPECT_THROW(describe_sample(reader_, 5), std::out_of_range);
-  EXPECT_THROW(describe_sample(reader_, -1), std::out_of_range);
+  EXPECT_THROWS(describe_sample(reader_, 5), std::out_of_range, "expected a sample 0..4, got 5");
+  EXPECT_THROWS(describe_sample(reader_, -1), std::out_of_range, "expected a sample 0..4, got -1");
 }
 
 TEST(ShardText, HasNoControlCharactersOfTheShard) {

@@ -15,6 +15,7 @@
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -103,8 +104,7 @@ TEST(ShardWriter, AFileThatSomeoneDeletedUnderWayIsNamed) {
   ShardWriter writer(folder.path(), example.header);
   writer.append(example.samples[0], chunk_of(example, 0));
   std::filesystem::remove(folder / names_in(folder.path()).at(0));
-  EXPECT_THAT([&] { writer.commit(); }, ::testing::ThrowsMessage<UnfinishedShardLost>(
-                                            HasSubstr((folder / example.header.name).string())));
+  EXPECT_THROWS(writer.commit(), UnfinishedShardLost, (folder / example.header.name).string());
   EXPECT_THAT(names_in(folder.path()), IsEmpty());
 }
 
@@ -170,30 +170,46 @@ TEST(ShardWriter, WrongUseIsALogicError) {
   const std::vector<std::byte> chunk = chunk_of(example, 0);
   ShardSample sample = example.samples[0];
   ShardWriter writer(folder.path(), example.header);
-  EXPECT_THROW(writer.commit(), std::logic_error) << "a slot is missing";
-  EXPECT_THROW(writer.append(sample, {}), std::logic_error) << "valid without a volume";
+  EXPECT_THROWS(writer.commit(), std::logic_error,
+                "expected 1 samples, got 0, in demo-train-00000-of-00001.h5")
+      << "a slot is missing";
+  EXPECT_THROWS(writer.append(sample, {}), std::logic_error,
+                "expected a volume for a valid sample and none for another")
+      << "valid without a volume";
 
   ShardSample invalid = sample;
   invalid.valid = false;
-  EXPECT_THROW(writer.append(invalid, chunk), std::logic_error) << "a volume, but not valid";
+  EXPECT_THROWS(writer.append(invalid, chunk), std::logic_error,
+                "expected a volume for a valid sample and none for another")
+      << "a volume, but not valid";
 
   ShardSample unmapped = sample;
   unmapped.annotation.boxes.resize(1);
-  EXPECT_THROW(writer.append(unmapped, chunk), std::logic_error) << "boxes without volume boxes";
+  EXPECT_THROWS(writer.append(unmapped, chunk), std::logic_error,
+                "expected a volume box for each annotated box (000000)")
+      << "boxes without volume boxes";
   unmapped.labels.boxes.resize(1);
-  EXPECT_THROW(writer.append(unmapped, chunk), std::logic_error) << "a class without a name";
+  EXPECT_THROWS(writer.append(unmapped, chunk), std::logic_error,
+                "expected class ids that the schema names (000000)")
+      << "a class without a name";
 
   ShardSample jointed = sample;
   jointed.annotation.persons.resize(1);
   jointed.labels.persons.resize(1);
   jointed.annotation.persons[0].joints.resize(2);
   jointed.labels.persons[0].joints.resize(2);
-  EXPECT_THROW(writer.append(jointed, chunk), std::logic_error) << "joints without names";
+  EXPECT_THROWS(writer.append(jointed, chunk), std::logic_error,
+                "expected a joint for each name in the schema (000000)")
+      << "joints without names";
 
   writer.append(sample, chunk);
-  EXPECT_THROW(writer.append(sample, chunk), std::logic_error) << "one too many";
+  EXPECT_THROWS(writer.append(sample, chunk), std::logic_error,
+                "expected no sample after the last slot, got one (000000")
+      << "one too many";
   writer.commit();
-  EXPECT_THROW(writer.commit(), std::logic_error) << "twice";
+  EXPECT_THROWS(writer.commit(), std::logic_error,
+                "a shard is committed once: demo-train-00000-of-00001.h5")
+      << "twice";
   EXPECT_EQ(ShardReader(folder / example.header.name).header().sample_count, 1);
 }
 
@@ -201,9 +217,11 @@ TEST(ShardWriter, RefusesVolumesThatHdf5CannotChunk) {
   const TemporaryFolder folder;
   ShardHeader header = unlabelled_shard().header;
   header.volume = {9, {8000, 8000}};  // 18 x 64e6 x 4 bytes = 4.6e9 > 2^32
-  EXPECT_THROW(ShardWriter(folder.path(), header), std::invalid_argument);
+  EXPECT_THROWS(ShardWriter(folder.path(), header), std::invalid_argument,
+                "expected volumes below 4 GiB, got 4608000000 bytes");
   header.volume = {9, {0, 8}};
-  EXPECT_THROW(ShardWriter(folder.path(), header), std::invalid_argument);
+  EXPECT_THROWS(ShardWriter(folder.path(), header), std::invalid_argument,
+                "expected samples and a volume with values");
   EXPECT_THAT(names_in(folder.path()), IsEmpty());
 }
 

@@ -21,6 +21,7 @@
 #include "stages/shards/codec/chunk_filters.h"
 #include "stages/shards/codec/quantization.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -356,15 +357,12 @@ TEST(VolumeCodec, HigherLevelsAreSmaller) {
   }
 }
 
-TEST(VolumeCodec, SameVolumeSameBytes) {
+TEST(VolumeCodec, SameVolumeSameBytesScaleAndSaturation) {
   const std::vector<float> values = some_volume(30000);
   for (const int level : {1, 4}) {
     const VolumeCodec codec(StoredType::kFloat16, level);
     EXPECT_EQ(codec.encode(values).chunk, codec.encode(values).chunk);
   }
-}
-
-TEST(VolumeCodec, PassesOnScaleAndSaturation) {
   EXPECT_EQ(VolumeCodec(StoredType::kUint8, 1).encode(std::vector<float>{510}).scale, 2);
   EXPECT_TRUE(VolumeCodec(StoredType::kFloat16, 1).encode(std::vector<float>{1e6}).saturated);
 }
@@ -374,8 +372,12 @@ TEST(VolumeCodec, RefusesWhatNoVolumeMayHold) {
                           -std::numeric_limits<float>::infinity()}) {
     for (const auto type : {StoredType::kFloat32, StoredType::kFloat16, StoredType::kUint8}) {
       const VolumeCodec codec(type, 1);
-      EXPECT_THROW(codec.encode(std::vector<float>{0, bad, 1}), std::invalid_argument) << bad;
-      EXPECT_THROW(codec.encode(std::vector<float>{0, 1, bad}), std::invalid_argument) << bad;
+      EXPECT_THROWS(codec.encode(std::vector<float>{0, bad, 1}), std::invalid_argument,
+                    "expected finite values >= 0 in a volume to store, got others")
+          << bad;
+      EXPECT_THROWS(codec.encode(std::vector<float>{0, 1, bad}), std::invalid_argument,
+                    "expected finite values >= 0 in a volume to store, got others")
+          << bad;
     }
   }
 }
@@ -428,10 +430,14 @@ TEST(VolumeCodec, RefusesAWindowThatDoesNotFit) {
   const VolumeCodec codec(StoredType::kUint8, 1);
   const VolumeShape shape{1, {2, 2}};
   const std::vector<float> four(4);
-  EXPECT_THROW(codec.encode(four, {shape, {1, 2}, 1, 0}, 0), std::invalid_argument);
-  EXPECT_THROW(codec.encode(four, {shape, {2, 1}, 0, 1}, 0), std::invalid_argument);
-  EXPECT_THROW(codec.encode(four, {shape, {1, 2}, 0, -1}, 0), std::invalid_argument);
-  EXPECT_THROW(codec.encode(four, {shape, {1, 1}, 0, 0}, 0), std::invalid_argument);
+  EXPECT_THROWS(codec.encode(four, {shape, {1, 2}, 1, 0}, 0), std::invalid_argument,
+                "expected a window inside of the volume, got one across its");
+  EXPECT_THROWS(codec.encode(four, {shape, {2, 1}, 0, 1}, 0), std::invalid_argument,
+                "expected a window inside of the volume, got one across its");
+  EXPECT_THROWS(codec.encode(four, {shape, {1, 2}, 0, -1}, 0), std::invalid_argument,
+                "expected a window inside of the volume, got one across its");
+  EXPECT_THROWS(codec.encode(four, {shape, {1, 1}, 0, 0}, 0), std::invalid_argument,
+                "expected 2 values, got 4");
 }
 
 TEST(VolumeCodec, ManyThreadsGetTheBytesOfOne) {
@@ -453,8 +459,10 @@ TEST(VolumeCodec, ManyThreadsGetTheBytesOfOne) {
 }
 
 TEST(VolumeCodec, RefusesLevelsThatDoNotExist) {
-  EXPECT_THROW(VolumeCodec(StoredType::kUint8, -1), std::invalid_argument);
-  EXPECT_THROW(VolumeCodec(StoredType::kUint8, 10), std::invalid_argument);
+  EXPECT_THROWS(VolumeCodec(StoredType::kUint8, -1), std::invalid_argument,
+                "expected a deflate level 0..9, got -1");
+  EXPECT_THROWS(VolumeCodec(StoredType::kUint8, 10), std::invalid_argument,
+                "expected a deflate level 0..9, got 10");
 }
 
 }  // namespace

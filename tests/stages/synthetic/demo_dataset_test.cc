@@ -15,6 +15,7 @@
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -109,8 +110,10 @@ TEST(DemoDataset, ScenesAreStreetsOfTheirOwn) {
 TEST(DemoDataset, RefusesAFolderWithContentAndAFile) {
   const TemporaryFolder folder;
   write_file(folder / "full/notes.txt", "mine");
-  EXPECT_THROW(write_demo_dataset(folder / "full", 7), UsageError);
-  EXPECT_THROW(write_demo_dataset(folder / "full/notes.txt", 7), UsageError);
+  EXPECT_THROWS(write_demo_dataset(folder / "full", 7), UsageError,
+                "expected a new or empty folder, got one with files in it");
+  EXPECT_THROWS(write_demo_dataset(folder / "full/notes.txt", 7), UsageError,
+                "expected a new or empty folder, got a file, at");
   EXPECT_EQ(content_of(folder.path()).size(), 1u) << "nothing was written";
 }
 

@@ -65,7 +65,7 @@ TEST(Figure, FacingTheCameraItsLeftIsOnTheRightOfTheImage) {
   EXPECT_LT(joints[kLeftToe].z, joints[kLeftAnkle].z);
 }
 
-TEST(Figure, EveryJointLiesInsideALimb) {
+TEST(Figure, EveryJointLiesInsideALimbWithinItsRadius) {
   const Joints3d joints = pose(walker(), 5);
   const auto bars = limbs(joints, {100, 100, 100});
   for (std::size_t joint = 0; joint < kFigureJoints; ++joint) {
@@ -73,9 +73,6 @@ TEST(Figure, EveryJointLiesInsideALimb) {
       return is_inside(limb, joints[joint]);
     })) << joint;
   }
-}
-
-TEST(Figure, InsideALimbIsWithinItsRadiusOfItsLine) {
   const Limb3d limb{{0, 0, 0}, {100, 0, 0}, 10, {}};
   EXPECT_TRUE(is_inside(limb, {50, 6, 8}));
   EXPECT_TRUE(is_inside(limb, {-10, 0, 0}));
@@ -138,17 +135,13 @@ constexpr ImageSize kSize{21, 31};
 /// A bar 10 px long and 2 px in radius at a distance of 1 m: 100 px a metre.
 Limb3d bar() { return {{0, 0, 1000}, {100, 0, 1000}, 20, {100, 100, 100}}; }
 
-TEST(LimbDrawing, ProjectsAndScales) {
+TEST(LimbDrawing, ProjectsScalesAndPlacesBeside) {
   const DrawnLimb drawn = drawn_limb(bar(), kLimbCamera);
   EXPECT_EQ(drawn.from, (Point{10, 10}));
   EXPECT_EQ(drawn.to, (Point{20, 10}));
   EXPECT_DOUBLE_EQ(drawn.radius, 2);
   // Centres from 8 to 22 and 8 to 12, edges half a pixel on.
   EXPECT_EQ(bounds_of(drawn), (Rectangle{8.5, 8.5, 22.5, 12.5}));
-}
-
-TEST(LimbDrawing, PlacesBesideAndBeyondTheEnds) {
-  const DrawnLimb drawn = drawn_limb(bar(), kLimbCamera);
   EXPECT_DOUBLE_EQ(place_on(drawn, {15, 13}).distance, 3);
   EXPECT_DOUBLE_EQ(place_on(drawn, {15, 13}).along, 0.5);
   EXPECT_DOUBLE_EQ(place_on(drawn, {23, 14}).distance, 5);  // 3 beyond, 4 beside
@@ -196,7 +189,7 @@ bool shows_figure_near(const std::vector<int>& objects, const Point& point) {
   return false;
 }
 
-TEST(FigureScene, EveryJointLiesOnTheFigure) {
+TEST(FigureScene, EveryJointLiesOnTheFigureAndIsTheProjectionOfThe3dOne) {
   for (const std::uint64_t seed : {1, 2, 3, 4, 5}) {
     const FigureScene scene = scene_of(seed);
     const auto objects = scene.objects(4);
@@ -205,9 +198,6 @@ TEST(FigureScene, EveryJointLiesOnTheFigure) {
       EXPECT_TRUE(shows_figure_near(objects, label.joints[joint])) << seed << " " << joint;
     }
   }
-}
-
-TEST(FigureScene, JointsAreTheProjectionOfThe3dOnes) {
   const FigureLabel label = scene_of(1).labels(2).front();
   for (std::size_t joint = 0; joint < kFigureJoints; ++joint) {
     const Vector3& at = label.joints3d[joint];

@@ -10,7 +10,7 @@
 namespace eventgan {
 namespace {
 
-TEST(Image, PixelsAreRoundedAndKeptInRange) {
+TEST(Image, PixelsAreRoundedAndColoursMix) {
   Image image = black_image({2, 3});
   set_pixel(image, 2, 1, {-5, 99.6f, 300});
   const std::size_t last = 3 * (1 * 3 + 2);
@@ -18,6 +18,10 @@ TEST(Image, PixelsAreRoundedAndKeptInRange) {
   EXPECT_EQ(image.bgr[last + 1], 100);
   EXPECT_EQ(image.bgr[last + 2], 255);
   EXPECT_EQ(image.bgr[0], 0);
+  const Colour middle = mix({0, 100, 200}, {100, 200, 0}, 0.25f);
+  EXPECT_FLOAT_EQ(middle.blue, 25);
+  EXPECT_FLOAT_EQ(middle.green, 125);
+  EXPECT_FLOAT_EQ(middle.red, 150);
 }
 
 TEST(Image, PngHoldsThePixels) {
@@ -29,13 +33,6 @@ TEST(Image, PngHoldsThePixels) {
   ASSERT_EQ(read.size(), cv::Size(5, 4));
   EXPECT_EQ(read.at<cv::Vec3b>(2, 3), cv::Vec3b(10, 20, 30));
   EXPECT_EQ(read.at<cv::Vec3b>(2, 2), cv::Vec3b(0, 0, 0));
-}
-
-TEST(Image, ColoursMix) {
-  const Colour middle = mix({0, 100, 200}, {100, 200, 0}, 0.25f);
-  EXPECT_FLOAT_EQ(middle.blue, 25);
-  EXPECT_FLOAT_EQ(middle.green, 125);
-  EXPECT_FLOAT_EQ(middle.red, 150);
 }
 
 TEST(Texture, CellsAreUniformAndTheSameEveryTime) {

@@ -15,6 +15,7 @@
 #include "stages/synthetic/layouts/output_files.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -24,13 +25,10 @@ using testing::read_file;
 using testing::TemporaryFolder;
 using ::testing::ThrowsMessage;
 
-TEST(OutputFiles, NumbersHaveZerosInFront) {
+TEST(OutputFiles, AreNumberedWrittenAndCopied) {
   EXPECT_EQ(numbered(7, 3), "007");
   EXPECT_EQ(numbered(0, 1), "0");
   EXPECT_EQ(numbered(12345, 3), "12345");
-}
-
-TEST(OutputFiles, WriteAndCopy) {
   const TemporaryFolder folder;
   make_folder(folder / "a/b");
   write_text(folder / "a/b/one.txt", "text");
@@ -66,19 +64,15 @@ RoadLabel example_label() {
   return label;
 }
 
-TEST(KittiText, ALineInTheDevkitsOrder) {
+TEST(KittiText, ALineInTheDevkitsOrderForEachVehicle) {
   EXPECT_EQ(kitti_labels({example_label()}),
             "Van 0.25 2 -1.40 1.23 2.00 300.50 188.00 2.10 1.85 4.90 -3.46 1.65 20.00 1.57\n");
-}
-
-TEST(KittiText, FarVehiclesAreMarkedButNotDescribed) {
   RoadLabel far = example_label();
   far.dont_care = true;
   EXPECT_EQ(kitti_labels({far}),
             "DontCare -1 -1 -10 1.23 2.00 300.50 188.00 -1 -1 -1 -1000 -1000 -1000 -10\n");
+  EXPECT_EQ(kitti_labels({}), "");
 }
-
-TEST(KittiText, NoVehiclesNoLines) { EXPECT_EQ(kitti_labels({}), ""); }
 
 TEST(KittiText, CalibrationHoldsTheCameraAsAMatrix) {
   std::istringstream lines(kitti_calibration({360, 361, 305, 88}));
@@ -122,17 +116,14 @@ TEST(MpiiAnnotation, JointsCountFromOne) {
                    (second.outline.bottom - second.outline.top) / 200);
 }
 
-TEST(MpiiAnnotation, VisibilityComesInItsThreeForms) {
-  const MatValue release = mpii_release({entry_of(true)});
+TEST(MpiiAnnotation, VisibilityComesInItsThreeFormsAndATestImageHasNoJoints) {
+  MatValue release = mpii_release({entry_of(true)});
   matvar_t* points =
       field(field(field(field(release.get(), "annolist"), "annorect"), "annopoints"), "point");
   EXPECT_EQ(field(points, "is_visible", 0)->class_type, MAT_C_UINT8);
   EXPECT_EQ(field(points, "is_visible", 1)->class_type, MAT_C_CHAR);
   EXPECT_EQ(field(points, "is_visible", 6)->nbytes, 0u);
-}
-
-TEST(MpiiAnnotation, ATestImageHasNoJoints) {
-  const MatValue release = mpii_release({entry_of(true), entry_of(false)});
+  release = mpii_release({entry_of(true), entry_of(false)});
   matvar_t* list = field(release.get(), "annolist");
   EXPECT_EQ(field(field(list, "annorect", 1), "annopoints"), nullptr);
   EXPECT_NE(field(field(list, "annorect", 1), "objpos"), nullptr);
@@ -189,20 +180,15 @@ TEST(MatValues, ReadBack) {
   EXPECT_EQ(static_cast<const double*>(row->data)[2], 3);
 }
 
-TEST(MatValues, TheFileBearsNoDate) {
+TEST(MatValues, TheFileBearsNoDateAndFailuresNameThePath) {
   const TemporaryFolder folder;
   write_mat_file(folder / "a.mat", "OUTER", example_value());
   write_mat_file(folder / "b.mat", "OUTER", example_value());
   const std::string bytes = read_file(folder / "a.mat");
   EXPECT_EQ(bytes, read_file(folder / "b.mat"));
   EXPECT_EQ(bytes.substr(0, 116).find("Created on"), std::string::npos);
-}
-
-TEST(MatValues, FailuresNameThePath) {
-  const TemporaryFolder folder;
-  EXPECT_THAT([&] { write_mat_file(folder / "none/m.mat", "X", mat_number(1)); },
-              ::testing::ThrowsMessage<std::runtime_error>(
-                  ::testing::HasSubstr((folder / "none/m.mat").string())));
+  EXPECT_THROWS(write_mat_file(folder / "none/m.mat", "X", mat_number(1)), std::runtime_error,
+                (folder / "none/m.mat").string());
 }
 
 std::vector<double> read_table(hid_t file, const std::string& name) {
@@ -264,8 +250,8 @@ TEST(Human36mLayout, ATableThatCannotBeMadeIsNamedAndLeavesNothingOpen) {
   std::filesystem::create_directories(path);
   // HDF5 numbers property lists as they are made.
   const hid_t before = H5Pcreate(H5P_LINK_CREATE);
-  EXPECT_THAT([&] { write_human36m_layout(folder / "h36m", 7); },
-              ::testing::ThrowsMessage<std::runtime_error>("cannot write " + path.string()));
+  EXPECT_THROWS(write_human36m_layout(folder / "h36m", 7), std::runtime_error,
+                ::testing::Eq("cannot write " + path.string()));
   const hid_t after = H5Pcreate(H5P_LINK_CREATE);
   for (hid_t id = before + 1; id < after; ++id) EXPECT_LE(H5Iis_valid(id), 0) << id - before;
   EXPECT_EQ(H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_ALL), 0);

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "stages/training/training_sample.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -111,9 +112,11 @@ TEST(DrawAugmentation, TakesAnImageOfExactlyTheCropAndRefusesASmallerOne) {
   EXPECT_EQ(drawn.top, 0);
   EXPECT_EQ(drawn.left, 0);
   for (const ImageSize image : {ImageSize{4, 6}, {5, 5}, {0, 0}}) {
-    EXPECT_THROW(draw_augmentation(image, {5, 6}, {}, CounterRandom(1)), std::invalid_argument);
+    EXPECT_THROWS(draw_augmentation(image, {5, 6}, {}, CounterRandom(1)), std::invalid_argument,
+                  "expected a crop within");
   }
-  EXPECT_THROW(draw_augmentation({5, 6}, {0, 6}, {}, CounterRandom(1)), std::invalid_argument);
+  EXPECT_THROWS(draw_augmentation({5, 6}, {0, 6}, {}, CounterRandom(1)), std::invalid_argument,
+                "expected a crop within 6x5 pixels, got 6x0 at row 0, column");
 }
 
 class AugmentFlips : public ::testing::TestWithParam<std::pair<bool, bool>> {};
@@ -199,7 +202,7 @@ TEST(Augment, TellsTheThresholdAsTheNetworkSeesIt) {
             (ContrastThreshold{0.125, 0.25}));
 }
 
-TEST(Augment, KeepsLightInItsRange) {
+TEST(Augment, KeepsLightInItsRangeAndANanAndNamesTheCrop) {
   const TrainingSample bright =
       augment(pixel_sample(-1, 1), {.crop = {1, 1}, .gain = 1.5f, .gamma = 0.5f});
   EXPECT_EQ(bright.network_frames, (std::vector<float>{-1, 1}));
@@ -208,20 +211,14 @@ TEST(Augment, KeepsLightInItsRange) {
   EXPECT_EQ(outside.network_frames, (std::vector<float>{-1, 1}));
   const TrainingSample dark = augment(pixel_sample(-0.3f, 1), {.crop = {1, 1}, .gain = 0});
   EXPECT_EQ(dark.network_frames, (std::vector<float>{-1, -1}));
-}
-
-TEST(Augment, KeepsANan) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const TrainingSample result =
       augment(pixel_sample(nan, 0), {.crop = {1, 1}, .gain = 2, .gamma = 2});
   EXPECT_TRUE(std::isnan(result.frames[0]));
   EXPECT_TRUE(std::isnan(result.network_frames[0]));
-}
-
-TEST(Augment, NamesTheCropInItsOrigin) {
-  const TrainingSample result =
+  const TrainingSample cropped =
       augment(marked_sample(1, {6, 9}), {.top = 2, .left = 3, .crop = {3, 5}, .flip_x = true});
-  EXPECT_EQ(result.origin, "recording, frames 3 and 4, crop 5x3 at row 2, column 3, flipped in x");
+  EXPECT_EQ(cropped.origin, "recording, frames 3 and 4, crop 5x3 at row 2, column 3, flipped in x");
 }
 
 TEST(Augment, RefusesACropThatLeavesTheSampleOrASampleThatIsNotWhole) {
@@ -233,14 +230,17 @@ TEST(Augment, RefusesACropThatLeavesTheSampleOrASampleThatIsNotWhole) {
                                       {.crop = {0, 3}},
                                       {.left = kHuge, .crop = {6, 9}},
                                       {.crop = {kHuge, kHuge}}}) {
-    EXPECT_THROW(augment(sample, outside), std::invalid_argument);
+    EXPECT_THROWS(augment(sample, outside), std::invalid_argument,
+                  "expected a crop within 9x6 pixels");
   }
   TrainingSample torn = sample;
   torn.frames.pop_back();
-  EXPECT_THROW(augment(torn, {.crop = {3, 3}}), std::invalid_argument);
+  EXPECT_THROWS(augment(torn, {.crop = {3, 3}}), std::invalid_argument,
+                "expected 2 frames and a volume of 9x6 pixels, got 107 and");
   torn = sample;
   torn.volume.clear();
-  EXPECT_THROW(augment(torn, {.crop = {3, 3}}), std::invalid_argument);
+  EXPECT_THROWS(augment(torn, {.crop = {3, 3}}), std::invalid_argument,
+                "expected 2 frames and a volume of 9x6 pixels, got 108 and 0");
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 
 #include "tests/stages/training/loss_cases.h"
 #include "tests/testing/shared_data.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -100,10 +101,17 @@ TEST(Ssim, OfConstantImagesIsWhatTheDefinitionSays) {
   }
 }
 
-TEST(ImageLoss, IsTheMeanDifferenceLessTheSimilarity) {
+TEST(ImageLoss, IsTheMeanDifferenceLessTheSimilarityOfImagesOfOneShape) {
   const at::Tensor black = at::zeros({2, 1, 6, 6}, at::kDouble);
   EXPECT_NEAR(image_loss(black + 0.25, black).item<double>(),
               0.25 - ssim(black + 0.25, black).item<double>(), 1e-12);
+  const at::Tensor images = at::zeros({2, 1, 4, 4});
+  EXPECT_THROWS(image_loss(images, at::zeros({1, 1, 4, 4})), std::invalid_argument,
+                "expected shape [2, 1, 4, 4], got [1, 1, 4, 4] (the image to");
+  EXPECT_THROWS(ssim(images, at::zeros({2, 1, 4, 5})), std::invalid_argument,
+                "expected shape [2, 1, 4, 4], got [2, 1, 4, 5] (the image to");
+  EXPECT_THROWS(ssim(at::zeros({2, 3, 4, 4}), at::zeros({2, 3, 4, 4})), std::invalid_argument,
+                "expected shape [-1, 1, -1, -1], got [2, 3, 4, 4] (an image");
 }
 
 TEST(ImageLoss, HasTheGradientOfDifferences) {
@@ -119,13 +127,6 @@ TEST(ImageLoss, LetsNanThrough) {
   spoiled[0][0][0][0].fill_(std::numeric_limits<double>::quiet_NaN());
   EXPECT_TRUE(std::isnan(image_loss(spoiled, image).item<double>()));
   EXPECT_TRUE(std::isnan(ssim(image, spoiled).item<double>()));
-}
-
-TEST(ImageLoss, RefusesImagesOfOtherShapes) {
-  const at::Tensor images = at::zeros({2, 1, 4, 4});
-  EXPECT_THROW(image_loss(images, at::zeros({1, 1, 4, 4})), std::invalid_argument);
-  EXPECT_THROW(ssim(images, at::zeros({2, 1, 4, 5})), std::invalid_argument);
-  EXPECT_THROW(ssim(at::zeros({2, 3, 4, 4}), at::zeros({2, 3, 4, 4})), std::invalid_argument);
 }
 
 TEST(ReconstructionLoss, EnlargesAndWeighsScalesByHalves) {
@@ -152,10 +153,12 @@ TEST(ReconstructionLoss, HasTheGradientOfDifferences) {
 
 TEST(ReconstructionLoss, RefusesShapesThatDoNotFit) {
   const at::Tensor target = at::zeros({2, 1, 4, 4});
-  EXPECT_THROW(multi_scale_reconstruction_loss({}, target), std::invalid_argument);
-  EXPECT_THROW(multi_scale_reconstruction_loss({at::zeros({1, 1, 4, 4})}, target),
-               std::invalid_argument);
-  EXPECT_THROW(multi_scale_reconstruction_loss({target}, target[0]), std::invalid_argument);
+  EXPECT_THROWS(multi_scale_reconstruction_loss({}, target), std::invalid_argument,
+                "expected images of at least one scale, got none");
+  EXPECT_THROWS(multi_scale_reconstruction_loss({at::zeros({1, 1, 4, 4})}, target),
+                std::invalid_argument, "expected shape [2, 1, -1, -1], got [1, 1, 4, 4] (a");
+  EXPECT_THROWS(multi_scale_reconstruction_loss({target}, target[0]), std::invalid_argument,
+                "expected shape [-1, 1, -1, -1], got [1, 4, 4] (the image to");
 }
 
 double rho(double error) { return std::pow(error * error + 1e-10, 0.45); }
@@ -207,7 +210,7 @@ TEST(FlowLoss, LooksUpTheRightNeighbour) {
               1e-6);
 }
 
-TEST(FlowLoss, CountsPlacesLeftOfTheFrameAsThePublishedCodeDoes) {
+TEST(FlowLoss, WeighsScalesByHalvesAndPlacesLeftOfTheFrameAsPublished) {
   const at::Tensor previous = at::ones({1, 1, 1, 1});
   const auto photometric = [&](float u) {
     return multi_scale_flow_loss(previous, previous, {tensor_of({1, 2, 1, 1}, {u, 0.5f})},
@@ -218,9 +221,6 @@ TEST(FlowLoss, CountsPlacesLeftOfTheFrameAsThePublishedCodeDoes) {
   EXPECT_NEAR(photometric(-0.9f), rho(1), 1e-6);  // black against white
   EXPECT_EQ(photometric(-1.1f), 0);
   EXPECT_EQ(photometric(1.1f), 0);
-}
-
-TEST(FlowLoss, WeighsScalesByHalves) {
   const at::Tensor frame = at::zeros({1, 1, 3, 5});
   const std::vector<at::Tensor> flows{at::zeros({1, 2, 1, 1}), at::zeros({1, 2, 2, 3}),
                                       at::zeros({1, 2, 3, 5})};
@@ -292,23 +292,24 @@ TEST(FlowLoss, RefusesShapesThatDoNotFit) {
   const at::Tensor mask = at::ones({2, 3, 4});
   const std::vector<at::Tensor> flow{at::zeros({2, 2, 3, 4})};
   EXPECT_NO_THROW(multi_scale_flow_loss(frame, frame, flow, mask));
-  EXPECT_THROW(multi_scale_flow_loss(frame, frame, {}, mask), std::invalid_argument);
-  EXPECT_THROW(multi_scale_flow_loss(frame, frame[0], flow, mask), std::invalid_argument);
-  EXPECT_THROW(multi_scale_flow_loss(frame, frame, {frame}, mask), std::invalid_argument);
-  EXPECT_THROW(multi_scale_flow_loss(frame, frame, flow, at::ones({3, 3, 4})),
-               std::invalid_argument);
-  EXPECT_THROW(multi_scale_flow_loss(frame, frame, flow, at::ones({})), std::invalid_argument);
+  EXPECT_THROWS(multi_scale_flow_loss(frame, frame, {}, mask), std::invalid_argument,
+                "expected flow of at least one scale, got none");
+  EXPECT_THROWS(multi_scale_flow_loss(frame, frame[0], flow, mask), std::invalid_argument,
+                "expected shape [2, 1, 3, 4], got [1, 3, 4] (the next frame;");
+  EXPECT_THROWS(multi_scale_flow_loss(frame, frame, {frame}, mask), std::invalid_argument,
+                "expected shape [2, 2, -1, -1], got [2, 1, 3, 4] (a flow;");
+  EXPECT_THROWS(multi_scale_flow_loss(frame, frame, flow, at::ones({3, 3, 4})),
+                std::invalid_argument, "expected shape [2, 1, 3, 4], got [3, 1, 3, 4] (the flow");
+  EXPECT_THROWS(multi_scale_flow_loss(frame, frame, flow, at::ones({})), std::invalid_argument,
+                "expected shape [2, 1, 3, 4], got [] (the flow loss's mask;");
 }
 
-TEST(VolumeLoss, IsTheMeanDifference) {
+TEST(VolumeLoss, IsTheMeanDifferenceWeightedByTheQuantile) {
   const at::Tensor generated = tensor_of({1, 2, 1, 2}, {0, 1, 0.5f, 0.25f});
   const at::Tensor real = tensor_of({1, 2, 1, 2}, {1, 1, 0, 0.75f});
   EXPECT_FLOAT_EQ(volume_loss(generated, real, 0.5).item<float>(),
                   0.5f);  // (1 + 0 + 1/2 + 1/2) / 4
   EXPECT_EQ(volume_loss(real, real, 0.8).item<float>(), 0);
-}
-
-TEST(VolumeLoss, CountsAMissedEventAsTheQuantileSays) {
   const at::Tensor empty = at::zeros({1, 2, 1, 2});
   const at::Tensor full = at::ones({1, 2, 1, 2});
   EXPECT_FLOAT_EQ(volume_loss(empty, full, 0.8).item<float>(), 1.6f);  // 2 q
@@ -343,9 +344,6 @@ TEST(OverlapLoss, IsOneMinusTheF1OfPixelsThatHaveEvents) {
   const at::Tensor empty = at::zeros({1, 2, 1, 2});
   EXPECT_EQ(overlap_loss(empty, empty).item<float>(), 0);
   EXPECT_GT(overlap_loss(generated, at::zeros({2, 2, 1, 2})).item<float>(), 1.4f);
-}
-
-TEST(OverlapLoss, OfAnEventAtAWrongTimeIsThatOfTheVoxelsAlone) {
   const at::Tensor early = tensor_of({1, 4, 1, 1}, {1, 0, 0, 0});
   const at::Tensor late = tensor_of({1, 4, 1, 1}, {0, 1, 0, 0});
   EXPECT_FLOAT_EQ(overlap_loss(early, late).item<float>(), 1 - 1.0f / 3);
@@ -449,7 +447,8 @@ TEST(LikelihoodLoss, LetsNanThroughAndRefusesOtherShapes) {
   EXPECT_TRUE(std::isnan(likelihood_loss(zero, nan).item<float>()));
   EXPECT_TRUE(std::isnan(block_likelihood_loss(zero, nan).item<float>()));
   for (const auto loss : {likelihood_loss, block_likelihood_loss}) {
-    EXPECT_THROW(loss(at::zeros({2, 18, 4, 5}), at::zeros({1, 18, 4, 5})), std::invalid_argument);
+    EXPECT_THROWS(loss(at::zeros({2, 18, 4, 5}), at::zeros({1, 18, 4, 5})), std::invalid_argument,
+                  "expected shape [2, 18, 4, 5], got [1, 18, 4, 5] (the real");
   }
 }
 
@@ -496,8 +495,8 @@ TEST(VolumeLoss, RefusesOtherShapesAndSaysWhich) {
     EXPECT_STREQ(error.what(),
                  "expected shape [2, 18, 4, 5], got [1, 18, 4, 5] (the real volumes; -1: any)");
   }
-  EXPECT_THROW(volume_loss(at::zeros({0, 18, 4, 5}), at::zeros({0, 18, 4, 5}), 0.5),
-               std::invalid_argument);
+  EXPECT_THROWS(volume_loss(at::zeros({0, 18, 4, 5}), at::zeros({0, 18, 4, 5}), 0.5),
+                std::invalid_argument, "expected shape [-1, -1, -1, -1], got [0, 18, 4, 5] (the");
 }
 
 TEST(HingeLoss, MatchesGoldenNumbers) {
@@ -515,9 +514,6 @@ TEST(HingeLoss, CountsOnlyWhatIsOnTheWrongSideOfTheMargin) {
   const at::Tensor fake = tensor_of({1, 1, 1, 2}, {-3, 0.5f});     // 0, 1.5
   EXPECT_FLOAT_EQ(discriminator_hinge_loss(real, fake).item<float>(), 0.75f + 0.75f);
   EXPECT_FLOAT_EQ(generator_hinge_loss(real).item<float>(), -1.25f);
-}
-
-TEST(HingeLoss, IsTwoForADiscriminatorThatKnowsNothing) {
   const at::Tensor logits = tensor_of({2, 1, 1, 1}, {0, 0});
   EXPECT_EQ(discriminator_hinge_loss(logits, logits).item<float>(), 2);
 }

@@ -9,6 +9,7 @@
 #include "tests/stages/training/network_cases.h"
 #include "tests/testing/golden_numbers.h"
 #include "tests/testing/shared_data.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -196,9 +197,9 @@ TEST(PatchDiscriminator, GivesOneLogitForTheSmallestImage) {
   EXPECT_THAT(
       network->forward(at::zeros({3, 4, side, side}), at::zeros({3, 2, side, side})).sizes().vec(),
       ::testing::ElementsAre(3, 1, 1, 1));
-  EXPECT_THROW(
+  EXPECT_THROWS(
       network->forward(at::zeros({3, 4, side - 1, side}), at::zeros({3, 2, side - 1, side})),
-      c10::Error);
+      c10::Error, "Calculated padded input size");
 }
 
 TEST(PatchDiscriminator, GradientsAreThoseOfCentralDifferences) {

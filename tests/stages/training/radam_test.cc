@@ -12,6 +12,7 @@
 #include "manifests/values/counter_random.h"
 #include "tests/testing/golden_numbers.h"
 #include "tests/testing/shared_data.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -243,7 +244,8 @@ TEST(RAdam, RefusesOptionsOutOfRange) {
                                         {.beta2 = 1},
                                         {.beta2 = nan},
                                         {.epsilon = -1}}) {
-    EXPECT_THROW(RAdam({}, options), std::invalid_argument);
+    EXPECT_THROWS(RAdam({}, options), std::invalid_argument,
+                  "expected rate and epsilon >= 0 and betas in [0, 1)");
   }
 }
 

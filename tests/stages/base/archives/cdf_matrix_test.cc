@@ -15,6 +15,7 @@
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -25,7 +26,6 @@ using testing::CdfMatrix;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-using ::testing::ThrowsMessage;
 using namespace std::string_literals;
 
 std::vector<std::uint32_t> bits(const TypedArray& array) {
@@ -45,9 +45,8 @@ class CdfMatrixTest : public ::testing::Test {
   TypedArray read(const CdfMatrix& matrix) { return read(cdf_bytes(matrix)); }
 
   void expect_refused(const std::string& bytes, const std::string& why) {
-    EXPECT_THAT([&] { read(bytes); },
-                ThrowsMessage<std::runtime_error>(
-                    AllOf(StartsWith("expected "), HasSubstr(why), EndsWith("a.cdf (Pose)"))));
+    EXPECT_THROWS(read(bytes), std::runtime_error,
+                  AllOf(StartsWith("expected "), HasSubstr(why), EndsWith("a.cdf (Pose)")));
   }
 
   testing::TemporaryFolder folder_;
@@ -102,11 +101,9 @@ TEST_F(CdfMatrixTest, RefusesFilesOfOtherKinds) {
   expect_refused("no CDF at all", "a CDF file of version 3, got another");
   expect_refused(with_start("\xCD\xF2\x60\x02\x00\x00\xFF\xFF"s), "version 3");
   expect_refused(with_start("\xCD\xF3\x00\x01\xCC\xCC\x00\x02"s), "compressed or not, got neither");
-  EXPECT_THAT([&] { read(bytes, "Pos"); },
-              ThrowsMessage<std::runtime_error>(AllOf(
-                  HasSubstr("expected a variable of that name, got none"), EndsWith("(Pos)"))));
-  EXPECT_THAT([&] { read_cdf_matrix(folder_ / "none.cdf", "Pose"); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("none.cdf")));
+  EXPECT_THROWS(read(bytes, "Pos"), std::runtime_error,
+                AllOf(HasSubstr("expected a variable of that name, got none"), EndsWith("(Pos)")));
+  EXPECT_THROWS(read_cdf_matrix(folder_ / "none.cdf", "Pose"), std::runtime_error, "none.cdf");
 }
 
 TEST_F(CdfMatrixTest, RefusesWhatHuman36mDoesNotUseAndWhatCannotBe) {

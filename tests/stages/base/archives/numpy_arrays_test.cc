@@ -15,6 +15,7 @@
 #include "tests/testing/npy_bytes.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -56,12 +57,8 @@ TEST(NumpyElementsTest, ReadsEveryDtype) {
               ElementsAre(4294967295));
   EXPECT_THAT(values<std::int64_t>(decode({"<u8", false, {1}}, std::string(7, '\xff') + '\x7f')),
               ElementsAre(std::numeric_limits<std::int64_t>::max()));
-  EXPECT_THAT(
-      [] {
-        decode({"<u8", false, {1}}, std::string(7, '\0') + '\x80');
-      },
-      ThrowsMessage<std::runtime_error>(
-          HasSubstr("expected numbers below 2^63, got 9223372036854775808, in x.npy")));
+  EXPECT_THROWS(decode({"<u8", false, {1}}, std::string(7, '\0') + '\x80'), std::runtime_error,
+                "expected numbers below 2^63, got 9223372036854775808, in x.npy");
 }
 
 std::vector<NamedArray> fields(const std::string& bytes) {
@@ -94,8 +91,8 @@ TEST(NpyFieldsTest, ReadsTheFieldsOfAStructuredArray) {
                 ThrowsMessage<std::runtime_error>(HasSubstr(what)));
   }
   const std::string structured = npy_file(kHeader, data);
-  EXPECT_THAT([&] { parse_npy(std::as_bytes(std::span(structured)), "f.npy"); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("got one of fields")));
+  EXPECT_THROWS(parse_npy(std::as_bytes(std::span(structured)), "f.npy"), std::runtime_error,
+                "got one of fields");
 }
 
 TEST(NumpyElementsTest, ReadsText) {
@@ -106,9 +103,11 @@ TEST(NumpyElementsTest, ReadsText) {
   EXPECT_THAT(values<std::string>(decode({"|S3", false, {2}}, "ab\0abc"s)),
               ElementsAre("ab", "abc"));
   EXPECT_THAT(values<std::string>(decode({"<U0", false, {0}}, "")), ElementsAre());
-  EXPECT_THROW(decode({"<U1", false, {1}}, "\x00\xd8\x00\x00"s), std::runtime_error)
+  EXPECT_THROWS(decode({"<U1", false, {1}}, "\x00\xd8\x00\x00"s), std::runtime_error,
+                "expected Unicode text, got code point 55296, in x.npy")
       << "a surrogate";
-  EXPECT_THROW(decode({"|S1", false, {1}}, "\xff"), std::runtime_error);
+  EXPECT_THROWS(decode({"|S1", false, {1}}, "\xff"), std::runtime_error,
+                "expected ASCII or UTF-8 text, got other bytes, in x.npy");
 }
 
 TEST(NumpyElementsTest, TextMayReachTheEdgesOfEveryLengthOfUtf8) {
@@ -134,7 +133,9 @@ TEST(NumpyElementsTest, TextMayReachTheEdgesOfEveryLengthOfUtf8) {
   for (const char32_t code : {0xd800, 0xdfff, 0x110000}) {
     std::string wide(4, '\0');
     std::memcpy(wide.data(), &code, 4);
-    EXPECT_THROW(decode({"<U1", false, {1}}, wide), std::runtime_error) << std::uint32_t{code};
+    EXPECT_THROWS(decode({"<U1", false, {1}}, wide), std::runtime_error,
+                  "expected Unicode text, got code point")
+        << std::uint32_t{code};
   }
 }
 
@@ -145,7 +146,8 @@ TEST(NumpyElementsTest, RefusesMalformedText) {
                                  "\xed\xa0\x80"s,      // surrogate
                                  "\xf4\x90\x80\x80"s,  // beyond U+10FFFF
                                  "\xf8\x88\x80\x80\x80"s}) {
-    EXPECT_THROW(decode({"|S" + std::to_string(bad.size()), false, {1}}, bad), std::runtime_error)
+    EXPECT_THROWS(decode({"|S" + std::to_string(bad.size()), false, {1}}, bad), std::runtime_error,
+                  "expected ASCII or UTF-8 text, got other bytes, in x.npy")
         << ::testing::PrintToString(bad);
   }
 }
@@ -185,30 +187,19 @@ TEST(NumpyElementsTest, ComparesTheSizeBeforeItAllocates) {
         NumpyLayout{"<f8", false, {huge, huge}},     // an overflow
         NumpyLayout{"<f8", false, {huge, 4, 0, 2}},  // none, but of bytes there are 16
         NumpyLayout{"|u1", false, {huge}}, NumpyLayout{"<U4294967295", false, {huge}}}) {
-    EXPECT_THAT([&] { decode(layout, std::string(16, 'x')); },
-                ThrowsMessage<std::runtime_error>(HasSubstr("got 16, in x.npy")));
+    EXPECT_THROWS(decode(layout, std::string(16, 'x')), std::runtime_error, "got 16, in x.npy");
   }
-  EXPECT_THAT(
-      [&] {
-        decode({"<U0", false, {huge}}, "");
-      },
-      ThrowsMessage<std::runtime_error>(HasSubstr("at least one character")));
-  EXPECT_THROW(decode({"|u1", false, std::vector<std::size_t>(33, 1)}, "x"), std::runtime_error);
+  EXPECT_THROWS(decode({"<U0", false, {huge}}, ""), std::runtime_error, "at least one character");
+  EXPECT_THROWS(decode({"|u1", false, std::vector<std::size_t>(33, 1)}, "x"), std::runtime_error,
+                "expected at most 32 dimensions, got 33, in x.npy");
 }
 
 TEST(NumpyElementsTest, RefusesOtherDtypesByName) {
-  EXPECT_THAT(
-      [] {
-        decode({"|O", false, {1}}, "12345678");
-      },
-      ThrowsMessage<std::runtime_error>(HasSubstr("Python objects")));
+  EXPECT_THROWS(decode({"|O", false, {1}}, "12345678"), std::runtime_error, "Python objects");
   for (const std::string descr :
        {"", ">f8", "<f2", "<c16", "<M8[ns]", "<U", "<Ux", "|S-1", "<U1x"}) {
-    EXPECT_THAT(
-        [&] {
-          decode({descr, false, {1}}, "12345678");
-        },
-        ThrowsMessage<std::runtime_error>(HasSubstr("got '" + descr + "', in x.npy")));
+    EXPECT_THROWS(decode({descr, false, {1}}, "12345678"), std::runtime_error,
+                  "got '" + descr + "', in x.npy");
   }
 }
 
@@ -218,15 +209,12 @@ TypedArray parse(const std::string& file) {
 
 const std::string kHeader = "{'descr': '|u1', 'fortran_order': False, 'shape': (2,), }";
 
-TEST(NpyArrayTest, ReadsEveryVersion) {
+TEST(NpyArrayTest, ReadsEveryVersionAndFixtures) {
   for (const int version : {1, 2, 3}) {
     const TypedArray array = parse(npy_file(kHeader, "\x07\x08", version));
     EXPECT_THAT(array.shape, ElementsAre(2));
     EXPECT_EQ(array.number(1), 8);
   }
-}
-
-TEST(NpyArrayTest, ReadsFixturesOfDoublesAndText) {
   const TypedArray numbers = parse(testing::npy_doubles({2, 2}, {1, 2, 3, 4.5}));
   EXPECT_THAT(numbers.shape, ElementsAre(2, 2));
   EXPECT_EQ(numbers.number(3), 4.5);
@@ -261,29 +249,31 @@ TEST(NpyArrayTest, RefusesMalformedHeaders) {
         "{'descr': '|u1', 'fortran_order': False, 'shape': (2,), 'more': 1}",
         "{'descr': '|u1', 'fortran_order': False, 'shape': (2,)} + x",
         "{'descr': __import__('os'), 'fortran_order': False, 'shape': (2,)}"}) {
-    EXPECT_THAT(
-        [&] { parse(npy_file(header, "ab")); },
-        ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("expected "), HasSubstr("in part.npy"))))
+    EXPECT_THROWS(parse(npy_file(header, "ab")), std::runtime_error, "expected ", "in part.npy")
         << header;
   }
 }
 
-TEST(NpyArrayTest, RefusesWhatIsNoNpyFile) {
-  EXPECT_THROW(parse(""), std::runtime_error);
-  EXPECT_THROW(parse("\x93NUMPX\x01\x00"s), std::runtime_error);
-  EXPECT_THROW(parse("\x93NUMPY"), std::runtime_error);
-  EXPECT_THROW(parse("\x93NUMPY\x01\x00\x10"s), std::runtime_error);
-  EXPECT_THROW(parse(npy_file(kHeader, "ab", 4)), std::runtime_error);
-  EXPECT_THROW(parse("\x93NUMPY\x02\x00\xff\xff\xff\xff{"s), std::runtime_error);
-}
-
-TEST(NpyArrayTest, RefusesTruncatedDataAndObjects) {
+TEST(NpyArrayTest, RefusesWhatIsNoNpyFileTruncatedDataAndObjects) {
+  EXPECT_THROWS(parse(""), std::runtime_error,
+                "expected a .npy file, got 0 bytes without its magic");
+  EXPECT_THROWS(parse("\x93NUMPX\x01\x00"s), std::runtime_error,
+                "expected a .npy file, got 8 bytes without its magic");
+  EXPECT_THROWS(parse("\x93NUMPY"), std::runtime_error,
+                "expected a .npy file, got 6 bytes without its magic");
+  EXPECT_THROWS(parse("\x93NUMPY\x01\x00\x10"s), std::runtime_error,
+                "expected a .npy header, got the end of the file, in part.npy");
+  EXPECT_THROWS(parse(npy_file(kHeader, "ab", 4)), std::runtime_error,
+                "expected .npy version 1-3, got 4, in part.npy");
+  EXPECT_THROWS(parse("\x93NUMPY\x02\x00\xff\xff\xff\xff{"s), std::runtime_error,
+                "expected a .npy header of 4294967295 bytes, got 1");
   const std::string whole = npy_file(kHeader, "ab");
-  EXPECT_THROW(parse(whole.substr(0, whole.size() - 1)), std::runtime_error);
-  EXPECT_THROW(parse(whole + "c"), std::runtime_error);
-  EXPECT_THAT(
-      [] { parse(npy_file("{'descr': '|O', 'fortran_order': False, 'shape': (1,)}", "x")); },
-      ThrowsMessage<std::runtime_error>(HasSubstr("Python objects")));
+  EXPECT_THROWS(parse(whole.substr(0, whole.size() - 1)), std::runtime_error,
+                "expected 2 bytes for shape [2] of |u1, got 1, in part.npy");
+  EXPECT_THROWS(parse(whole + "c"), std::runtime_error,
+                "expected 2 bytes for shape [2] of |u1, got 3, in part.npy");
+  EXPECT_THROWS(parse(npy_file("{'descr': '|O', 'fortran_order': False, 'shape': (1,)}", "x")),
+                std::runtime_error, "Python objects");
 }
 
 TEST(NpyArrayTest, RandomDamageNeverCrashes) {
@@ -322,29 +312,21 @@ TEST(NpyArrayTest, ReadsHuman36mLists) {
   EXPECT_NEAR(joints.number(0), 473.6835632324219, 1e-9);
 }
 
-TEST(NpyFile, IsReadBack) {
+TEST(NpyFile, IsAsNumpyWritesItAndIsReadBack) {
   const std::vector<double> values{1, 2.5, -3, 4, 5, 6};
-  const TypedArray array = parse(npy_file("<f8", {2, 3}, values));
+  TypedArray array = parse(npy_file("<f8", {2, 3}, values));
   EXPECT_EQ(array.shape, (std::vector<std::size_t>{2, 3}));
   EXPECT_EQ(std::get<std::vector<double>>(array.values), values);
-}
-
-TEST(NpyFile, IsAsNumpyWritesIt) {
   const std::string file = npy_file("|u1", {3}, std::vector<std::uint8_t>{7, 8, 9});
   EXPECT_EQ(file.substr(0, 10), std::string("\x93NUMPY\x01\x00\x76\x00", 10));
   EXPECT_EQ(file.substr(10, 59), "{'descr': '|u1', 'fortran_order': False, 'shape': (3,), }  ");
   EXPECT_EQ(file.size(), 128u + 3);  // the values begin at a multiple of 64
   EXPECT_EQ(file.substr(127), "\n\x07\x08\x09");
-}
-
-TEST(NpyFile, ASingleValueHasNoSides) {
-  const TypedArray array = parse(npy_file("<f4", {}, std::vector<float>{0.5f}));
+  array = parse(npy_file("<f4", {}, std::vector<float>{0.5f}));
   EXPECT_TRUE(array.shape.empty());
   EXPECT_EQ(array.number(0), 0.5);
-}
-
-TEST(NpyFile, RefusesAnotherNumberOfValues) {
-  EXPECT_THROW(npy_file("<f4", {2}, std::vector<float>{1}), std::invalid_argument);
+  EXPECT_THROWS(npy_file("<f4", {2}, std::vector<float>{1}), std::invalid_argument,
+                "expected 8 bytes of an array, got 4");
 }
 
 TEST(NpyRecordsTest, HaveTheirFieldsInTheHeader) {
@@ -355,16 +337,14 @@ TEST(NpyRecordsTest, HaveTheirFieldsInTheHeader) {
                               "'shape': (2,), }"));
   EXPECT_TRUE(file.ends_with("\n\x07\x00\x09\x00"s));
   EXPECT_THAT(npy_records(kFields, 2, ""), HasSubstr("'shape': (0,)"));
-  EXPECT_THROW(npy_records(kFields, 2, "123"), std::invalid_argument);
+  EXPECT_THROWS(npy_records(kFields, 2, "123"), std::invalid_argument,
+                "expected 2 bytes of an array, got 3");
 }
 
-TEST(NpyTexts, AreReadBack) {
+TEST(NpyTexts, AreReadBackInUtf8) {
   const std::vector<std::string> texts{"S1/a", "", "\xc3\xa9t\xc3\xa9"};
   const TypedArray array = parse(npy_texts(texts));
   EXPECT_EQ(std::get<std::vector<std::string>>(array.values), texts);
-}
-
-TEST(NpyTexts, WhatIsNotUtf8IsReplaced) {
   EXPECT_EQ(parse(npy_texts({"a\xff"})).text(0), "a\xef\xbf\xbd");
 }
 
@@ -431,7 +411,8 @@ TEST(PickledArrayTest, RefusesWhatIsNoArray) {
         pickled_array("K\x02\x85", "O8", "|", "\x89", "]"),
         pickled_array("K\x02\x85", "f8", "<", "N", "C\x10" + kDoubles)}) {
     const PickleDocument document = read(pickle);
-    EXPECT_THROW(parse_pickled_array(document.root(), "test.pkl"), std::runtime_error)
+    EXPECT_THROWS(parse_pickled_array(document.root(), "test.pkl"), std::runtime_error,
+                  ", in test.pkl")
         << ::testing::PrintToString(pickle);
   }
 }

@@ -10,6 +10,7 @@
 #include "stages/base/archives/zip_archive.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -168,10 +169,14 @@ TEST(PickleTest, KeepsCallsAsData) {
   EXPECT_EQ(storage.root().items[0]->items[1]->text, "0");
 }
 
-TEST(PickleTest, TellsHowManyBytesItUsed) {
+TEST(PickleTest, TellsHowManyBytesItUsedAndListsEveryValue) {
   std::size_t used = 0;
   unpickled("\x80\x02N.and more", {}, &used);
   EXPECT_EQ(used, 4u);
+  const PickleDocument document = unpickled("N0K\x07.");
+  ASSERT_EQ(document.nodes().size(), 2u);
+  EXPECT_EQ(document.nodes()[0].kind, Kind::kNone);
+  EXPECT_EQ(&document.nodes()[1], &document.root());
 }
 
 TEST(PickleTest, TakesNoMoreMemoryThanAllowed) {
@@ -182,15 +187,10 @@ TEST(PickleTest, TakesNoMoreMemoryThanAllowed) {
   const std::uint64_t needed = unpickled(pickle).memory_bytes();
   EXPECT_GT(needed, 3 * sizeof(PickleNode) + 11);
   EXPECT_EQ(run(needed).root().items.size(), 2u);
-  EXPECT_THROW(run(needed - 1), std::runtime_error);
-  EXPECT_THROW(run(0), std::runtime_error);
-}
-
-TEST(PickleTest, ListsEveryValueEvenThoseTheRootDoesNotLeadTo) {
-  const PickleDocument document = unpickled("N0K\x07.");
-  ASSERT_EQ(document.nodes().size(), 2u);
-  EXPECT_EQ(document.nodes()[0].kind, Kind::kNone);
-  EXPECT_EQ(&document.nodes()[1], &document.root());
+  EXPECT_THROWS(run(needed - 1), std::runtime_error,
+                "expected values of at most 970 bytes of memory, got more");
+  EXPECT_THROWS(run(0), std::runtime_error,
+                "expected values of at most 0 bytes of memory, got more");
 }
 
 TEST(PickleTest, PopTakesOffAValueOrAMark) {

@@ -13,15 +13,13 @@
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 #include "tests/testing/zip_file.h"
 
 namespace eventgan {
 namespace {
 
-using ::testing::AllOf;
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 std::string text(const std::vector<std::byte>& bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -56,9 +54,7 @@ TEST_F(ZipArchiveTest, ReadsStoredAndDeflatedMembersInTheirOrder) {
 TEST_F(ZipArchiveTest, NamesTheMissingMember) {
   testing::write_zip(file_, {{"a", "x"}});
   const ZipArchive archive(file_);
-  EXPECT_THAT([&] { archive.read("data.pkl"); },
-              ThrowsMessage<std::runtime_error>(
-                  AllOf(HasSubstr("some.zip"), HasSubstr("(member data.pkl)"))));
+  EXPECT_THROWS(archive.read("data.pkl"), std::runtime_error, "some.zip", "(member data.pkl)");
 }
 
 /// Lets the process open `count` more files while it lives.
@@ -93,21 +89,25 @@ TEST_F(ZipArchiveTest, TooManyOpenFilesAreNoFaultOfTheFile) {
   }
 }
 
-TEST_F(ZipArchiveTest, RefusesWhatIsNoZipFile) {
-  EXPECT_THAT([&] { ZipArchive(folder_ / "absent.zip"); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("absent.zip")));
-  for (const std::string& content : {std::string(), std::string("no zip file at all")}) {
-    testing::write_file(file_, content);
-    EXPECT_THAT([&] { ZipArchive{file_}; },
-                ThrowsMessage<std::runtime_error>(HasSubstr("expected a zip file")));
-  }
+TEST_F(ZipArchiveTest, ReadsNoMoreBytesThanAllowed) {
+  testing::write_zip(file_, {{"a", "12345"}, {"b", std::string(1000, 'x'), true}});
+  const ZipArchive archive(file_);
+  EXPECT_EQ(text(archive.read("a", 5)), "12345");
+  EXPECT_THROWS(archive.read("a", 4), std::runtime_error, "at most 4 bytes");
+  EXPECT_THROWS(archive.read("b", 999), std::runtime_error, "expected at most 999 bytes");
 }
 
-TEST_F(ZipArchiveTest, RefusesTruncatedFile) {
+TEST_F(ZipArchiveTest, RefusesWhatIsNoZipFileOrATruncatedOne) {
+  EXPECT_THROWS(ZipArchive(folder_ / "absent.zip"), std::runtime_error, "absent.zip");
+  for (const std::string& content : {std::string(), std::string("no zip file at all")}) {
+    testing::write_file(file_, content);
+    EXPECT_THROWS(ZipArchive{file_}, std::runtime_error, "expected a zip file");
+  }
   testing::write_zip(file_, {{"a", std::string(1000, 'x')}});
   const std::string whole = testing::read_file(file_);
   testing::write_file(file_, whole.substr(0, whole.size() / 2));
-  EXPECT_THROW(ZipArchive{file_}, std::runtime_error);
+  EXPECT_THROWS(ZipArchive{file_}, std::runtime_error,
+                "expected a zip file, got \"Not a zip archive\"");
 }
 
 TEST_F(ZipArchiveTest, FindsDamageByTheChecksum) {
@@ -119,26 +119,15 @@ TEST_F(ZipArchiveTest, FindsDamageByTheChecksum) {
     whole[30 + 1 + 10] ^= 0x10;
     testing::write_file(file_, whole);
     const ZipArchive archive(file_);
-    EXPECT_THAT([&] { archive.read("a"); },
-                ThrowsMessage<std::runtime_error>(HasSubstr("(member a)")));
+    EXPECT_THROWS(archive.read("a"), std::runtime_error, "(member a)");
   }
-}
-
-TEST_F(ZipArchiveTest, ReadsNoMoreBytesThanAllowed) {
-  testing::write_zip(file_, {{"a", "12345"}, {"b", std::string(1000, 'x'), true}});
-  const ZipArchive archive(file_);
-  EXPECT_EQ(text(archive.read("a", 5)), "12345");
-  EXPECT_THAT([&] { archive.read("a", 4); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("at most 4 bytes")));
-  EXPECT_THROW(archive.read("b", 999), std::runtime_error);
 }
 
 TEST_F(ZipArchiveTest, RefusesADirectoryThatWouldFillTheMemory) {
   std::string signatures;
   for (int i = 0; i < 65537; ++i) signatures += "PK\1\2 and more than a block of 1 MiB of them";
   testing::write_file(file_, signatures);
-  EXPECT_THAT([&] { ZipArchive archive(file_); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("at most 65536 members")));
+  EXPECT_THROWS(ZipArchive archive(file_), std::runtime_error, "at most 65536 members");
   testing::write_zip(file_, {{"holds them", signatures.substr(0, 1000)}});
   EXPECT_EQ(ZipArchive(file_).names().size(), 1u);
 }
@@ -156,8 +145,7 @@ TEST_F(ZipArchiveTest, DoesNotTrustTheDeclaredSize) {
     }
     ASSERT_GE(changed, 2);
     testing::write_file(file_, whole);
-    EXPECT_THAT([&] { ZipArchive(file_).read("a"); },
-                ThrowsMessage<std::runtime_error>(HasSubstr("some.zip")));
+    EXPECT_THROWS(ZipArchive(file_).read("a"), std::runtime_error, "some.zip");
   }
 }
 
@@ -166,9 +154,9 @@ TEST_F(ZipArchiveTest, RefusesAMemberTwice) {
   std::string whole = testing::read_file(file_);
   std::ranges::replace(whole, 'x', 'a');  // libzip writes no name twice
   testing::write_file(file_, whole);
-  EXPECT_THAT([&] { ZipArchive{file_}; },
-              ThrowsMessage<std::runtime_error>("expected each member once, got one twice, in " +
-                                                file_.string() + " (member a)"));
+  EXPECT_THROWS(ZipArchive{file_}, std::runtime_error,
+                ::testing::Eq("expected each member once, got one twice, in " + file_.string() +
+                              " (member a)"));
 }
 
 TEST_F(ZipArchiveTest, ReadsPyTorchCheckpoint) {

@@ -55,26 +55,20 @@ Chart curve(const std::vector<double>& x, const std::vector<double>& y,
   return {"title", "across", "up", {{"", y, mark, x}}};
 }
 
-TEST(ChartSvg, BarsStandOnZeroUnderRoundTicks) {
-  const std::string svg = chart_svg(bars({3, 7}));
+TEST(ChartSvg, BarsStandOnZeroAndStackedOnesAddUp) {
+  std::string svg = chart_svg(bars({3, 7}));
   // 7 in five steps is 1.4, rounded up to 2: the axis ends at 8.
   EXPECT_THAT(y_ticks(svg), ElementsAre("0", "2", "4", "6", "8"));
   // The plot is 202 high and begins at 12.
   EXPECT_THAT(all(svg, "<rect [^>]* height=\"([0-9.]+)\""), ElementsAre("75.75", "176.75"));
   EXPECT_THAT(all(svg, "<rect [^>]* y=\"([0-9.]+)\""), ElementsAre("138.25", "37.25"));
-}
-
-TEST(ChartSvg, StackedBarsAddUp) {
   Chart chart = bars({1, 2});
   chart.series.push_back({"upper", {3, kNan}});
   chart.stacked = true;
-  const std::string svg = chart_svg(chart);
+  svg = chart_svg(chart);
   EXPECT_THAT(y_ticks(svg), ElementsAre("0", "1", "2", "3", "4"));
   EXPECT_THAT(all(svg, "<rect [^>]* y=\"([0-9.]+)\""), ElementsAre("163.50", "12.00", "113.00"));
-}
-
-TEST(ChartSvg, ALinesAxisHoldsItsValues) {
-  const std::string svg = chart_svg(curve({0, 50, 100}, {-3, 1, 7}));
+  svg = chart_svg(curve({0, 50, 100}, {-3, 1, 7}));
   EXPECT_THAT(y_ticks(svg), ElementsAre("-4", "-2", "0", "2", "4", "6", "8"));
   // Two letters beside the axis: it begins at 28 + 2 * 7.7 and ends 28 before 460.
   EXPECT_THAT(x_ticks(svg), ElementsAre("0", "50", "100"));

@@ -9,6 +9,7 @@
 #include "stages/base/hdf5/hdf5_output_file.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -58,8 +59,9 @@ TEST(Hdf5OutputFile, ManyThreadsWriteFilesAndReadThemBack) {
         EXPECT_EQ(read_dataset<std::string>(file, "texts", dims), texts);
         EXPECT_EQ(dims, Dims{3});
         EXPECT_EQ(read_dataset<std::vector<char>>(file, "bytes", dims), bytes);
-        EXPECT_THROW(read_dataset<float>(file, "texts", dims), Hdf5Error);
-        EXPECT_THROW(read_dataset<float>(file, "none", dims), Hdf5Error);
+        EXPECT_THROWS(read_dataset<float>(file, "texts", dims), Hdf5Error,
+                      "expected type float32 of texts, got another");
+        EXPECT_THROWS(read_dataset<float>(file, "none", dims), Hdf5Error, "cannot open none");
       }
     });
   }

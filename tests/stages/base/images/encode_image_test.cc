@@ -7,6 +7,7 @@
 
 #include "stages/base/images/image_file.h"
 #include "tests/stages/base/images/test_images.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -55,14 +56,16 @@ TEST(EncodeImage, NumbersAreColoursUnlessTheyAreTooMany) {
   const cv::Mat wide = read(many, cv::IMREAD_UNCHANGED);
   ASSERT_EQ(wide.type(), CV_16UC1);
   EXPECT_TRUE(std::equal(indices.begin(), indices.end(), wide.begin<std::uint16_t>()));
-  EXPECT_THROW(encode_index_png({0, 0}, {}), std::runtime_error);
+  EXPECT_THROWS(encode_index_png({0, 0}, {}), std::runtime_error, "cannot encode an image");
 }
 
 TEST(EncodeImage, RefusesWhatTheFormatsCannotHold) {
   const std::vector<std::uint8_t> row(3 * 65501);
-  EXPECT_THROW(encode_jpeg({{1, 65501}, row.data()}, 90), std::runtime_error);
-  EXPECT_THROW(encode_jpeg({{0, 0}, row.data()}, 90), std::runtime_error);
-  EXPECT_THROW(encode_png({{0, 0}, row.data()}), std::runtime_error);
+  EXPECT_THROWS(encode_jpeg({{1, 65501}, row.data()}, 90), std::runtime_error,
+                "cannot encode an image");
+  EXPECT_THROWS(encode_jpeg({{0, 0}, row.data()}, 90), std::runtime_error,
+                "cannot encode an image");
+  EXPECT_THROWS(encode_png({{0, 0}, row.data()}), std::runtime_error, "cannot encode an image");
 }
 
 }  // namespace

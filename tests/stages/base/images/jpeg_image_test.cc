@@ -12,6 +12,7 @@
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 // jpeglib.h needs <cstddef> and <cstdio> above it.
 // clang-format off
@@ -155,7 +156,8 @@ TEST(JpegImage, HugeAnnouncedSizeIsRefusedByName) {
   write_file(file, bytes);
   EXPECT_NE(why_jpeg_refused(file).find("60000x60000"), std::string::npos)
       << why_jpeg_refused(file);
-  EXPECT_THROW(with_open(file, jpeg_size), std::runtime_error);
+  EXPECT_THROWS(with_open(file, jpeg_size), std::runtime_error,
+                "a size of 60000x60000, not 1 to 67108864 pixels");
 }
 
 TEST(JpegImage, RealFramesEqualOpenCv) {

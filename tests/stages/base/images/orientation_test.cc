@@ -10,6 +10,7 @@
 #include "tests/stages/base/images/test_images.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -131,7 +132,8 @@ TEST_F(ImageOrientationTest, IsAppliedOrRefused) {
                     "expected an image that is not mirrored, got EXIF "
                     "orientation " +
                         std::to_string(orientation));
-          EXPECT_THROW(image_file_size(file, ImageOrientation::kUpright), std::runtime_error);
+          EXPECT_THROWS(image_file_size(file, ImageOrientation::kUpright), std::runtime_error,
+                        "expected an image that is not mirrored, got EXIF");
           continue;
         }
         const cv::Mat upright = turned_by_opencv(stored, orientation);
@@ -227,7 +229,8 @@ TEST_F(ImageOrientationTest, DamageIsNamed) {
   damaged[kPngHeader + 5] ^= 0x20;  // eXIf becomes exIf, which nobody knows
   write_file(file, damaged);
   EXPECT_EQ(why_not_upright(file), "expected a whole PNG, got a damaged chunk of metadata");
-  EXPECT_THROW(image_file_size(file, ImageOrientation::kUpright), std::runtime_error);
+  EXPECT_THROWS(image_file_size(file, ImageOrientation::kUpright), std::runtime_error,
+                "expected a whole PNG, got a damaged chunk of metadata");
   EXPECT_NO_THROW(decode_image_file(file));
   damaged = png;
   damaged.replace(kPngHeader, 4, "\x7f\xff\xff\xff");

@@ -14,6 +14,7 @@
 #include "tests/stages/base/images/test_images.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -96,8 +97,8 @@ TEST(ImagesOfSixteenBits, AreSpreadOverTheGivenRange) {
         // A file that ends early has no values.
         const std::string whole = read_file(file);
         write_file(file, whole.substr(0, whole.size() - whole.size() / 4));
-        EXPECT_THROW(decode_image_file(file, ImageOrientation::kStored, ValueRange{1000, 1500}),
-                     std::runtime_error)
+        EXPECT_THROWS(decode_image_file(file, ImageOrientation::kStored, ValueRange{1000, 1500}),
+                      std::runtime_error, "expected a whole")
             << ending << choice;
       }
     }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tests/stages/events/simulation/simulated_images.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -108,30 +109,28 @@ TEST(SimulatePlanes, TakesAnySizeAndTexture) {
 }
 
 TEST(SimulatePlanes, RefusesNoTextures) {
-  EXPECT_THROW(simulate_planes({}, {16, 16}, CounterRandom(1)), std::invalid_argument);
+  EXPECT_THROWS(simulate_planes({}, {16, 16}, CounterRandom(1)), std::invalid_argument,
+                "expected textures and a size, got 0 textures, 16x16");
 }
 
-TEST(SimulatePlaneScene, AStillSceneGivesNoEvents) {
-  const std::vector<GreyImage> textures = {textured_image({60, 80})};
+TEST(SimulatePlaneScene, StillScenesAndConstantTexturesGiveNoEvents) {
+  std::vector<GreyImage> textures = {textured_image({60, 80})};
   PlaneScene scene = plain_scene({30, 40}, 0, 0.1);
   scene.sensor.threshold_spread = 0.02;
   scene.level_spread = 1;
   scene.cutoff_hz = 100;
   scene.exposure = 0.5;
-  const SimulatedPair pair = simulate_plane_scene(scene, textures, CounterRandom(1));
+  SimulatedPair pair = simulate_plane_scene(scene, textures, CounterRandom(1));
   EXPECT_THAT(pair.events, IsEmpty());
   EXPECT_EQ(pair.previous, pair.next);
-}
-
-TEST(SimulatePlaneScene, AConstantTextureGivesNoEventsHoweverItMoves) {
-  const std::vector<GreyImage> textures = {constant_image({50, 50}, 120)};
-  PlaneScene scene = plain_scene({30, 40}, 17.3, 0.01);
+  textures = {constant_image({50, 50}, 120)};
+  scene = plain_scene({30, 40}, 17.3, 0.01);
   scene.planes.front().texture.mean_intensity = 0.25;  // 63.75 levels: no tie to round
   scene.planes.front().motion.linear = {0.1, -0.2, 0.2, 0.1};
   scene.planes.front().motion.perspective_per_px = {0.002, 0.001};
   scene.planes.front().motion.acceleration = 0.5;
   scene.cutoff_hz = 100;
-  const SimulatedPair pair = simulate_plane_scene(scene, textures, CounterRandom(1));
+  pair = simulate_plane_scene(scene, textures, CounterRandom(1));
   EXPECT_THAT(pair.events, IsEmpty());
   EXPECT_THAT(pair.next.pixels, Each(pair.next.pixels.front()));
 }
@@ -295,28 +294,30 @@ TEST(SimulatePlaneScene, APixelMayBeAboutToSignalAtFirst) {
 TEST(SimulatePlaneScene, RefusesWhatIsNoScene) {
   const std::vector<GreyImage> textures = {textured_image({20, 20})};
   const PlaneScene sound = plain_scene({8, 8}, 1, 0.2);
-  const auto refused = [&](const PlaneScene& scene, std::span<const GreyImage> images) {
-    EXPECT_THROW(simulate_plane_scene(scene, images, CounterRandom(1)), std::invalid_argument);
+  const auto refused = [&](const PlaneScene& scene, std::span<const GreyImage> images,
+                           const std::string& words) {
+    EXPECT_THROWS(simulate_plane_scene(scene, images, CounterRandom(1)), std::invalid_argument,
+                  words);
   };
-  refused(sound, {});
-  refused(sound, std::vector<GreyImage>{{{0, 0}, {}}});
-  refused(sound, std::vector<GreyImage>{{{2, 2}, {1, 2, 3}}});
+  refused(sound, {}, "expected a texture below 0, got 0");
+  refused(sound, std::vector<GreyImage>{{{0, 0}, {}}}, "as texture, got 0x0 with 0 pixels");
+  refused(sound, std::vector<GreyImage>{{{2, 2}, {1, 2, 3}}}, "as texture, got 2x2 with 3 pixels");
   PlaneScene scene = sound;
-  scene.planes.clear();
-  refused(scene, textures);
-  scene = sound;
   scene.planes.front().texture.image = 1;
-  refused(scene, textures);
+  refused(scene, textures, "expected a texture below 1, got 1");
+  scene = sound;
+  scene.planes.clear();
+  refused(scene, textures, "expected a scene with a background, got 8x8, 0 planes, 0.05");
   scene = sound;
   scene.planes.front().outline = {{0, 0}, {5, 0}, {5, 5}};
-  refused(scene, textures);
+  refused(scene, textures, "expected a scene with a background, got 8x8, 1 planes, 0.05");
   scene = sound;
   scene.size = {0, 8};
-  refused(scene, textures);
+  refused(scene, textures, "expected a scene with a background, got 8x0");
   for (const double duration_s : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
     scene = sound;
     scene.duration_s = duration_s;
-    refused(scene, textures);
+    refused(scene, textures, "1 planes, " + std::to_string(duration_s) + " s");
   }
 }
 

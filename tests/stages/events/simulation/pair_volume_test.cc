@@ -16,6 +16,7 @@
 #include "stages/events/simulation/sensor.h"
 #include "stages/events/simulation/simulate_pair.h"
 #include "tests/stages/events/simulation/simulated_images.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -166,33 +167,34 @@ INSTANTIATE_TEST_SUITE_P(Sensors, PairVolume, ::testing::ValuesIn(sensors()),
                            return name;
                          });
 
-TEST(PairVolume, IsTheSameOfAWholeFrame) {
+TEST(PairVolume, IsTheSameOfAWholeFrameAndNotOfNothing) {
   constexpr ImageSize kSize{260, 861};
   expect_same_pair(textured_image(kSize), textured_image(kSize, 4, 1), {}, 0.1, 9);
-}
-
-TEST(PairVolume, RefusesDurationsOfNothing) {
   const GreyImage image = textured_image({4, 4});
   for (const double duration_s : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
-    EXPECT_THROW(simulate_difference(image, image, {}, duration_s, CounterRandom(1)),
-                 std::invalid_argument);
-    EXPECT_THROW(simulate_affine(image, 3, {}, duration_s, CounterRandom(1)),
-                 std::invalid_argument);
+    EXPECT_THROWS(simulate_difference(image, image, {}, duration_s, CounterRandom(1)),
+                  std::invalid_argument, "expected a time after");
+    EXPECT_THROWS(simulate_affine(image, 3, {}, duration_s, CounterRandom(1)),
+                  std::invalid_argument, "expected a time after");
   }
-  EXPECT_THROW(simulate_affine(image, 0, {}, 1e308 * 10, CounterRandom(1)), std::invalid_argument);
+  EXPECT_THROWS(simulate_affine(image, 0, {}, 1e308 * 10, CounterRandom(1)), std::invalid_argument,
+                "expected a time after");
 }
 
 TEST(PixelEventVolume, RefusesEventsOutsideOrOutOfOrder) {
-  const VolumeShape shape{3, {4, 5}};
-  const auto refused = [&](std::vector<Event> events) {
-    EXPECT_THROW(pixel_volume(events, shape), std::invalid_argument);
-  };
-  refused({{.x = 5, .y = 0, .t_s = 0}});
-  refused({{.x = 0, .y = 0, .t_s = std::nan("")}});
-  refused({{.x = 0, .y = 1, .t_s = 0}, {.x = 0, .y = 0, .t_s = 1}});
-  refused({{.x = 1, .y = 1, .t_s = 0}, {.x = 0, .y = 1, .t_s = 1}});
-  refused({{.x = 1, .y = 1, .t_s = 1}, {.x = 1, .y = 1, .t_s = 0}});
-  refused({{.x = 1, .y = 1, .t_s = -1e308}, {.x = 1, .y = 1, .t_s = 1e308}});
+  const std::string time = "expected an event with a finite time inside 5x4 pixels, got ",
+                    order = "expected events pixel by pixel, each pixel's in time order, got ";
+  const std::pair<std::vector<Event>, std::string> cases[] = {
+      {{{.x = 5, .y = 0, .t_s = 0}}, time + "x=5 y=0"},
+      {{{.x = 0, .y = 0, .t_s = std::nan("")}}, time + "x=0 y=0 t=nan"},
+      {{{.x = 0, .y = 1, .t_s = 0}, {.x = 0, .y = 0, .t_s = 1}}, order + "x=0 y=0"},
+      {{{.x = 1, .y = 1, .t_s = 0}, {.x = 0, .y = 1, .t_s = 1}}, order + "x=0 y=1"},
+      {{{.x = 1, .y = 1, .t_s = 1}, {.x = 1, .y = 1, .t_s = 0}}, order + "x=1 y=1"},
+      {{{.x = 1, .y = 1, .t_s = -1e308}, {.x = 1, .y = 1, .t_s = 1e308}},
+       "expected times whose differences are finite"}};
+  for (const auto& [events, words] : cases) {
+    EXPECT_THROWS(pixel_volume(events, {3, {4, 5}}), std::invalid_argument, words);
+  }
 }
 
 TEST(PixelEventVolume, TakesTheEarliestAndTheLatestTimeOfAll) {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "tests/testing/texts.h"
+
 namespace eventgan {
 namespace {
 
@@ -70,8 +72,10 @@ TEST(DrawPlaneScene, OneSceneInTwentyIsAtRest) {
 }
 
 TEST(DrawPlaneScene, RefusesToDrawFromNothing) {
-  EXPECT_THROW(draw_plane_scene(0, kSceneSize, CounterRandom(1)), std::invalid_argument);
-  EXPECT_THROW(draw_plane_scene(1, {0, 5}, CounterRandom(1)), std::invalid_argument);
+  EXPECT_THROWS(draw_plane_scene(0, kSceneSize, CounterRandom(1)), std::invalid_argument,
+                "expected textures and a size, got 0 textures, 128x96");
+  EXPECT_THROWS(draw_plane_scene(1, {0, 5}, CounterRandom(1)), std::invalid_argument,
+                "expected textures and a size, got 1 textures, 5x0");
 }
 
 }  // namespace

@@ -43,20 +43,14 @@ TEST(PixelThresholds, AreGaussian) {
   EXPECT_NEAR(within(2), 0.9545, 4 * std::sqrt(0.9545 * 0.0455 / n));
 }
 
-TEST(PixelThresholds, AreTheMeanWithoutSpread) {
+TEST(PixelThresholds, AreTheMeanWithoutSpreadAndNeverBelowTheSmallest) {
   EXPECT_THAT(draw_thresholds(0.3, 0, 5, CounterRandom(1)), ::testing::Each(0.3f));
-}
-
-TEST(PixelThresholds, AreNeverBelowTheSmallest) {
   const std::vector<float> drawn = draw_thresholds(0.02, 1, kManyPixels, CounterRandom(7));
   EXPECT_EQ(*std::ranges::min_element(drawn), kSmallestThreshold);
   // Half of a Gaussian of spread 1 about 0.02 lies below 0.01, to within 0.01/sqrt(2 pi).
   const auto lowest = std::ranges::count(drawn, kSmallestThreshold);
   EXPECT_NEAR(static_cast<double>(lowest) / kManyPixels, 0.496,
               4 * 0.5 / std::sqrt(double{kManyPixels}));
-}
-
-TEST(PixelThresholds, DependOnTheSeedAlone) {
   EXPECT_EQ(draw_thresholds(0.2, 0.03, 50, CounterRandom(3)),
             draw_thresholds(0.2, 0.03, 50, CounterRandom(3)));
   EXPECT_NE(draw_thresholds(0.2, 0.03, 50, CounterRandom(3)),

@@ -14,6 +14,7 @@
 #include "stages/events/simulation/flow_interval.h"
 #include "stages/events/simulation/sensor.h"
 #include "tests/stages/events/simulation/simulated_images.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -24,14 +25,14 @@ using ::testing::SizeIs;
 using testing::texture;
 using testing::textured_image;
 
-TEST(LinearIntensity, IsTheGreyValueOver255) {
+TEST(LinearIntensity, IsTheGreyValueOver255OfAnImage) {
   EXPECT_THAT(linear_intensity({{1, 3}, {0, 51, 255}}), ::testing::ElementsAre(0.0f, 0.2f, 1.0f));
-}
-
-TEST(LinearIntensity, RefusesWhatIsNoImage) {
-  EXPECT_THROW(linear_intensity({}), std::invalid_argument);
-  EXPECT_THROW(linear_intensity({{0, 4}, {}}), std::invalid_argument);
-  EXPECT_THROW(linear_intensity({{2, 2}, {1, 2, 3}}), std::invalid_argument);
+  EXPECT_THROWS(linear_intensity({}), std::invalid_argument,
+                "expected an image, got 0x0 with 0 pixels");
+  EXPECT_THROWS(linear_intensity({{0, 4}, {}}), std::invalid_argument,
+                "expected an image, got 4x0 with 0 pixels");
+  EXPECT_THROWS(linear_intensity({{2, 2}, {1, 2, 3}}), std::invalid_argument,
+                "expected an image, got 2x2 with 3 pixels");
 }
 
 AffineMotion shift(double dx, double dy) { return {{1, 0, dx, 0, 1, dy}}; }
@@ -56,30 +57,22 @@ TEST(RandomAffineMotion, DiffersBySeedAndIsMoreThanATranslation) {
   EXPECT_NE(one.matrix, random_affine_motion({180, 320}, 6, CounterRandom(2)).matrix);
   EXPECT_NE(one.matrix[0], 1);
   EXPECT_NE(one.matrix[1], 0);
-}
-
-TEST(RandomAffineMotion, RefusesBadDisplacements) {
   for (const double bad : {-1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
-    EXPECT_THROW(random_affine_motion({8, 8}, bad, CounterRandom(1)), std::invalid_argument);
+    EXPECT_THROWS(random_affine_motion({8, 8}, bad, CounterRandom(1)), std::invalid_argument,
+                  "expected a displacement >= 0 px");
   }
 }
 
-TEST(RenderAffine, IsTheImageAtTheStart) {
-  const GreyImage image = textured_image({37, 53});
+TEST(RenderAffine, IsTheImageAtTheStartAndMovesTheWayOfTheMatrix) {
+  GreyImage image = textured_image({37, 53});
   const AffineMotion motion = random_affine_motion(image.size, 6, CounterRandom(1));
   EXPECT_EQ(render_affine(image, motion, 0), linear_intensity(image));
-}
-
-TEST(RenderAffine, MovesTheWayOfTheMatrix) {
-  const GreyImage image{{1, 5}, {10, 20, 30, 40, 50}};
+  image = GreyImage{{1, 5}, {10, 20, 30, 40, 50}};
   const std::vector<float> moved = render_affine(image, shift(2, 0), 1);
   // Right by two; mirrored about the first pixel at the left.
   EXPECT_EQ(moved, linear_intensity({{1, 5}, {30, 20, 10, 20, 30}}));
   const std::vector<float> halfway = render_affine(image, shift(3, 0), 0.5);
   EXPECT_NEAR(halfway[3] * 255, 25, 1e-4);  // bilinear between 20 and 30
-}
-
-TEST(RenderAffine, TakesAnImageOfOnePixel) {
   EXPECT_EQ(render_affine({{1, 1}, {51}}, shift(3, 2), 1), std::vector<float>{0.2f});
 }
 
@@ -210,11 +203,15 @@ TEST(FlowInterval, FlowIsTheShift) {
   EXPECT_LT(error, 0.2);
 }
 
-TEST(FlowInterval, StaysStillBetweenEqualFrames) {
+TEST(FlowInterval, StaysStillBetweenEqualFramesAndOneWithoutTextureFades) {
   const GreyImage image = textured_image(kPairSize);
   const FlowInterval interval(image, image);
   EXPECT_EQ(interval.steps(), 1);
   for (const float x : interval.flow().x_px) EXPECT_NEAR(x, 0, 0.01);
+  EXPECT_THROWS(FlowInterval(textured_image({9, 8}), textured_image({8, 9})), std::invalid_argument,
+                "expected two frames of one size");
+  EXPECT_THROWS(FlowInterval(GreyImage{}, GreyImage{}), std::invalid_argument,
+                "expected an image, got 0x0 with 0 pixels");
 }
 
 TEST(FlowInterval, ABrighteningImageWithoutTextureFades) {
@@ -249,11 +246,6 @@ TEST(FlowInterval, DoesNotDependOnTheNumberOfThreads) {
   EXPECT_EQ(image_at(1), image_at(3));
 }
 
-TEST(FlowInterval, RefusesFramesOfTwoSizesAndNone) {
-  EXPECT_THROW(FlowInterval(textured_image({9, 8}), textured_image({8, 9})), std::invalid_argument);
-  EXPECT_THROW(FlowInterval(GreyImage{}, GreyImage{}), std::invalid_argument);
-}
-
 TEST(SimulateInterval, AnAffinelyMovedEdgeFiresAlongItsWay) {
   // Bright (255) up to x = 7, dark (51) right of it, moved right by 4 px in 0.4 s: pixels 8..11
   // brighten one after the other, 0.1 s each, by ln(1.001/0.201) = 1.605: 5 events of 0.3.
@@ -276,8 +268,10 @@ TEST(SimulateInterval, AnAffinelyMovedEdgeFiresAlongItsWay) {
 
 TEST(SimulateInterval, RefusesADurationOfNothing) {
   const AffineInterval interval(textured_image({4, 4}), {});
-  EXPECT_THROW(simulate_interval(interval, {}, 0, CounterRandom(1)), std::invalid_argument);
-  EXPECT_THROW(simulate_interval(interval, {}, -1, CounterRandom(1)), std::invalid_argument);
+  EXPECT_THROWS(simulate_interval(interval, {}, 0, CounterRandom(1)), std::invalid_argument,
+                "expected a time after 0.000000 s, got 0.000000 s");
+  EXPECT_THROWS(simulate_interval(interval, {}, -1, CounterRandom(1)), std::invalid_argument,
+                "expected a time after 0.000000 s, got -1.000000 s");
 }
 
 TEST(FeedInterval, GoesOnWhereTheIntervalBeforeEnded) {
@@ -297,9 +291,10 @@ TEST(FeedInterval, GoesOnWhereTheIntervalBeforeEnded) {
   EXPECT_LE(events.back().t_s, 1.7);
 }
 
-TEST(SimulateAffine, AStillImageGivesNoEvents) {
+TEST(SimulateAffine, AStillImageGivesNoEventsAndOnePixelIsTaken) {
   EXPECT_THAT(simulate_affine(textured_image({30, 40}), 0, SensorSpec{}, 0.1, CounterRandom(1)),
               IsEmpty());
+  EXPECT_THAT(simulate_affine({{1, 1}, {9}}, 6, SensorSpec{}, 0.1, CounterRandom(1)), IsEmpty());
 }
 
 TEST(SimulateAffine, IsAFunctionOfTheSeed) {
@@ -310,11 +305,8 @@ TEST(SimulateAffine, IsAFunctionOfTheSeed) {
   EXPECT_THAT(events(1), ::testing::Not(IsEmpty()));
   EXPECT_EQ(events(1), events(1));
   EXPECT_NE(events(1), events(2));
-  EXPECT_THROW(simulate_affine(image, -1, {}, 0.1, CounterRandom(1)), std::invalid_argument);
-}
-
-TEST(SimulateAffine, TakesAnImageOfOnePixel) {
-  EXPECT_THAT(simulate_affine({{1, 1}, {9}}, 6, SensorSpec{}, 0.1, CounterRandom(1)), IsEmpty());
+  EXPECT_THROWS(simulate_affine(image, -1, {}, 0.1, CounterRandom(1)), std::invalid_argument,
+                "expected a displacement >= 0 px, got -0.783683");
 }
 
 TEST(SimulateDifference, GivesTheWholeThresholdsOfTheChange) {
@@ -333,8 +325,8 @@ TEST(SimulateDifference, GivesTheWholeThresholdsOfTheChange) {
 }
 
 TEST(SimulateDifference, RefusesFramesOfTwoSizes) {
-  EXPECT_THROW(simulate_difference({{2, 1}, {1, 2}}, {{1, 2}, {1, 2}}, {}, 1, CounterRandom(1)),
-               std::invalid_argument);
+  EXPECT_THROWS(simulate_difference({{2, 1}, {1, 2}}, {{1, 2}, {1, 2}}, {}, 1, CounterRandom(1)),
+                std::invalid_argument, "expected frames of one size");
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 // What a view holds is looked at with stock h5py, in view_h5py_test.py.
 
@@ -36,12 +37,18 @@ ViewShard shard(const std::string& split, const std::string& name, std::vector<s
   return result;
 }
 
-TEST(ViewLayout, NoShards) {
-  const ViewLayout layout = lay_out_view({});
+TEST(ViewLayout, OfNoShardsAndOfRowsBeyond32Bits) {
+  ViewLayout layout = lay_out_view({});
   EXPECT_THAT(layout.shards, IsEmpty());
   EXPECT_THAT(layout.splits, IsEmpty());
   EXPECT_THAT(layout.box_offsets, ElementsAre(0));
   EXPECT_EQ(layout.sample_count(), 0);
+  const std::int32_t most = 2147483647;
+  layout = lay_out_view({shard("a", "0", {most, most, most}, {0, 0, 0})});
+  EXPECT_EQ(layout.box_offsets.back(), 3LL * most);
+  ViewShard second = shard("a", "1", {0, 0, 0}, {0, 0, 0});
+  second.record.quarantined = {{0, "x", ""}, {2, "y", ""}};
+  EXPECT_THAT(lay_out_view({shard("a", "0", {0}, {0}), second}).valid, ElementsAre(1, 0, 1, 0));
 }
 
 TEST(ViewLayout, SplitsAreWholeRangesInTheOrderOfTheirFirstShard) {
@@ -68,18 +75,6 @@ TEST(ViewLayout, OffsetsRunThroughAllShards) {
   EXPECT_EQ(layout.shards[1].persons, (RowRange{1, 4}));
   EXPECT_EQ(layout.shards[2].boxes, (RowRange{3, 3}));
   EXPECT_EQ(layout.shards[2].persons, (RowRange{5, 0}));
-}
-
-TEST(ViewLayout, RowsBeyond32Bits) {
-  const std::int32_t most = 2147483647;
-  const ViewLayout layout = lay_out_view({shard("a", "0", {most, most, most}, {0, 0, 0})});
-  EXPECT_EQ(layout.box_offsets.back(), 3LL * most);
-}
-
-TEST(ViewLayout, QuarantinedSamplesAreNotValid) {
-  ViewShard second = shard("a", "1", {0, 0, 0}, {0, 0, 0});
-  second.record.quarantined = {{0, "x", ""}, {2, "y", ""}};
-  EXPECT_THAT(lay_out_view({shard("a", "0", {0}, {0}), second}).valid, ElementsAre(1, 0, 1, 0));
 }
 
 TEST(ViewLayout, CommitRecordsThatContradictThemselvesAreRefused) {
@@ -150,15 +145,12 @@ TEST(DatasetViewFile, AFullDiskLeavesTheOldView) {
   EXPECT_EQ(read_file(folder / "dataset.h5"), before);
 }
 
-TEST(DatasetViewFile, AFolderThatIsNotThereIsNamed) {
+TEST(DatasetViewFile, AFolderThatIsNotThereIsNamedAndNoViewsAreACallersMistake) {
   const TemporaryFolder folder;
-  EXPECT_THAT([&] { write_dataset_view(folder / "no/dataset.h5", {view_of_nothing(1)}); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("/no/.dataset.h5")));
-}
-
-TEST(DatasetViewFile, NoViewsAreACallersMistake) {
-  const TemporaryFolder folder;
-  EXPECT_THROW(write_dataset_view(folder / "dataset.h5", {}), std::invalid_argument);
+  EXPECT_THROWS(write_dataset_view(folder / "no/dataset.h5", {view_of_nothing(1)}),
+                std::runtime_error, "/no/.dataset.h5");
+  EXPECT_THROWS(write_dataset_view(folder / "dataset.h5", {}), std::invalid_argument,
+                "expected at least one view, got none");
 }
 
 }  // namespace
