@@ -48,11 +48,12 @@ extern const LabelReader kMotReader;
 /// of these (FrameNames), which a note tells. Of a video's frame it is "STEM/NUMBER", perhaps with
 /// an extension, counted from 0. The label_key is the image's id, its place is "FILE#images/ID".
 ///
-/// Classes are numbered by ascending category id. `iscrowd` and `ignore` become Box::ignore. An annotation with
-/// keypoints is a Box, and a Person with it if a joint is annotated; `bbox`, `segmentation` (the
-/// outline) and `keypoints` are all measured from the image's left and upper edge, as exports have
-/// them, so that a joint lies half a pixel less in Joint::at. Annotation::original is {"image":
-/// ENTRY, "annotations": [ENTRY, ...]}, each entry byte for byte as in the file.
+/// Classes are numbered by ascending category id. `iscrowd` and `ignore` become Box::ignore. An
+/// annotation with keypoints is a Box, and a Person with it if a joint is annotated; `bbox`,
+/// `segmentation` (the outline) and `keypoints` are all measured from the image's left and upper
+/// edge, as exports have them, so that a joint lies half a pixel less in Joint::at.
+/// Annotation::original is {"image": ENTRY, "annotations": [ENTRY, ...]}, each entry byte for byte
+/// as in the file.
 ///
 /// PoseTrack's images with `is_labeled` false and no annotation have no label; the regions that it
 /// ignores are boxes to ignore, and `bbox_head` is Person::head_box.
