@@ -90,7 +90,8 @@ TEST(BeyondLimits, CountAndFractionBothBindAndThePolicyFailAllowsNone) {
   EXPECT_TRUE(beyond_limits(none, 1, 10));
   EXPECT_EQ(limits_text({ErrorPolicy::kQuarantine, 3, 0.25}, 8),
             "at most 2 quarantined pairs (errors in the manifest)");
-  EXPECT_EQ(limits_text(none, 8), "no quarantined pair (errors.policy in the manifest is \"fail\")");
+  EXPECT_EQ(limits_text(none, 8),
+            "no quarantined pair (errors.policy in the manifest is \"fail\")");
 }
 
 TEST(BeyondLimits, OfFewSamplesOneMayFail) {

@@ -82,8 +82,9 @@ TEST_F(ZipArchiveTest, TooManyOpenFilesAreNoFaultOfTheFile) {
     if (count == kNeeded) {
       EXPECT_NO_THROW(open());
     } else {
-      EXPECT_THAT(open, ThrowsMessage<LimitReached>(
-                            AllOf(HasSubstr("some.zip: Too many open files"), HasSubstr("ulimit"))))
+      EXPECT_THAT(open, ::testing::ThrowsMessage<LimitReached>(
+                            ::testing::AllOf(::testing::HasSubstr("some.zip: Too many open files"),
+                                             ::testing::HasSubstr("ulimit"))))
           << count;
     }
   }
