@@ -160,10 +160,10 @@ struct PreviewReader::State {
     }
     const LabelledFrame* const labelled = labelled_frame(sample);
     if (labelled == nullptr) return sample.annotation.boxes;
-    Outcome<Annotation> own = labels().annotation(labelled->label_key);
+    const Outcome<Annotation> own = labels().annotation(labelled->label_key);
     const bool is_same = !is_fault(own) && own->original == sample.annotation.original &&
                          own->boxes.size() == sample.annotation.boxes.size();
-    return is_same ? std::move(own->boxes) : sample.annotation.boxes;
+    return is_same ? own->boxes : sample.annotation.boxes;
   } catch (const std::runtime_error&) {  // labels can have been taken elsewhere
     return sample.annotation.boxes;
   }
