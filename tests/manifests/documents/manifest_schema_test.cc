@@ -151,6 +151,13 @@ bool is_kept_otherwise(const std::string& pointer) {
   return false;
 }
 
+/// What an object may hold that can also be a word.
+const json& object_of(const json& schema) {
+  return schema.contains("anyOf") && schema.at("anyOf").back().contains("properties")
+             ? schema.at("anyOf").back()
+             : schema;
+}
+
 /// Each value that was written is the one that was given, or else the default that the schema says.
 void expect_given_or_default(const json& schema, const json& given, const json& written) {
   for (const auto& [key, value] : written.items()) {
@@ -159,7 +166,7 @@ void expect_given_or_default(const json& schema, const json& given, const json& 
     const bool has_default = !given.contains(key) && property.contains("default");
     if (is_kept_otherwise("/" + key)) continue;
     if (value.is_object() && !has_default) {
-      expect_given_or_default(property, given.value(key, json::object()), value);
+      expect_given_or_default(object_of(property), given.value(key, json::object()), value);
     } else if (has_objects) {
       for (std::size_t i = 0; i < value.size(); ++i) {
         expect_given_or_default(property.at("items"), given.at(key).at(i), value.at(i));
@@ -183,8 +190,9 @@ void add_schema_keys(const json& schema, const std::string& place, std::set<std:
   const json properties = schema.value("properties", json::object());
   for (const auto& [key, property] : properties.items()) {
     keys.insert(place + "/" + key);
-    if (key == "validation") continue;  // the table of recordings
-    add_schema_keys(property.value("items", property), place + "/" + key, keys);
+    // The table of recordings, and a sensor's document.
+    if (key == "validation" || is_kept_otherwise(place + "/" + key)) continue;
+    add_schema_keys(property.value("items", object_of(property)), place + "/" + key, keys);
   }
 }
 
