@@ -654,7 +654,7 @@ class WithoutFrames(program.InFolder):
         self.assertIn("expected 640x480, as when the job began",
                       run("convert", self.folder / "camera.dat", "--output", out, "--sensor", "1280x720",
                           expect=64)[1])
-        self.assertIn("expected a recording, got a manifest",
+        self.assertIn("expected a folder, video or recording, got a manifest",
                       run("convert", manifest, "--sensor", "640x480", expect=64)[1])
 
     def test_a_davis_recording_is_its_conversion(self):

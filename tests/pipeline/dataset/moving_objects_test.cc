@@ -64,7 +64,8 @@ class MovingObjects : public ::testing::Test {
             pairs + R"(}}],
             "image": {"width": 32, "height": 24, "fit": "letterbox", "preset": "demo"},
             "generator": {"kind": ")" +
-            std::string(generator_) + R"("}, "output": {"directory": "out"}})",
+            std::string(generator_) +
+            R"("}, "output": {"directory": "out", "samples_per_shard": 64}})",
         folder_.path(), "manifest.json");
     std::filesystem::remove_all(folder_ / "out");
     ConversionOptions options;

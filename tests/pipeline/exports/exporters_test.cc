@@ -43,7 +43,7 @@ constexpr char kManifest[] = R"({
   "format": "eventgan-manifest", "version": 1, "name": "demo",
   "sources": [{"dataset": "kitti_object", "root": "kitti",
                "pairs": {"gaps": [2], "side": "before", "choose": "one"}}],
-  "image": {"preset": "kitti"}, "generator": {"weights": "untrained:2"},
+  "image": {"width": 8, "height": 6, "preset": "kitti"}, "generator": {"weights": "untrained:2"},
   "output": {"directory": "out", "samples_per_shard": 5}})";
 constexpr std::size_t kChannels = 4;
 constexpr std::size_t kPixels = 6 * 8;
@@ -335,7 +335,8 @@ class RecordingExporters : public Exporters, public ::testing::WithParamInterfac
 
 TEST_P(RecordingExporters, HaveTheBoxOfTheSequenceAndItsEvents) {
   const RecordingCase& format = GetParam();
-  // Frames are read at their own size, by the manifest, and no still, which would be moved again.
+  // Frames are scaled to the volume, as the manifest says, and no still, which would be moved
+  // again.
   testing::ConvertedFolder converted(0);
   for (int shard = 0; shard < 4; ++shard) {
     converted.add(shard, [](testing::ExampleShard& example) {
@@ -353,7 +354,7 @@ TEST_P(RecordingExporters, HaveTheBoxOfTheSequenceAndItsEvents) {
   for (const char* image :
        {"prev_2/000000_02", "image_2/000000", "prev_2/000001_02", "image_2/000001",
         "prev_2/000003_02", "image_2/000003", "prev_2/000004_02", "image_2/000004"}) {
-    testing::write_flat_image(options.frames / "kitti" / (std::string(image) + ".png"), {6, 8},
+    testing::write_flat_image(options.frames / "kitti" / (std::string(image) + ".png"), {12, 16},
                               100);
   }
   const std::filesystem::path out = exported(format.word, options, converted);
