@@ -43,7 +43,7 @@ constexpr char kManifest[] = R"({
   "format": "eventgan-manifest", "version": 1, "name": "demo",
   "sources": [{"dataset": "kitti_object", "root": "kitti",
                "pairs": {"gaps": [2], "side": "before", "choose": "one"}}],
-  "image": {"width": 8, "height": 6, "preset": "kitti"}, "generator": {"weights": "untrained:2"},
+  "image": {"preset": "kitti"}, "generator": {"weights": "untrained:2"},
   "output": {"directory": "out", "samples_per_shard": 5}})";
 constexpr std::size_t kChannels = 4;
 constexpr std::size_t kPixels = 6 * 8;
@@ -342,6 +342,8 @@ TEST_P(RecordingExporters, HaveTheBoxOfTheSequenceAndItsEvents) {
     converted.add(shard, [](testing::ExampleShard& example) {
       example.header.manifest_text = kManifest;
       for (ShardSample& sample : example.samples) {
+        sample.source_size = {6, 8};
+        sample.pair.previous.video_frame = sample.pair.next.video_frame = FrameRef().video_frame;
         if (!sample.pair.motion) continue;
         sample.pair.motion.reset();
         sample.pair.previous.path = "kitti/prev_2/000004_02.png";
@@ -354,7 +356,7 @@ TEST_P(RecordingExporters, HaveTheBoxOfTheSequenceAndItsEvents) {
   for (const char* image :
        {"prev_2/000000_02", "image_2/000000", "prev_2/000001_02", "image_2/000001",
         "prev_2/000003_02", "image_2/000003", "prev_2/000004_02", "image_2/000004"}) {
-    testing::write_flat_image(options.frames / "kitti" / (std::string(image) + ".png"), {12, 16},
+    testing::write_flat_image(options.frames / "kitti" / (std::string(image) + ".png"), {6, 8},
                               100);
   }
   const std::filesystem::path out = exported(format.word, options, converted);
