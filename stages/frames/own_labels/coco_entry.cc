@@ -302,10 +302,12 @@ void add_ignored_regions(const CocoImage& entry, ImageSize image, const CocoInde
       index.categories, [](const auto& category) { return !category.keypoints.empty(); });
   const auto of = with_joints == index.categories.end() ? index.categories.begin() : with_joints;
   for (const std::vector<Point>& corners : entry.ignored) {
-    Box box{.class_id = static_cast<int>(of - index.categories.begin()), .ignore = true};
-    box.outline = outline_of_parts({corners});
-    box.xyxy = bounds(box.outline);
-    add_box(box, image, place, annotation);
+    Outline outline = outline_of_parts({corners});
+    add_box({.class_id = static_cast<int>(of - index.categories.begin()),
+             .xyxy = bounds(outline),
+             .ignore = true,
+             .outline = std::move(outline)},
+            image, place, annotation);
   }
 }
 
