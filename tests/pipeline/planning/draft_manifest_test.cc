@@ -110,7 +110,9 @@ TEST_F(DraftManifest, OfPhotographsIsForTheCameraThatIsWanted) {
     const JobManifest job = read(draft({photos}, {one.camera, {"dog"}}));
     EXPECT_EQ(job.sources[0].pairs.stills.value().rests, one.rests);
     EXPECT_EQ(job.generator.kind, one.kind);
-    if (one.kind == GeneratorKind::kNetwork) EXPECT_EQ(job.generator.weights, "shipped:16");
+    if (one.kind == GeneratorKind::kNetwork) {
+      EXPECT_EQ(job.generator.weights, "shipped:16");
+    }
     EXPECT_THAT(job.sources[0].classes, ElementsAre("dog"));
   }
   EXPECT_THAT(

@@ -214,7 +214,9 @@ TEST(FitSensor, FindsTheThresholdOfACameraThatKeepsItsLevels) {
     EXPECT_LT(*fit.difference_anew, 0.85 * threshold);  // pairs alone lack what came before
     const auto told = fit.sensor("n", "").threshold;    // for convert, whose pairs begin anew
     ASSERT_EQ(told.has_value(), fit.is_better("difference").value());
-    if (told) EXPECT_NEAR(told->range[0], *fit.difference_anew, 5e-3 * threshold);
+    if (told) {
+      EXPECT_NEAR(told->range[0], *fit.difference_anew, 5e-3 * threshold);
+    }
   }
 }
 

@@ -161,7 +161,7 @@ TEST(StopSignal, CountsFromTheFirstAndLeavesSignalsAsTheyWere) {
   EXPECT_GE(signal.seconds_since_request(), first_s);
   std::array<struct sigaction, 3> before{};
   for (std::size_t i = 0; i < kSignals.size(); ++i) before[i] = action_of(kSignals[i]);
-  { const StopSignal signal; }
+  { const StopSignal second; }
   for (std::size_t i = 0; i < kSignals.size(); ++i) {
     EXPECT_EQ(action_of(kSignals[i]).sa_handler, before[i].sa_handler);
   }

@@ -277,11 +277,11 @@ TEST(RealismScores, EmptyVolumesMatchEachOtherAndMissAllEvents) {
   Voxels real({1, {2, 2}});
   real.at(0, 0, 0) = 1;
   for (const bool ours_empty : {true, false}) {
-    const RealismScores scores = ours_empty ? scores_of(empty.values, real.values, real.shape)
+    const RealismScores missed = ours_empty ? scores_of(empty.values, real.values, real.shape)
                                             : scores_of(real.values, empty.values, real.shape);
-    EXPECT_EQ(scores.f1_raw, 0);
-    EXPECT_EQ(scores.f1_time_polarity, 0);
-    EXPECT_DOUBLE_EQ(scores.pool_mse_2, 1.0 / 16 / 2);
+    EXPECT_EQ(missed.f1_raw, 0);
+    EXPECT_EQ(missed.f1_time_polarity, 0);
+    EXPECT_DOUBLE_EQ(missed.pool_mse_2, 1.0 / 16 / 2);
   }
 }
 
