@@ -142,7 +142,7 @@ class Packages(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-"))
         cls.addClassCleanup(shutil.rmtree, cls.folder)
-        run("cpack", "-B", cls.folder, "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=gzip", cwd=BUILD, umask=0o022)
+        run("cpack", "-B", cls.folder, "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=zstd", cwd=BUILD, umask=0o022)
         cls.files = {path.name.split("_")[0]: path for path in cls.folder.glob("*.deb")}
 
     def test_everybody_may_read_what_they_hold(self):
