@@ -127,13 +127,13 @@ def loaded_packages(executable):
     names = re.findall(r"NEEDED.*\[(.+)\]", run("readelf", "--dynamic", executable))
     paths = dict(re.findall(r"(?m)^\s*(\S+) => (/\S+)", run("ldd", executable)))
     assert len(paths) > 10
-    packages = set()
-    for path in (paths[name] for name in names if name in paths):  # the loader has no arrow
-        # Where /lib is a link to /usr/lib, dpkg may know either name. It does not know links of alternatives.
-        found = subprocess.run(["dpkg-query", "--search", path, "/usr" + path, os.path.realpath(path)],
-                               capture_output=True, text=True)
-        packages.update(re.findall(r"(?m)^([^:\n]+)(?::\w+)?: /", found.stdout)[:1] or [f"the package of {path}"])
-    return packages
+    # Where /lib is a link to /usr/lib, dpkg may know either name. It does not know links of alternatives.
+    places = [(path, "/usr" + path, os.path.realpath(path))
+              for path in (paths[name] for name in names if name in paths)]  # the loader has no arrow
+    found = subprocess.run(["dpkg-query", "--search", *sum(places, ())], capture_output=True, text=True).stdout
+    package_of = {path: package for package, path in re.findall(r"(?m)^([^:\n]+)(?::\w+)?: (/.+)$", found)}
+    return {next((package_of[path] for path in own if path in package_of), f"the package of {own[0]}")
+            for own in places}
 
 
 @unittest.skipUnless(shutil.which("dpkg-shlibdeps"), "no dpkg-dev")
@@ -142,7 +142,7 @@ class Packages(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-"))
         cls.addClassCleanup(shutil.rmtree, cls.folder)
-        run("cpack", "-B", cls.folder, "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=gzip", cwd=BUILD, umask=0o022)
+        run("cpack", "-B", cls.folder, "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=zstd", cwd=BUILD, umask=0o022)
         cls.files = {path.name.split("_")[0]: path for path in cls.folder.glob("*.deb")}
 
     def test_everybody_may_read_what_they_hold(self):

@@ -18,7 +18,9 @@ import program
 from camera_files import (BBOX, DHP19_JOINTS, DHP19_MATRICES, HEIGHT, WIDTH, random_events, volume_of,
                           whole_microseconds, write_columns, write_dat, write_dhp19, write_event_utils, write_mvsec,
                           write_v2e)
+from folders import quarantined
 from program import PACKAGE, SHARED, run, shard_bytes, text
+from small_job import LENIENT
 
 sys.path.insert(0, str(PACKAGE))
 
@@ -188,16 +190,14 @@ class Recordings(program.InFolder):
         np.testing.assert_allclose(sample["xyxy"][0], [2 * 21 / 32 + 9, 2, 12 * 21 / 32 + 9, 13 * 16 / 24])
 
     def test_a_corrupt_window_is_quarantined_and_mended_by_retry(self):
-        lenient = {"errors": {"policy": "quarantine", "max_count": 9, "max_fraction": 1}}
         index = int(np.searchsorted(self.events[:, 2], 10.08))
         with h5py.File(self.folder / "drive.hdf5", "r+") as file:
             file["davis/left/events"][index, 0] = WIDTH
         # outside, in place and time
         labels = LABELS.replace("10.170000,5,5,20,20", "10.170000,50,5,60,20") + "99,1,1,2,2,car,easy\n"
         (self.folder / "drive.csv").write_text(labels)
-        run("convert", self.manifest(**lenient))
-        reasons = {entry["sample_id"]: entry["reason"] for path in self.out.glob("job-*.json")
-                   for entry in json.loads(path.read_text())["quarantined"]}
+        run("convert", self.manifest(errors=LENIENT))
+        reasons = quarantined(self.out)
         self.assertEqual(set(reasons), {f"drive/00000000{time}" for time in ("10.100000", "10.170000", "99.000000")})
         self.assertIn(f"(event {index})", reasons["drive/0000000010.100000"])
         self.assertIn("drive.csv (10.170000 s)", reasons["drive/0000000010.170000"])
@@ -242,13 +242,6 @@ class Recordings(program.InFolder):
         self.assertIn('data-key="source.0.empty" data-value="8"', page)
         self.assertIn("all 8 volumes of", page)
 
-    def test_names_of_classes_with_control_characters_are_refused(self):
-        # In a shard both would be "ca".
-        (self.folder / "drive.csv").write_text(HEADER + "10.1,1,2,3,4,ca\0r,\n10.17,1,2,3,4,ca\0t,\n")
-        error = run("convert", self.manifest(), expect=66)[1]
-        self.assertIn(f'got "ca\\u0000r", in {self.folder / "drive.csv"} (line 2)', error)
-        self.assertIn('got "ca\\u0000t"', error)
-
     def test_without_labels_each_frame_is_a_sample_and_a_limit_makes_a_trial(self):
         (self.folder / "drive.csv").unlink()
         manifest = self.manifest()
@@ -258,16 +251,6 @@ class Recordings(program.InFolder):
         self.assertEqual(list(trial), [f"drive/00000000{time:.6f}" for time in FRAMES[1:4]])
 
     def test_what_does_not_go_together_is_one_line(self):
-        frames = {"dataset": "frames", "root": "clip", "pairs": program.pairs([1])}
-        for manifest, expected in [(events_manifest(frames), 'since generator.kind is "events"'),
-                                   (events_manifest({"dataset": "recording", "root": "drive.hdf5"},
-                                                    generator={"kind": "difference"}),
-                                    'since generator.kind is not "events"'),
-                                   (events_manifest({"dataset": "recording", "root": "drive.hdf5",
-                                                     "pairs": program.pairs([1])}),
-                                    'pairs: expected no such key for dataset "recording"'),
-                                   (events_manifest({"dataset": "recordings", "root": "drive.hdf5"}), '"recording"')]:
-            self.assertIn(expected, run("plan", self.write_manifest(manifest), expect=64)[1])
         for command in ("tradeoff", "calibrate"):
             error = run(command, self.manifest(), expect=64)[1]
             self.assertIn('got "events"', error)
@@ -329,43 +312,6 @@ class WithoutFrames(program.InFolder):
         self.assertEqual(len(list((self.folder / "images").iterdir())), 7)
         run("report", self.out)
 
-    def test_dsec_rectified(self):
-        write_columns(self.folder / "seq/events/left/events.h5", self.events, offset=0)
-        x, y = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
-        places = np.stack([x * 1.1 - 2.3, y * 0.9 + 0.7], -1).astype(np.float32)
-        with h5py.File(self.folder / "seq/events/left/rectify_map.h5", "w") as file:
-            file["rectify_map"] = places
-        told = self.convert("seq", sensor=self.SENSOR, rectify=True)[0]
-        moved = np.floor(places + 0.5)[self.events[:, 1].astype(int), self.events[:, 0].astype(int)]
-        inside = (moved >= 0).all(1) & (moved[:, 0] < WIDTH) & (moved[:, 1] < HEIGHT)
-        self.assertGreater((~inside).sum(), 100)
-        outside = (np.floor(places + 0.5) < 0).any(-1) | (np.floor(places[..., 0] + 0.5) >= WIDTH)
-        self.assertIn(f"events of {outside.sum()} of {WIDTH * HEIGHT} pixels leave the image", told)
-        begin = self.events[0, 2] - 2.5e-7
-        for k, sample in enumerate(rows(self.out).values()):
-            chosen = inside & (self.events[:, 2] > begin + 0.05 * k) & (self.events[:, 2] <= begin + 0.05 * (k + 1))
-            window = np.c_[moved[chosen], self.events[chosen, 2:]]
-            np.testing.assert_allclose(sample["volume"], volume_of(window), rtol=0, atol=1e-4)
-
-    def test_dsec_with_images_of_its_view(self):
-        write_columns(self.folder / "seq/events/left/events.h5", self.events, offset=0)
-        times = [20.0 + 0.1 * k for k in range(4)]
-        images = self.folder / "seq/images/left/distorted"
-        images.mkdir(parents=True)
-        for k in range(4):
-            cv2.imwrite(str(images / f"{k:06}.png"), np.full((HEIGHT, WIDTH), 60 * k, np.uint8))
-        (self.folder / "seq/images/timestamps.txt").write_text("".join(f"{round(t * 1e6)}\n" for t in times))
-        manifest = self.write_manifest(events_manifest({"dataset": "recording", "root": "seq", "sensor": self.SENSOR}))
-        run("convert", manifest)
-        samples = rows(self.out)
-        self.assertEqual(list(samples), [f"seq/00000000{time:.6f}" for time in times[1:]])
-        for sample, begin, end in zip(samples.values(), times, times[1:]):
-            window = self.events[(self.events[:, 2] > begin) & (self.events[:, 2] <= end)]
-            np.testing.assert_allclose(sample["volume"], volume_of(window), rtol=0, atol=1e-4)
-        self.assertEqual(run("preview", self.out, "--out", self.folder / "images")[1], "")
-        (self.folder / "seq/images/timestamps.txt").write_text("".join(f"{round(t * 1e6) + 1}\n" for t in times))
-        self.assertIn("annotations", run("convert", manifest, expect=64)[1])  # another clock is another job
-
     def test_blosc(self):
         plugins = [path.parent for path in pathlib.Path("/usr/lib").glob("*/hdf5/serial/plugins/libH5Zblosc.so")]
         if not plugins:
@@ -411,26 +357,15 @@ class WithoutFrames(program.InFolder):
         self.convert("m3ed.h5")
         self.check_windows(whole_microseconds(events)[0])
 
-    def test_tables(self):
-        columns = {"t_us": self.ticks, "x": self.events[:, 0].astype(np.uint16),
-                   "y": self.events[:, 1].astype(np.uint16), "p": (self.events[:, 3] > 0).astype(np.uint8)}
-        structured = np.zeros(len(self.ticks), [(name, values.dtype) for name, values in columns.items()])
-        for name, values in columns.items():
-            structured[name] = values
-        np.save(self.folder / "a.npy", structured)
-        np.savez(self.folder / "b.npz", **columns)
-        np.savez_compressed(self.folder / "c.npz", **columns)
-        np.savetxt(self.folder / "d.csv", np.stack(list(columns.values()), 1), fmt="%d", delimiter=",",
-                   header=",".join(columns), comments="")
-        for name in ("a.npy", "b.npz", "c.npz", "d.csv"):
-            self.convert(name, sensor=self.SENSOR, columns={"t": "t_us"})
-            self.check_windows(self.events)
-        np.save(self.folder / "e.npy", np.stack([self.ticks / 1e6, *list(columns.values())[1:]], 1))
-        self.convert("e.npy", sensor=self.SENSOR, columns={"unit": "s"})
+    def test_a_table(self):
+        np.savez_compressed(self.folder / "a.npz", t_us=self.ticks, x=self.events[:, 0].astype(np.uint16),
+                            y=self.events[:, 1].astype(np.uint16), p=(self.events[:, 3] > 0).astype(np.uint8))
+        source = {"root": "a.npz", "columns": {"t": "t_us"}}
+        self.convert(sensor=self.SENSOR, **source)
         self.check_windows(self.events)
-        self.assertIn("expected the sensor's size", self.convert("e.npy", expect=66)[1])
+        self.assertIn("expected the sensor's size", self.refused({**source, "window_s": 0.05}))
         self.assertIn("expected window_s, or labels, since the recording has no frames",
-                      self.refused({"root": "e.npy", "sensor": self.SENSOR}))
+                      self.refused({**source, "sensor": self.SENSOR}))
 
     def refused(self, source):
         return run("plan", self.write_manifest(events_manifest({"dataset": "recording", **source})), expect=66)[1]
@@ -477,19 +412,6 @@ class WithoutFrames(program.InFolder):
         self.assertIn("drive_bbox.npy (row 1)", error)
         self.assertIn("expected a class of label_map_dictionary.json, got class_id 7", error)
 
-    def test_damage_is_named(self):
-        file = self.folder / "seq/events/left/events.h5"
-        write_columns(file, self.events, offset=0)
-        with h5py.File(file, "a") as h5:
-            h5["events/x"][1234] = WIDTH
-        lenient = {"errors": {"policy": "quarantine", "max_count": 9, "max_fraction": 1}}
-        source = {"dataset": "recording", "root": "seq", "sensor": self.SENSOR, "window_s": 0.05}
-        self.assertIn("1 quarantined", run("convert", self.write_manifest(events_manifest(source, **lenient)))[0])
-        self.assertIn("(event 1234)", "".join(path.read_text() for path in self.out.glob("job-*.json")))
-        with h5py.File(file, "a") as h5:
-            h5["ms_to_idx"][...] = h5["ms_to_idx"][...] + 1
-        self.assertIn("dataset ms_to_idx", self.refused({"root": "seq", "sensor": self.SENSOR, "window_s": 0.05}))
-
     def test_what_needs_frames_says_so(self):
         write_columns(self.folder / "seq/events/left/events.h5", self.events, offset=0)
         expected = "expected a recording with frames, got one without"
@@ -507,33 +429,17 @@ class WithoutFrames(program.InFolder):
         write_v2e(self.folder / "v2e.h5", self.events)
         self.convert("v2e.h5", sensor=self.SENSOR)
         self.check_windows(self.events)
-        self.assertIn("expected the sensor's size", self.refused({"root": "v2e.h5", "window_s": 0.05}))
-        times = [20.05, 20.1, 20.3]
-        frames = np.random.default_rng(3).integers(0, 256, (3, HEIGHT, WIDTH), dtype=np.uint8)
-        write_v2e(self.folder / "frames.h5", self.events, frames, times)
-        self.check_intervals("frames.h5", times)
 
     def test_event_utils_events(self):
-        for polarity in (np.bool_, np.int8):
-            write_event_utils(self.folder / "e.h5", self.events, polarity=polarity)
-            self.convert("e.h5")
-            self.check_windows(self.events)
+        write_event_utils(self.folder / "e.h5", self.events, polarity=np.bool_)
+        self.convert("e.h5")
+        self.check_windows(self.events)
         random = np.random.default_rng(3)
-        images = [random.integers(0, 256, (HEIGHT, WIDTH), dtype=np.uint8),
-                  random.integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8),
-                  random.integers(0, 256, (HEIGHT, WIDTH, 1), dtype=np.uint8)]
+        images = [random.integers(0, 256, (HEIGHT, WIDTH, *channels), dtype=np.uint8) for channels in ((), (3,), (1,))]
         times = [20.05, 20.1, 20.3]
         write_event_utils(self.folder / "hqf.h5", self.events, images, times, resolution=(HEIGHT, WIDTH, 3))
         self.check_intervals("hqf.h5", times)
         self.assertEqual(run("preview", self.out, "--out", self.folder / "images")[1], "")
-        # Without images the tool has the largest y and x for the size, one short.
-        write_event_utils(self.folder / "e.h5", self.events, resolution=(HEIGHT - 1, WIDTH - 1))
-        source = {"dataset": "recording", "root": "e.h5", "window_s": 0.05}
-        lenient = {"errors": {"policy": "quarantine", "max_count": 99, "max_fraction": 1}}
-        self.assertIn("7 quarantined", run("convert", self.write_manifest(events_manifest(source, **lenient)),
-                                           "--output", self.folder / "short")[0])
-        self.assertIn("the manifest's \"sensor\" is", self.convert("e.h5", sensor=self.SENSOR)[1])
-        self.check_windows(self.events)
 
     def check_intervals(self, root, times):
         """A sample of each interval between frames."""
@@ -555,7 +461,7 @@ class WithoutFrames(program.InFolder):
             table = np.stack([np.round(part[:, 2] * 1e6), part[:, 0], part[:, 1], part[:, 3] > 0], 1)
             np.save(folder / f"{name}.npy", table.astype(np.int64))
             (folder / f"{name}.txt").write_text(label)
-        for changes in ({}, {"window_s": 9}, {"label_at": "middle"}):
+        for changes in ({}, {"label_at": "middle"}):
             shutil.rmtree(self.out, ignore_errors=True)
             source = {"dataset": "recording", "root": "pedro", "sensor": self.SENSOR, **changes}
             told = run("convert", self.write_manifest(events_manifest(source)))[0]

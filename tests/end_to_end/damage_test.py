@@ -74,26 +74,22 @@ class Damage(program.InFolder):
         self.assertIn("5 of 5 shards (5 done before)", out)
         self.assertEqual({path: stamp(path) for path in self.out.iterdir()}, before)
 
-    def test_truncated_shard(self):
-        self.shard.write_bytes(self.shard.read_bytes()[:-1])
-        self.found_and_mended(self.shard)
-
-    def test_emptied_shard(self):
-        self.shard.write_bytes(b"")
-        self.found_and_mended(self.shard)
-
-    def test_one_bit_flipped_anywhere_in_a_shard(self):
-        original = self.shard.read_bytes()
-        for place in (0, len(original) // 3, len(original) // 2, len(original) - 1):
-            with self.subTest(place=place):
-                damaged = bytearray(original)
-                damaged[place] ^= 0x10
-                self.shard.write_bytes(damaged)
-                self.found_and_mended(self.shard)
-
-    def test_shard_of_the_same_size_from_elsewhere(self):
-        self.shard.write_bytes(bytes(self.shard.stat().st_size))
-        self.found_and_mended(self.shard)
+    def test_a_shard_or_commit_record_of_other_bytes(self):
+        shard, record = self.shard.read_bytes(), self.record.read_bytes()
+        own = records(self.out)[self.shard.name]["plan_hash"].encode()
+        others = self.record.with_name(self.shards[1]).with_suffix(".json").read_bytes()
+        flipped = {place: bytearray(shard) for place in (0, len(shard) // 3, len(shard) // 2, len(shard) - 1)}
+        for place, damaged in flipped.items():
+            damaged[place] ^= 0x10
+        for path, cases in [
+                (self.shard, {"cut": shard[:-1], "empty": b"", "zeros": bytes(len(shard)), "absent": None,
+                              **flipped}),
+                (self.record, {1: record[:1], 200: record[:200], -2: record[:-2], "empty": b"", "absent": None,
+                               "another plan's": record.replace(own, own[::-1]), "another shard's": others})]:
+            for case, damaged in cases.items():
+                with self.subTest(path=path.suffix, case=case):
+                    path.unlink() if damaged is None else path.write_bytes(damaged)
+                    self.found_and_mended(path.name if damaged is None else path)
 
     def test_shard_that_is_a_folder(self):
         self.shard.unlink()
@@ -106,25 +102,6 @@ class Damage(program.InFolder):
         self.convert()
         self.same_as_whole()
 
-    def test_damaged_commit_record(self):
-        for kept in (1, 200, -2):
-            with self.subTest(kept=kept):
-                self.record.write_bytes(self.record.read_bytes()[:kept])
-                self.found_and_mended(self.record)
-
-    def test_emptied_commit_record(self):
-        self.record.write_bytes(b"")
-        self.found_and_mended(self.record)
-
-    def test_commit_record_of_another_plan(self):
-        own = records(self.out)[self.shard.name]["plan_hash"]
-        self.record.write_text(self.record.read_text().replace(own, own[::-1]))
-        self.found_and_mended(self.record)
-
-    def test_commit_record_of_another_shard(self):
-        shutil.copy(self.record.with_name(self.shards[1]).with_suffix(".json"), self.record)
-        self.found_and_mended(self.record)
-
     def test_commit_record_with_plausible_counts_that_are_not_the_shards(self):
         """Shard 2 holds one car; a commit record with two would give the next sample's labels to this one in
         dataset.h5."""
@@ -134,14 +111,6 @@ class Damage(program.InFolder):
         told, _ = run("finalize", self.out, expect=1)
         self.assertIn(f"{self.record}: expected number of boxes in slot 0: 1, got 2", told)
         self.found_and_mended(self.shard.stem)
-
-    def test_commit_record_without_shard(self):
-        self.shard.unlink()
-        self.found_and_mended(self.shard)
-
-    def test_shard_without_commit_record(self):
-        self.record.unlink()
-        self.found_and_mended(self.record.name)
 
     def test_neither_shard_nor_commit_record(self):
         self.record.unlink()

@@ -280,12 +280,6 @@ class Engines(program.InFolder):
             shards.append(program.shard_bytes(self.job / "cuda"))
         self.assertEqual(*shards)
 
-    def test_cuda_takes_neither_onednn_nor_int8(self):
-        _, err = run("plan", self.manifest(engine="onednn", device="cuda"), expect=64)
-        self.assertIn('$.generator.engine: expected "auto" or "torch" on device cuda, got "onednn"', err)
-        _, err = run("plan", self.manifest(precision="int8", device="cuda"), expect=64)
-        self.assertIn('$.generator.precision: expected "float32" or "bfloat16" on device cuda, got "int8"', err)
-
     # Calibration.
 
     def calibrate(self, *arguments, expect=0, **generator):

@@ -93,7 +93,6 @@ class Recordings(Export):
                                                         errors=small_job.LENIENT)))
         cls.source = manifest.parent / "out"
         run("convert", manifest, "--progress", "none")
-        run("finalize", cls.source)
         cls.samples = {key[2]: sample for key, sample in read_samples(cls.source).items()}
 
     def check_volume(self, columns, window, sample):
@@ -199,7 +198,6 @@ class Recordings(Export):
         manifest.write_text(json.dumps(program.manifest([{"pairs": program.pairs([1]), **source}],
                                                         generator={"kind": "difference"}, **changes)))
         run("convert", manifest, "--progress", "none")
-        run("finalize", manifest.parent / "out")
         return manifest.parent / "out"
 
     def converted_frames(self, sequence, numbers, **source):
@@ -382,7 +380,6 @@ class Recordings(Export):
         manifest = small_job.small_job(self.out.parent / "wide", cars=2, people=0, errors=small_job.LENIENT,
                                        image={"width": 2560, "height": 16, "preset": "mpii"})
         run("convert", manifest, "--progress", "none")
-        run("finalize", manifest.parent / "out")
         _, err = self.export("raw", source=manifest.parent / "out", expect=64)
         self.assertIn("expected volumes of at most 2048 pixels a side for --to raw, got 2560x16", err)
         self.assertFalse(self.out.exists())

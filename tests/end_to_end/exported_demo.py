@@ -14,6 +14,7 @@ from program import run, text
 
 BROKEN = "000003"  # of KITTI: quarantined
 folder = finalized = samples = None  # a module's tests have them from set_up() to tear_down()
+exports = {}
 
 
 def set_up():
@@ -34,12 +35,20 @@ def set_up():
     (demo / "manifest.json").write_text(json.dumps(manifest))
     finalized = demo / "out"
     run("convert", demo / "manifest.json", "--progress", "none")
-    run("finalize", finalized)
     samples = read_samples(finalized)
 
 
 def tear_down():
     shutil.rmtree(folder)
+
+
+def exported(to, *arguments):
+    """The folder of an export that is made once, which no test may change; and what it said."""
+    if (to, *arguments) not in exports:
+        out = folder / "exports" / str(len(exports))
+        said, _ = run("export", finalized, "--to", to, "--out", out, "--progress", "none", *arguments)
+        exports[to, *arguments] = out, said
+    return exports[to, *arguments]
 
 
 def read_samples(out):

@@ -23,6 +23,12 @@ def records(folder):
     return {path.with_suffix(".h5").name: json.loads(path.read_text()) for path in sorted(found)}
 
 
+def quarantined(folder):
+    """The reason of each sample that is in quarantine, by its id."""
+    return {entry["sample_id"]: entry["reason"] for record in records(folder).values()
+            for entry in record["quarantined"]}
+
+
 def content(folder):
     """Each file by name: a commit record as JSON without what differs from run to run,
     any other as SHA-256 of its bytes."""

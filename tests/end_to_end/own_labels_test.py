@@ -7,7 +7,6 @@ import os
 import shutil
 import subprocess
 import sys
-import xml.etree.ElementTree as ElementTree
 
 import cv2
 import h5py
@@ -16,8 +15,10 @@ import PIL.Image
 import yaml
 
 import program
+from folders import quarantined
 from program import SHARED, manifest, pairs, run, text
 from scale_test import MOST_LINKS, Measured, grey_png
+from small_job import LENIENT
 
 PIXELS = 1e-4
 LABELLED = SHARED / "labelled_frames"
@@ -68,7 +69,6 @@ class OwnLabels(program.InFolder):
                 np.testing.assert_allclose(got, np.array(edges) * scale + shift, atol=tolerance)
 
     def export(self, kind, name="out", *options):
-        run("finalize", self.folder / name)
         folder = self.folder / f"{name}_{kind}"
         run("export", "--to", kind, self.folder / name, "--out", folder, *options)
         return folder
@@ -102,21 +102,12 @@ class OwnLabels(program.InFolder):
         (self.folder / "instances.json").write_text(json.dumps(document))
         return document
 
-    def test_tracks_of_coco_go_out_again(self):
-        squares = self.make_images()
-        boxes = [(f"{name}.png", label, *edges) for name, edges in squares.items() for label in ("person", "car")]
-        self.coco({f"{name}.png": (64, 48) for name in squares}, boxes, lambda i: {"instance_id": 11 + i % 2})
-        self.job({"format": "coco", "path": "instances.json"})
-        self.assertEqual([sample["tracks"] for sample in self.samples.values()], [[11, 12]] * 5)
-        tracks = [np.load(path) for path in self.export("dsec").rglob("tracks.npy")]
-        self.assertEqual(set(np.concatenate(tracks)["track_id"]), {11, 12})
-
     def test_coco_comes_out_as_it_went_in(self):
         squares = self.make_images()
         boxes = [(f"{name}.png", label, *edges) for name, edges in squares.items() for label in ("person", "car")]
         keypoints = [7, 12, 2, 0, 0, 0, 13.5, 19, 1]
         given = self.coco({f"{name}.png": (64, 48) for name in squares}, boxes,
-                          lambda i: {"iscrowd": int(i in (3, 4)),
+                          lambda i: {"iscrowd": int(i in (3, 4)), "instance_id": 11 + i % 2,
                                      **({"keypoints": keypoints, "num_keypoints": 2} if i % 2 == 0 else {})},
                           {"keypoints": JOINTS, "skeleton": [[1, 2]]})
         self.job({"format": "coco", "path": "instances.json"})
@@ -142,6 +133,9 @@ class OwnLabels(program.InFolder):
             for key in ("image_id", "category_id", "iscrowd"):
                 self.assertEqual(person[key], originals[person["id"]][key])
         self.assertEqual(sum(person["iscrowd"] for person in people["annotations"]), 1)
+        self.assertEqual([sample["tracks"] for sample in self.samples.values()], [[11, 12]] * 5)
+        tracks = [np.load(path) for path in self.export("dsec").rglob("tracks.npy")]
+        self.assertEqual(set(np.concatenate(tracks)["track_id"]), {11, 12})
 
     def assert_same_coco(self, given, exported, scale=1.0, shift=(0, 0)):
         images = {entry["id"]: entry for entry in given["images"]}
@@ -163,39 +157,36 @@ class OwnLabels(program.InFolder):
             expected = np.array(original["bbox"], float) * scale + np.array([*shift, 0, 0])
             np.testing.assert_allclose(annotation["bbox"], expected, atol=PIXELS)
 
-    def test_coco_through_a_letterbox(self):
+    def test_coco_through_a_letterbox_goes_out_and_scores_1(self):
         squares = self.make_images()
-        given = self.coco({f"{name}.png": (64, 48) for name in squares},
-                          [(f"{name}.png", "car", *edges) for name, edges in squares.items()])
+        boxes = [(f"{name}.png", label, *edges) for name, edges in squares.items() for label in ("person", "car")]
+        given = self.coco({f"{name}.png": (64, 48) for name in squares}, boxes, lambda i: {"iscrowd": int(i == 3)})
         self.job({"format": "coco", "path": "instances.json"}, width=128, height=112, fit="letterbox")
-        self.assert_boxes({name: [("car", *edges)] for name, edges in squares.items()})
+        self.assert_boxes({name: [(label, *edges) for label in ("person", "car")] for name, edges in squares.items()})
         exported = json.loads((self.export("coco") / "instances_train.json").read_text())
         matrix = next(iter(self.samples.values()))["matrix"]
         scale = matrix[0, 0]
         self.assertEqual(scale, 2)
         self.assert_same_coco(given, exported, scale, matrix[:, 2] + 0.5 - 0.5 * scale)
 
-    def test_what_is_wrong_is_quarantined_and_counted(self):
-        squares = self.make_images()
-        given = self.coco({**{f"{name}.png": (64, 48) for name in squares}, "gone.png": (64, 48)},
-                          [(f"{name}.png", "car", *edges) for name, edges in squares.items()])
-        given["annotations"][2]["bbox"] = [70, 10, 5, 5]
-        given["images"][4]["width"] = 48
-        del given["annotations"][5]["category_id"]
-        (self.folder / "instances.json").write_text(json.dumps(given))
-        source = {"dataset": "frames", "root": "images", "labels": {"format": "coco", "path": "instances.json"},
-                  "pairs": pairs([1])}
-        path = self.write_manifest(manifest([source], generator={"kind": "difference"},
-                                            errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1}))
-        run("convert", path, "--progress", "none")
-        run("verify", "--deep", self.folder / "out")
-        reasons = {}
-        for record in (self.folder / "out").glob("*-of-*.json"):
-            reasons.update((q["sample_id"], q["reason"]) for q in json.loads(record.read_text())["quarantined"])
-        self.assertEqual(sorted(reasons), ["000004", "000005", "gone"])  # a box outside is left out
-        self.assertIn("expected an image of 48x48", reasons["000004"])
-        self.assertIn("(annotation 90056): $.category_id", reasons["000005"])
-        self.assertIn("expected a frame, got no file, in images/gone.png", reasons["gone"])
+        found = [{"image_id": name, "category_id": label, "bbox": [left, top, right - left, bottom - top], "score": 0.9}
+                 for name, sample in self.samples.items()
+                 for label, (left, top, right, bottom), ignore in sample["boxes"] if not ignore]
+        self.assertEqual(len(found), 9)  # 5 samples of 2 boxes, one of them a crowd
+        self.assertEqual(self.average_precisions(found), {"car": "1.000", "person": "1.000", "all": "1.000"})
+        wrong = [{**one, "bbox": [0, 100, 9, 9]} if one["category_id"] == "car" else one for one in found]
+        self.assertEqual(self.average_precisions(wrong)["car"], "0.000")
+
+    def average_precisions(self, found):
+        """COCO's AP@[.5:.95] of each class, as eventgan.evaluate prints it."""
+        (self.folder / "found.json").write_text(
+            json.dumps([{**one, "bbox": [float(edge) for edge in one["bbox"]]} for one in found]))
+        done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", "detections", self.folder / "found.json",
+                               "--truth", self.folder / "out"],
+                              capture_output=True, text=True, check=True,
+                              env={**os.environ, "PYTHONPATH": str(program.SOURCE / "manifests" / "python")})
+        lines = [line.split() for line in done.stdout.partition("average precision ")[2].splitlines()[1:]]
+        return {line[0]: line[-1] for line in lines if line}
 
     def rows(self, folder):
         """Of every sample all that its shard has in its row, the volume included."""
@@ -223,13 +214,11 @@ class OwnLabels(program.InFolder):
         images["000007"].unlink()  # the labels name it
         source = {"dataset": "frames", "root": "images", "labels": {"format": "coco", "path": "instances.json"},
                   "pairs": pairs([1])}
-        path = self.write_manifest(manifest([source], generator={"kind": "difference"},
-                                            errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1}))
+        path = self.write_manifest(manifest([source], generator={"kind": "difference"}, errors=LENIENT))
         out = self.folder / "out"
         run("convert", path, "--progress", "none")
         spoiled = {"000003", "000004", "000007"}
-        self.assertEqual({q["sample_id"] for record in out.glob("*-of-*.json")
-                          for q in json.loads(record.read_text())["quarantined"]}, spoiled)
+        self.assertEqual(quarantined(out).keys(), spoiled)
         before = self.rows(out)
         for name, path_of_image in images.items():
             path_of_image.write_bytes(whole[name])
@@ -268,30 +257,6 @@ class OwnLabels(program.InFolder):
         self.assertEqual({shard.name.split("-")[-4] for shard in (self.folder / "out").glob("*-of-*.h5")},
                          {"train", "val"})
 
-    def test_the_labels_themselves_score_1(self):
-        squares = self.make_images()
-        boxes = [(f"{name}.png", label, *edges) for name, edges in squares.items() for label in ("person", "car")]
-        self.coco({f"{name}.png": (64, 48) for name in squares}, boxes, lambda i: {"iscrowd": i == 3})
-        self.job({"format": "coco", "path": "instances.json"}, width=128, height=112, fit="letterbox")
-        found = [{"image_id": name, "category_id": label, "bbox": [left, top, right - left, bottom - top], "score": 0.9}
-                 for name, sample in self.samples.items()
-                 for label, (left, top, right, bottom), ignore in sample["boxes"] if not ignore]
-        self.assertEqual(len(found), 9)  # 5 samples of 2 boxes, one of them a crowd
-        self.assertEqual(self.average_precisions(found), {"car": "1.000", "person": "1.000", "all": "1.000"})
-        wrong = [{**one, "bbox": [0, 100, 9, 9]} if one["category_id"] == "car" else one for one in found]
-        self.assertEqual(self.average_precisions(wrong)["car"], "0.000")
-
-    def average_precisions(self, found):
-        """COCO's AP@[.5:.95] of each class, as eventgan.evaluate prints it."""
-        (self.folder / "found.json").write_text(
-            json.dumps([{**one, "bbox": [float(edge) for edge in one["bbox"]]} for one in found]))
-        done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", "detections", self.folder / "found.json",
-                               "--truth", self.folder / "out"],
-                              capture_output=True, text=True, check=True,
-                              env={**os.environ, "PYTHONPATH": str(program.SOURCE / "manifests" / "python")})
-        lines = [line.split() for line in done.stdout.partition("average precision ")[2].splitlines()[1:]]
-        return {line[0]: line[-1] for line in lines if line}
-
     def test_yolo_comes_out_as_it_went_in(self):
         squares = self.make_images()
         (self.folder / "labels").mkdir()
@@ -314,198 +279,70 @@ class OwnLabels(program.InFolder):
         for annotation in json.loads((self.export("coco") / "person_keypoints_train.json").read_text())["annotations"]:
             np.testing.assert_allclose(annotation["keypoints"], [16, 24, 2, 0, 0, 0, 8, 36, 1], atol=PIXELS)
 
-    # ---- As other programs write them
-
-    def expected(self, squares, classes=("car",)):
-        """Of each image its square, of one class after the other."""
-        return {name: [(classes[i % len(classes)], *edges)] for i, (name, edges) in enumerate(squares.items())}
-
-    def test_mot_with_classes_of_its_own(self):
+    def test_tables_and_texts_of_other_formats(self):
+        """As other programs write them: VOC from 0 without sizes, MOT with classes of its own, a table."""
         squares = self.make_images()
+        squares["000004"][0] = 0  # one in the image's corner
         names = ["tram", "dog", "car"]
-        rows = "".join(f"{i + 1}.0,{i - 1},{left},{top},{right - left},{bottom - top},1,{i % 3 + 1},1.0\n"
-                       for i, (left, top, right, bottom) in enumerate(squares.values()))
-        for labels, edges_from, shift in (("labels.txt", {}, 0), ("labels.txt", {"edges_from": 1}, 1)):
-            gt = self.folder / f"mot{shift}" / "gt"
-            gt.mkdir(parents=True)
-            (gt / "gt.txt").write_text(rows)
-            (gt / labels).write_text("\ufeff" + "\n".join(names))
-            (gt.parent / "seqinfo.ini").write_text("[Sequence]\nname=a\nseqLength=6\n")
-            out = self.job({"format": "mot", "path": f"mot{shift}", **edges_from}, name=f"out{shift}")
-            self.assert_boxes(self.expected({name: np.array(edges) - shift for name, edges in squares.items()}, names))
-            self.assertEqual([sample["tracks"] for sample in self.samples.values()], [[0], [1], [2], [3], [4]])
-            self.assertIn("with the classes of labels.txt", out)
-            self.assertIn("id 0 taken as it is: 1 time, first in", out)
-
-    def test_mot_of_visdrone(self):
-        squares = self.make_images()
-        (self.folder / "annotations").mkdir()
-        (self.folder / "sequences").mkdir()
-        (self.folder / "images").rename(self.folder / "sequences" / "uav1_v")
-        (self.folder / "annotations" / "uav1_v.txt").write_text("".join(
-            f"{i + 1},7,{left},{top},{right - left},{bottom - top},{int(i != 3)},{[4, 9, 0][i % 3]},0,{i % 3}\n"
-            for i, (left, top, right, bottom) in enumerate(squares.values())))
-        out = self.job({"format": "mot", "path": "annotations"}, "sequences")
-        self.assert_boxes({f"uav1_v/{name}": box for name, box in
-                           self.expected(squares, ["car", "bus", "ignored regions"]).items()})
-        self.assertEqual([sample["boxes"][0][2] for sample in self.samples.values()], [False, True, True, False, True])
-        self.assertIn("1 file with VisDrone's classes in column 8, with edges from 0 as", out)
-        self.assertIn("annotations/uav1_v.txt", out)
-
-    def test_voc_from_0_without_sizes(self):
-        squares = self.make_images()
+        classes = {name: names[i % 3] for i, name in enumerate(squares)}
         (self.folder / "xml").mkdir()
         for name, (left, top, right, bottom) in squares.items():
-            corner = 0 if name == "000004" else left  # one in the image's corner
-            squares[name][0] = corner
             (self.folder / "xml" / f"{name}.xml").write_text(
-                f"<annotation><object><name>car</name><truncated>0.06</truncated><difficult>Unspecified</difficult>"
-                f"<bndbox><xmin>{corner}</xmin><ymin>{top}</ymin><xmax>{right}</xmax><ymax>{bottom}</ymax></bndbox>"
-                f"</object></annotation>")
-        out = self.job({"format": "voc", "path": "xml"})
-        self.assert_boxes(self.expected(squares))
-        self.assertIn("edges count from 0 in xml, since one is at 0 in xml/000004.xml", out)
-        self.assertIn("<difficult> that is no 0 or 1 taken for unknown: 6 times, first in xml/000000.xml", out)
-        out = self.job({"format": "voc", "path": "xml", "edges_from": 1}, name="from_1")
-        self.assert_boxes(self.expected({name: np.array(edges) - [1, 1, 0, 0] for name, edges in squares.items()}))
-        self.assertNotIn("edges count", out)
-
-    def yolo_with_faults(self):
-        """A square each; one of them as an outline, and some beside boxes that are none."""
-        squares = self.make_images()
-        (self.folder / "labels").mkdir()
-        (self.folder / "labels" / "classes.txt").write_text("\ufeffcar\n")
-        for i, (name, (left, top, right, bottom)) in enumerate(squares.items()):
-            box = (f"{(left + right) / 128} {(top + bottom) / 96} {(right - left) / 64} {(bottom - top) / 48}")
-            outline = (f"{left / 64} {top / 48} {right / 64} {top / 48} {right / 64} {bottom / 48}")
-            before = {1: "0 1.009 0.5 0.001 0.5\n", 2: "0 0.5 0.5 0 0.5\n"}.get(i, "")
-            (self.folder / "labels" / f"{name}.txt").write_text(
-                f"\ufeff{before}0.0 {outline if i == 3 else box}\n")
-        squares["000005"] = [64 * (1.0004 - 0.25), 12, 64 * (1.0004 + 0.25), 36]
-        (self.folder / "labels" / "000005.txt").write_text("0 1.0004 0.5 0.5 0.5\n")
-        return squares
-
-    def test_yolo_with_outlines_and_boxes_that_are_none(self):
-        squares = self.yolo_with_faults()
-        (self.folder / "labels" / "._000002.txt").write_bytes(b"\0\5\x16\7Mac OS X")
-        out = self.job({"format": "yolo", "path": "labels"})
-        self.assert_boxes(self.expected(squares))
-        self.assertIn("note: 2 boxes of labels left out: expected a box within the image of 64x48, got one from (64.",
-                      out)
-        self.assertIn("expected a box of a width and height above 0, got 0 x 24, in labels/000002.txt:1", out)
+                f"<annotation><object><name>{classes[name]}</name><truncated>0.06</truncated>"
+                f"<difficult>Unspecified</difficult><bndbox><xmin>{left}</xmin><ymin>{top}</ymin><xmax>{right}</xmax>"
+                f"<ymax>{bottom}</ymax></bndbox></object></annotation>")
+        (self.folder / "mot" / "gt").mkdir(parents=True)
+        (self.folder / "mot" / "gt" / "gt.txt").write_text("".join(
+            f"{i + 1}.0,{i - 1},{left},{top},{right - left},{bottom - top},1,{i % 3 + 1},1.0\n"
+            for i, (left, top, right, bottom) in enumerate(squares.values())))
+        (self.folder / "mot" / "gt" / "labels.txt").write_text("\ufeff" + "\n".join(names))
+        (self.folder / "mot" / "seqinfo.ini").write_text("[Sequence]\nname=a\nseqLength=6\n")
+        (self.folder / "boxes.csv").write_text("image,class,left,top,right,bottom\n" + "".join(
+            f"{name}.png,{classes[name]},{','.join(map(str, edges))}\n" for name, edges in squares.items()))
+        for labels, path, notes in [
+                ("voc", "xml", ["edges count from 0 in xml, since one is at 0 in xml/000004.xml",
+                                "<difficult> that is no 0 or 1 taken for unknown: 6 times, first in xml/000000.xml"]),
+                ("mot", "mot", ["with the classes of labels.txt", "id 0 taken as it is: 1 time, first in"]),
+                ("csv", "boxes.csv", [])]:
+            with self.subTest(labels):
+                out = self.job({"format": labels, "path": path}, name=f"out_{labels}")
+                self.assert_boxes({name: [(classes[name], *edges)] for name, edges in squares.items()})
+                for note in notes:
+                    self.assertIn(note, out)
+                if labels == "mot":
+                    self.assertEqual([sample["tracks"] for sample in self.samples.values()], [[0], [1], [2], [3], [4]])
 
     def test_a_box_left_out_ends_the_run_where_the_first_fault_does(self):
-        self.yolo_with_faults()
+        self.make_images(2)
+        (self.folder / "labels").mkdir()
+        (self.folder / "labels" / "classes.txt").write_text("car\n")
+        (self.folder / "labels" / "000001.txt").write_text("0 1.009 0.5 0.001 0.5\n")
         source = {"dataset": "frames", "root": "images", "labels": {"format": "yolo", "path": "labels"},
                   "pairs": pairs([1])}
         path = self.write_manifest(manifest([source], generator={"kind": "difference"}, errors={"policy": "fail"}))
         _, errors = run("convert", path, "--progress", "none", expect=65)
         self.assertIn("expected a box within the image of 64x48, got one from (64.", errors)
 
-    def test_a_name_that_is_not_utf8_costs_its_image_alone(self):
-        squares = self.make_images()
-        (self.folder / "labels").mkdir()
-        (self.folder / "data.yaml").write_text("names: [car]\n")
-        for name, (left, top, right, bottom) in squares.items():
-            (self.folder / "labels" / f"{name}.txt").write_text(
-                f"0 {(left + right) / 128} {(top + bottom) / 96} {(right - left) / 64} {(bottom - top) / 48}\n")
-        for folder, ending in (("images", ".png"), ("labels", ".txt")):
-            shutil.copy(self.folder / folder / f"000003{ending}",
-                        os.fsencode(self.folder / folder) + b"/stra\xdfe" + ending.encode())
-        out, _ = run("convert", self.folder, "--output", self.folder / "whole", "--progress", "none")
-        self.assertIn(r"stra\xdfe.png (no UTF-8)", out)
-        out = self.job({"format": "yolo", "path": "."})
-        self.assertEqual(len(self.samples), 5)
-        self.assert_boxes(self.expected(squares))
-
     # ---- Real frames
 
-    def real(self, name):
-        """Sizes and boxes of a set of labelled frames."""
-        folder = LABELLED / name
+    def test_real_frames_with_coco(self):
+        folder = LABELLED / "davis_tennis"
         if not folder.is_dir():
             self.skipTest(f"no {folder}")
         with open(folder / "frames.csv", newline="") as file:
-            sizes = {row["image"]: (int(row["width"]), int(row["height"])) for row in csv.DictReader(file)}
+            sizes = {row["image"]: (int(row["width"]), int(row["height"])) for row in list(csv.DictReader(file))[:12]}
+        for image in sizes:
+            (self.folder / "images" / image).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(folder / "images" / image, self.folder / "images" / image)
         with open(folder / "boxes.csv", newline="") as file:
             boxes = [(row["image"], row["class"], *(float(row[edge]) for edge in ("x1", "y1", "x2", "y2")))
-                     for row in csv.DictReader(file)]
-        expected = {image.rsplit(".", 1)[0]: [] for image in sizes}
-        for image, *box in boxes:
-            expected[image.rsplit(".", 1)[0]].append(tuple(box))
-        return folder / "images", sizes, boxes, expected
-
-    def test_real_frames_with_coco(self):
-        for name, least in (("davis_tennis", 69), ("camvid", 90)):
-            with self.subTest(name):
-                root, sizes, boxes, expected = self.real(name)
-                given = self.coco(sizes, boxes)
-                self.job({"format": "coco", "path": "instances.json"}, root, name)
-                self.assertGreaterEqual(len(self.samples), least)
-                self.assert_boxes(expected, 1e-3)  # float32 of a thousand pixels
-                self.assert_same_coco(given,
-                                      json.loads((self.export("coco", name) / "instances_train.json").read_text()))
-
-    def test_real_frames_with_yolo(self):
-        root, sizes, boxes, expected = self.real("sot_person")
-        for image, label, left, top, right, bottom in boxes:
-            width, height = sizes[image]
-            path = self.folder / "labels" / f"{image.rsplit('.', 1)[0]}.txt"
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with open(path, "a") as file:
-                file.write(f"0 {(left + right) / 2 / width:.9f} {(top + bottom) / 2 / height:.9f} "
-                           f"{(right - left) / width:.9f} {(bottom - top) / height:.9f}\n")
-        (self.folder / "labels" / "classes.txt").write_text("person\n")
-        self.job({"format": "yolo", "path": "labels"}, root)
-        self.assert_boxes(expected, 1e-3)
-        folder = self.export("yolo")
-        for sample_id in self.samples:
-            given = np.loadtxt(self.folder / "labels" / f"{sample_id}.txt", ndmin=2)
-            got = np.loadtxt(folder / "labels" / "train" / f"{sample_id.replace('/', '+')}.txt", ndmin=2)
-            np.testing.assert_allclose(got, given, atol=PIXELS / 1000)
-
-    def test_real_frames_with_voc(self):
-        root, sizes, boxes, expected = self.real("davis_tennis")
-        (self.folder / "Annotations").mkdir()
-        for image, (width, height) in sizes.items():
-            annotation = ElementTree.Element("annotation")
-            size = ElementTree.SubElement(annotation, "size")
-            for key, value in (("width", width), ("height", height), ("depth", 3)):
-                ElementTree.SubElement(size, key).text = str(value)
-            for _, label, left, top, right, bottom in (box for box in boxes if box[0] == image):
-                item = ElementTree.SubElement(annotation, "object")
-                ElementTree.SubElement(item, "name").text = label
-                bounds = ElementTree.SubElement(item, "bndbox")
-                for key, value in (("xmin", left + 1), ("ymin", top + 1), ("xmax", right), ("ymax", bottom)):
-                    ElementTree.SubElement(bounds, key).text = f"{value:.0f}"
-            ElementTree.ElementTree(annotation).write(self.folder / "Annotations" / f"{image.rsplit('.', 1)[0]}.xml")
-        self.job({"format": "voc", "path": "Annotations"}, root)
-        self.assert_boxes(expected)
-
-    def test_real_frames_with_a_table(self):
-        root, _, boxes, expected = self.real("camvid")
-        with open(self.folder / "boxes.csv", "w", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(["image", "class", "left", "top", "right", "bottom"])
-            writer.writerows(boxes)
-        self.job({"format": "csv", "path": "boxes.csv"}, root)
-        self.assertGreaterEqual(len(self.samples), 90)
-        self.assert_boxes(expected, 1e-3)
-
-    def test_real_frames_with_mot(self):
-        root = self.real("mot17_mini")[0]
-        self.job({"format": "mot", "path": str(root.parent)}, root)
-        self.assertEqual(len(self.samples), 3 + 7)
-        for sample_id, sample in self.samples.items():
-            sequence, frame = sample_id.split("/")
-            table = np.loadtxt(root.parent / sequence / "gt.txt", delimiter=",")
-            table = table[table[:, 0] == int(frame)]
-            corner = table[:, 2:4] - 1
-            np.testing.assert_allclose([box for _, box, _ in sample["boxes"]],
-                                       np.hstack([corner, corner + table[:, 4:6]]), atol=1e-3)
-            self.assertEqual(sample["tracks"], list(table[:, 1].astype(int)))
-            self.assertEqual([ignore for _, _, ignore in sample["boxes"]],
-                             [bool(row[6] == 0 or row[7] in (2, 7, 8, 12, 13)) for row in table])
+                     for row in csv.DictReader(file) if row["image"] in sizes]
+        expected = {image.rsplit(".", 1)[0]: [box for name, *box in boxes if name == image] for image in sizes}
+        given = self.coco(sizes, boxes)
+        self.job({"format": "coco", "path": "instances.json"})
+        self.assertGreaterEqual(len(self.samples), 11)
+        self.assert_boxes(expected, 1e-3)  # float32 of a thousand pixels
+        self.assert_same_coco(given, json.loads((self.export("coco") / "instances_train.json").read_text()))
 
     # ---- Scale
 
@@ -558,17 +395,15 @@ class OwnLabels(program.InFolder):
                 if not original.exists():
                     original.write_bytes(grey_png(i // MOST_LINKS))
                 os.link(original, folder / f"{i:012d}.jpg")
-            polygon = [1.25 + i / 7 for i in range(40)]
+            polygon = ", ".join(str(1.25 + i / 7) for i in range(40))
             with open(self.folder / f"{count}.json", "w") as file:
-                file.write('{"images": [')
-                for i in range(count):
-                    file.write(("," if i else "") + json.dumps({"id": 17 * i + 3, "width": 16, "height": 16,
-                                                                "file_name": f"{i:012d}.jpg"}))
-                file.write('], "annotations": [')
-                for i in range(8 * count):
-                    entry = {"id": i, "image_id": 17 * (i * 7919 % count) + 3, "category_id": 1, "iscrowd": 0,
-                             "area": 4, "bbox": [1, 2, 2, 2], "segmentation": [polygon]}
-                    file.write(("," if i else "") + json.dumps(entry))
+                file.write('{"images": [' + ",".join(
+                    f'{{"id": {17 * i + 3}, "width": 16, "height": 16, "file_name": "{i:012d}.jpg"}}'
+                    for i in range(count)) + '], "annotations": [')
+                for i in range(3 * count):
+                    file.write(f'{"," if i else ""}{{"id": {i}, "image_id": {17 * (i * 7919 % count) + 3}, '
+                               f'"category_id": 1, "iscrowd": 0, "area": 4, "bbox": [1, 2, 2, 2], '
+                               f'"segmentation": [[{polygon}]]}}')
                 file.write('], "categories": [{"id": 1, "name": "person"}]}')
             source = {"dataset": "frames", "root": folder.name, "labels": {"format": "coco", "path": f"{count}.json"},
                       "pairs": pairs([1])}

@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -51,6 +52,11 @@ def manifest(sources, **changes):
     }
     result.update(changes)
     return result
+
+
+def read_commented(path):
+    """A manifest, whose comments have lines of their own or after two spaces."""
+    return json.loads(re.sub(r"(?m)(^|  )\s*//.*$", "", path.read_text()))
 
 
 def pairs(gaps, side="before", choose="one"):

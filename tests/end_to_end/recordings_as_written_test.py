@@ -1,7 +1,6 @@
 """Recordings as cameras and tools leave them: out of order, cut, padded, of kinds that are not read. `convert` loses
 none of their events in silence, and says of each that it does not read why."""
 
-import json
 import pathlib
 import shutil
 
@@ -12,6 +11,7 @@ import numpy as np
 import program
 from camera_files import (BBOX, HEIGHT, WIDTH, random_events, volume_of, whole_microseconds, write_columns, write_dat,
                           write_evt3, write_mvsec)
+from folders import quarantined
 from program import run
 from small_job import LENIENT, save_image
 
@@ -130,9 +130,7 @@ class AsWritten(program.InFolder):
         write_dat(folder / "d_td.dat", self.events)
         self.assertIn("3 quarantined", self.convert("all")[0])
         self.assertEqual(self.check_windows(self.events, invalid=3), 32)
-        reasons = [entry["reason"] for path in self.out.glob("job-*.json")
-                   for entry in json.loads(path.read_text())["quarantined"]]
-        for reason in reasons:
+        for reason in quarantined(self.out).values():
             self.assertIn("expected times that never decrease", reason)
             self.assertIn(f"(event {k + 1})", reason)
 
@@ -184,7 +182,7 @@ class AsWritten(program.InFolder):
         self.assertIn("got 1 of 2 that cannot", error)
         self.assertIn("truncated file", error)
         self.assertIn("second_td.h5", error)
-        error = self.convert("data", errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1})[1]
+        error = self.convert("data", errors=LENIENT)[1]
         self.assertIn("truncated file", error)
         self.assertEqual(self.check_windows(self.events), 8)
 

@@ -11,7 +11,7 @@ import PIL.Image
 import program
 from folders import content, records, same_content, temporaries
 from program import run
-from small_job import save_image, small_job
+from small_job import LENIENT, save_image, small_job
 
 BROKEN_CAR, MALFORMED_CAR, MISSING = "000001", "000002", "000000002"
 
@@ -19,7 +19,7 @@ BROKEN_CAR, MALFORMED_CAR, MISSING = "000001", "000002", "000000002"
 class Retry(program.InFolder):
     def setUp(self):
         super().setUp()
-        self.manifest = small_job(self.folder, errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1})
+        self.manifest = small_job(self.folder, errors=LENIENT)
         self.out = self.folder / "out"
         self.image = self.folder / "cars" / "image_2" / f"{BROKEN_CAR}.png"
         self.label = self.folder / "cars" / "label_2" / f"{MALFORMED_CAR}.txt"
@@ -141,7 +141,7 @@ class Retry(program.InFolder):
 
         self.label.write_bytes(self.spoiled[self.label])
         strict = self.folder / "strict.json"
-        strict.write_text(self.manifest.read_text().replace('"max_count": 9', '"max_count": 1'))
+        strict.write_text(self.manifest.read_text().replace('"max_count": 99', '"max_count": 1'))
         report = self.retry("--manifest", strict, expect=65)
         self.assertEqual((report["mended"], report["quarantined"]), (1, 2))
         self.assertTrue(report["too_many_faults"])
@@ -265,7 +265,7 @@ class UnknownSizes(program.InFolder):
     """Images none of which could be read at planning; mended, they are of another size than the others."""
 
     def test_they_are_converted_in_the_end(self):
-        manifest = small_job(self.folder, errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1},
+        manifest = small_job(self.folder, errors=LENIENT,
                              image={"preset": "kitti"})
         out = self.folder / "out"
         bad = sorted((self.folder / "cars").glob("*/00000[1-3]*.png"))
@@ -316,7 +316,7 @@ class RetryOfClasses(program.InFolder):
         source = {"dataset": "frames", "root": "images", "labels": labels, "pairs": program.pairs([1])}
         path = self.write_manifest(program.manifest(
             [source], generator={"kind": "difference"}, image={"preset": "mpii"},
-            errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1},
+            errors=LENIENT,
             output={"directory": "out", "samples_per_shard": 2}))
         return run("convert", path, "--output", self.out, "--progress", "none")
 

@@ -74,15 +74,17 @@ class Terminal(program.InFolder):
         cls.addClassCleanup(shutil.rmtree, cls.job)
         moving_texture.write_images(cls.job / "frames" / "scene", [4 * index for index in range(PAIRS + 1)], HEIGHT,
                                     WIDTH, seed=3)
-        cls.manifest = cls.job / "manifest.json"
-        cls.manifest.write_text(program.json.dumps(program.manifest(
-            [{"dataset": "frames", "root": "frames", "pairs": program.pairs([1])}],
-            image={"width": WIDTH, "height": HEIGHT, "preset": "mpii"}, generator={"kind": "difference"},
-            output={"directory": "out", "samples_per_shard": 6, "dtype": "float32", "deflate_level": 9})))
+        cls.manifest, cls.longer = cls.job / "manifest.json", cls.job / "longer.json"  # four times as long
+        for path, part in ((cls.manifest, 2), (cls.longer, 1)):
+            path.write_text(program.json.dumps(program.manifest(
+                [{"dataset": "frames", "root": "frames", "pairs": program.pairs([1])}],
+                image={"width": WIDTH // part, "height": HEIGHT // part, "preset": "mpii"},
+                generator={"kind": "difference"},
+                output={"directory": "out", "samples_per_shard": 6, "dtype": "float32", "deflate_level": 9})))
 
-    def convert(self, **how):
-        return on_terminal("convert", self.manifest, "--output", self.folder / "out", "--overwrite", "--threads", 1,
-                           **how)
+    def convert(self, manifest=None, **how):
+        return on_terminal("convert", manifest or self.manifest, "--output", self.folder / "out", "--overwrite",
+                           "--threads", 1, **how)
 
     def test_the_bar_fits_the_terminal(self):
         for columns in (40, 80, 200):
@@ -109,7 +111,7 @@ class Terminal(program.InFolder):
         self.assertRegex(program.run("make-demo", self.folder / "piped")[1], r"\A(drawing: .* images/s\n)*\Z")
 
     def test_the_bar_follows_a_resized_terminal(self):
-        before, after = self.convert(columns=200, resized=40)
+        before, after = self.convert(self.longer, columns=200, resized=40)
         self.assertGreater(max(map(len, bars(before))), 40)
         drawn = bars(after)
         # What was on its way when the terminal became narrow has the old width.
@@ -150,7 +152,7 @@ class Terminal(program.InFolder):
         self.assertRegex(text, re.escape(WIPE) + r"warning: [^\r\n]*making it again\r\n")
 
     def test_ctrl_c_is_answered_at_once(self):
-        one_shard = program.json.loads(self.manifest.read_text())
+        one_shard = program.json.loads(self.longer.read_text())
         one_shard["output"].update(samples_per_shard=PAIRS)
         manifest = self.job / "one_shard.json"
         manifest.write_text(program.json.dumps(one_shard))
@@ -199,7 +201,7 @@ class Terminal(program.InFolder):
         tmux = lambda *command: subprocess.run([*server, *map(str, command)], capture_output=True,
                                                text=True, check=True).stdout
         script = self.folder / "script"
-        convert = shlex.join(map(str, (program.PROGRAM, "convert", self.manifest, "--output",
+        convert = shlex.join(map(str, (program.PROGRAM, "convert", self.longer, "--output",
                                        self.folder / "tmux", "--threads", 1)))
         script.write_text(f"seq 15\necho begun\n{convert}\necho exit code $?\nexec sleep 1000\n")
         tmux("new-session", "-d", "-x", 200, "-y", 24, "sh", script)

@@ -83,7 +83,7 @@ def read_args() -> argparse.Namespace:
         kind.add_argument("--truth", type=pathlib.Path,
                           help="finalized folder of a camera's volumes with labels, instead of the simulated camera")
         kind.add_argument("--small", action="store_true",
-                          help="8 sequences, one seed, 2 steps: tests that it runs; the scores mean nothing")
+                          help="8 sequences, one seed, a step: tests that it runs; the scores mean nothing")
     real = kinds.add_parser("real", parents=[shared])
     real.add_argument("--task", choices=["persons", "cars", "joints"], default="persons",
                       help="what is learnt (default: %(default)s); results of the others are in OUT/TASK")
@@ -100,7 +100,7 @@ def read_args() -> argparse.Namespace:
                       help="one row, one seed, 60 steps; fails unless it finds more than an untrained network")
     args = parser.parse_args()
     if getattr(args, "small", False):
-        args.scenes, args.seeds, args.steps = 8, 1, 2
+        args.scenes, args.seeds, args.steps = 8, 1, 1
     args.out = args.out.resolve()
     return args
 
@@ -245,7 +245,7 @@ def detection(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
     real = camera(args, seen, labelled, "kitti/training/between_2", {"window_s": 1 / FRAMES_PER_SECOND}, ["test"])
     scores: dict[str, list[dict[str, float]]] = {}
     for seed in range(args.seeds):
-        scale = "--scale", 1.5  # cheaper than its default by half
+        scale = "--scale", 0.5 if args.small else 1.5  # cheaper than its default by half
         tests = {}
         for name, folder in data.items():
             trained, row = train(args, "train_yolov3.py", name, folder, real, seed, *scale), f"{name}, as bright"
@@ -291,14 +291,16 @@ def pose(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
     of_camera = ("--dataset", next(iter(read_description(real)["counts"]["by_dataset"])))
     scores: dict[str, list[dict[str, float]]] = {}
     for seed in range(args.seeds):
-        trained, row = train(args, "train_pose.py", "EventGAN", made, real, seed), "EventGAN, without noise"
-        tests = {"EventGAN": (trained, real),
-                 row: (train(args, "train_pose.py", row, made, real, seed, "--without-noise", trained=trained), real)}
+        size = ("--size", 64, "--filters", 16) if args.small else ()
+        trained = train(args, "train_pose.py", "EventGAN", made, real, seed, *size)
+        row = "EventGAN, without noise"
+        quiet = train(args, "train_pose.py", row, made, real, seed, *size, "--without-noise", trained=trained)
+        tests = {"EventGAN": (trained, real), row: (quiet, real)}
         for epochs, name in ((1, "1 epoch"), (5, "5 epochs")):
-            tuned = "--pretrained", trained / "weights.pt", "--last-layer", "--epochs", epochs
+            tuned = "--pretrained", trained / "weights.pt", "--last-layer", "--epochs", epochs, *size
             tests[f"EventGAN, last layer {name}"] = train(args, "train_pose.py", f"tuned-{epochs}", real, real, seed,
                                                           *tuned, *of_camera), real
-        tests["camera"] = train(args, "train_pose.py", "camera", real, real, seed, *of_camera), real
+        tests["camera"] = train(args, "train_pose.py", "camera", real, real, seed, *of_camera, *size), real
         for name, (out, test) in tests.items():
             result, _, _ = evaluate_poses(out / "predictions.json", samples_of(test))
             scores.setdefault(name, []).append(result["joints"]["all"])

@@ -11,7 +11,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import DATA, EXPERIMENTS
+from conftest import DATA, EXPERIMENTS, part_of_data
 
 torch = pytest.importorskip("torch")
 cv2 = pytest.importorskip("cv2")
@@ -211,8 +211,9 @@ def test_rows_are_those_of_one_thing_each():
 def test_a_detector_that_learnt_from_photographs_finds_persons_in_real_events(tmp_path):
     if not (DATA / "labelled_frames").is_dir() or not (DATA / "real_labels").is_dir():
         pytest.skip("no ../shared/data")
+    part_of_data(tmp_path / "frames", 40)
     line = [sys.executable, EXPERIMENTS / "experiment.py", "real", "--program", os.environ["EVENTGAN_PROGRAM"],
-            "--frames", DATA / "labelled_frames", "--real", DATA / "real_labels", "--out", tmp_path, "--quick"]
+            "--frames", tmp_path / "frames", "--real", DATA / "real_labels", "--out", tmp_path, "--quick"]
     done = subprocess.run(line, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     shutil.copytree(DATA / "real_labels" / "pedro", tmp_path / "other" / "pedro")

@@ -2,9 +2,12 @@
 
 import os
 import pathlib
+import runpy
 import shutil
 import subprocess
 import sys
+import tempfile
+import traceback
 
 import pytest
 
@@ -15,6 +18,39 @@ sys.path[:0] = [str(PACKAGE), str(SOURCE / "tests" / "stages" / "shards")]
 from example_shards import NAME, ExampleShards
 
 SECOND = "demo-train-00001-of-00002.h5"
+
+
+def run_script(path, *arguments):
+    """What a script says, and its exit code, in a fork of this process: PyTorch is loaded once for all. On one thread:
+    those of OpenMP and OpenCV do not outlive a fork."""
+    import cv2
+
+    cv2.setNumThreads(1)
+    with tempfile.TemporaryFile() as output:
+        child = os.fork()
+        if not child:
+            code = 1
+            try:
+                for stream in (1, 2):
+                    os.dup2(output.fileno(), stream)
+                sys.stdout = sys.stderr = os.fdopen(1, "w", closefd=False)
+                sys.argv, sys.path[:0] = [str(path), *map(str, arguments)], [str(pathlib.Path(path).parent)]
+                os.environ["OMP_NUM_THREADS"] = "1"
+                runpy.run_path(str(path), run_name="__main__")
+                code = 0
+            except SystemExit as end:
+                code = end.code or 0
+                if isinstance(code, str):
+                    print(code)
+                    code = 1
+            except BaseException:
+                traceback.print_exc()
+            finally:
+                sys.stdout.flush()
+                os._exit(code)
+        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        output.seek(0)
+        return output.read().decode(), code
 
 
 @pytest.fixture(scope="session")

@@ -3,12 +3,11 @@ and a few steps on the demo."""
 
 import json
 import pathlib
-import subprocess
 import sys
 
 import numpy as np
 import pytest
-from conftest import SOURCE
+from conftest import SOURCE, run_script
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("cv2")
@@ -134,24 +133,22 @@ def test_overlapping_boxes_are_one():
 
 @pytest.mark.parametrize("channels", ["signed", "volume"])
 def test_a_few_steps(channels, data, tmp_path):
-    line = [sys.executable, EXAMPLES / "train_detector.py", "--data", data, "--out", tmp_path / "out", "--dataset",
-            "kitti_object", "--threads", "1", "--channels", channels, "--batch", "4", "--images", "2", "--every", "2"]
-    for steps, epochs in ((4, "2"), (8, "4")):  # and on
-        done = subprocess.run([*line, "--epochs", epochs], capture_output=True, text=True)
-        assert done.returncode == 0, done.stdout + done.stderr
-    assert "resuming after epoch 2" in done.stdout
+    line = [EXAMPLES / "train_detector.py", "--data", data, "--out", tmp_path / "out", "--dataset", "kitti_object",
+            "--threads", "1", "--channels", channels, "--batch", "4", "--images", "2", "--every", "2"]
+    for epochs in ("2", "4"):  # and on
+        said, code = run_script(*line, "--epochs", epochs)
+        assert code == 0, said
+    assert "resuming after epoch 2" in said
     history = json.loads((tmp_path / "out" / "metrics.json").read_text())["history"]
     assert [row["epoch"] for row in history] == [0, 2, 4] and history[-1]["loss"] < history[1]["loss"]
     assert len([*pathlib.Path(tmp_path, "out", "images").iterdir()]) == 2
     entries = json.loads((tmp_path / "out" / "predictions.json").read_text())
-    more = [*line[:-2], "--every", "9", "--epochs", "1", "--out", tmp_path / "more", "--pretrained",
-            tmp_path / "out" / "weights.pt"]
-    done = subprocess.run(more, capture_output=True, text=True)
-    assert done.returncode == 0 and "of the model's" in done.stdout, done.stdout + done.stderr
+    said, code = run_script(*line[:-2], "--every", "9", "--epochs", "1", "--out", tmp_path / "more", "--pretrained",
+                            tmp_path / "out" / "weights.pt")
+    assert code == 0 and "of the model's" in said, said
     assert all(entry["category_id"] == "Car" and len(entry["bbox"]) == 4 for entry in entries)
-    done = subprocess.run([*line, "--classes", "Cat", "--epochs", "1", "--out", tmp_path / "cats"], capture_output=True,
-                          text=True)
-    assert done.returncode == 1 and "got Cat" in done.stderr and "Traceback" not in done.stderr
+    said, code = run_script(*line, "--classes", "Cat", "--epochs", "1", "--out", tmp_path / "cats")
+    assert code == 1 and "got Cat" in said and "Traceback" not in said
 
 
 class TestShards:

@@ -13,12 +13,10 @@
 #include "manifests/values/faults.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 std::ptrdiff_t open_descriptors() {
   return std::distance(std::filesystem::directory_iterator("/proc/self/fd"),
@@ -46,8 +44,8 @@ TEST(OpenFiles, MoreThanAProcessMayHaveOpenAreRead) {
     }
   }
   testing::write_file(folder / "0", "file 0, longer");
-  EXPECT_THAT([&] { files[0]->read_between(0, 1); },
-              ThrowsMessage<InputError>(HasSubstr("expected a file of 6 bytes as before, got 14")));
+  EXPECT_THROWS(files[0]->read_between(0, 1), InputError,
+                "expected a file of 6 bytes as before, got 14");
   files.clear();
   EXPECT_EQ(open_descriptors(), before);
 }

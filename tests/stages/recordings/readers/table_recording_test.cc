@@ -11,6 +11,7 @@
 #include "tests/testing/npy_bytes.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 #include "tests/testing/zip_file.h"
 
 namespace eventgan {
@@ -19,7 +20,6 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 /// Three events of 4x3 pixels at 5, 7 and 7 µs, as each kind of table.
 class TableRecordingTest : public ::testing::Test {
@@ -46,9 +46,7 @@ class TableRecordingTest : public ::testing::Test {
 
   void refuses(const std::string& name, const std::string& text, const std::string& what) {
     testing::write_file(folder_ / name, text);
-    EXPECT_THAT([&] { open(name)->events_in(-1, 1e9); },
-                ThrowsMessage<InputError>(AllOf(HasSubstr(what), HasSubstr(name))))
-        << text;
+    EXPECT_THROWS(open(name)->events_in(-1, 1e9), InputError, what, name) << text;
   }
 
   testing::TemporaryFolder folder_;
@@ -87,10 +85,9 @@ TEST_F(TableRecordingTest, IsAnArrayOfFourColumns) {
   options_.columns = {"2", "0", "1", "3", 1};
   holds_the_events("b.npy");
   options_.columns.x = "2";
-  EXPECT_THAT([&] { open("b.npy"); },
-              ThrowsMessage<InputError>(HasSubstr("each of the columns 0 to 3 once, got 2 twice")));
+  EXPECT_THROWS(open("b.npy"), InputError, "each of the columns 0 to 3 once, got 2 twice");
   options_.columns.x = "column";
-  EXPECT_THAT([&] { open("b.npy"); }, ThrowsMessage<InputError>(HasSubstr("got an array [N, 4]")));
+  EXPECT_THROWS(open("b.npy"), InputError, "got an array [N, 4]");
 }
 
 TEST_F(TableRecordingTest, IsAnArchiveOfArrays) {
@@ -101,20 +98,17 @@ TEST_F(TableRecordingTest, IsAnArchiveOfArrays) {
   testing::write_zip(folder_ / "a.npz",
                      {{"t_us.npy", t, true}, {"x.npy", x}, {"y.npy", y}, {"p.npy", p}});
   EXPECT_EQ(find_recording_format(folder_ / "a.npz", options_), std::nullopt);
-  EXPECT_THAT([&] { open("a.npz"); },
-              ThrowsMessage<InputError>(HasSubstr("expected an array \"t\", got none")));
+  EXPECT_THROWS(open("a.npz"), InputError, "expected an array \"t\", got none");
   options_.columns.t = "t_us";
   holds_the_events("a.npz");
   const std::string two = npy_file("<u2", {2}, std::vector<std::uint16_t>{0, 3});
   testing::write_zip(folder_ / "b.npz",
                      {{"t_us.npy", t}, {"x.npy", two}, {"y.npy", y}, {"p.npy", p}});
-  EXPECT_THAT([&] { open("b.npz"); },
-              ThrowsMessage<InputError>(
-                  AllOf(HasSubstr("expected numbers [3], got [2]"), HasSubstr("b.npz (x)"))));
+  EXPECT_THROWS(open("b.npz"), InputError, "expected numbers [3], got [2]", "b.npz (x)");
   const std::string text = npy_texts({"a", "b", "c"});
   testing::write_zip(folder_ / "c.npz",
                      {{"t_us.npy", t}, {"x.npy", text}, {"y.npy", y}, {"p.npy", p}});
-  EXPECT_THAT([&] { open("c.npz"); }, ThrowsMessage<InputError>(HasSubstr("got text [3]")));
+  EXPECT_THROWS(open("c.npz"), InputError, "got text [3]");
 }
 
 TEST_F(TableRecordingTest, IsATextWithAHeader) {
@@ -171,8 +165,7 @@ TEST_F(TableRecordingTest, ATimeThatIsInfiniteHidesNoOther) {
   testing::write_file(folder_ / "a.csv",
                       "t,x,y,p\n0.1,0,0,1\ninf,0,0,1\n0.12,1,0,1\n0.2,2,0,1\n0.3,3,0,1\n");
   const auto recording = open("a.csv");
-  EXPECT_THAT([&] { recording->events_in(0.05, 0.15); },
-              ThrowsMessage<InputError>(HasSubstr("got inf")));
+  EXPECT_THROWS(recording->events_in(0.05, 0.15), InputError, "got inf");
   EXPECT_THAT(recording->events_in(0.15, 0.25), ElementsAre(Event{2, 0, 0.2, true}));
   EXPECT_THAT(recording->events_in(0.25, 0.35), ElementsAre(Event{3, 0, 0.3, true}));
 }
@@ -193,11 +186,11 @@ TEST_F(TableRecordingTest, MetavisionsCsvHasNoHeader) {
   options_.sensor.reset();
   holds_the_events("a.csv");
   testing::write_file(folder_ / "b.csv", "0,2,1,5\n3,0,0,7\n1,1,1,7\n");
-  EXPECT_THAT([&] { open("b.csv"); }, ThrowsMessage<InputError>(HasSubstr("the sensor's size")));
+  EXPECT_THROWS(open("b.csv"), InputError, "the sensor's size");
   options_.sensor = ImageSize{3, 4};
   holds_the_events("b.csv");
   testing::write_file(folder_ / "c.csv", "%geometry:4,3\n0,2,1,5\n3,x,0,7\n");
-  EXPECT_THAT([&] { open("c.csv"); }, ThrowsMessage<InputError>(HasSubstr("(line 3)")));
+  EXPECT_THROWS(open("c.csv"), InputError, "(line 3)");
 }
 
 TEST_F(TableRecordingTest, TellsWhatItsTimesCount) {
@@ -222,8 +215,7 @@ TEST_F(TableRecordingTest, TellsWhatItsTimesCount) {
   EXPECT_EQ(table("0 2000", "time_ms"), (std::array{0.0, 2.0}));
   EXPECT_EQ(table("0 2", "t_s"), (std::array{0.0, 2.0}));
   const auto refused = [&](const std::string& times, const std::string& what) {
-    EXPECT_THAT([&] { table(times); },
-                ThrowsMessage<InputError>(AllOf(HasSubstr("expected \"unit\""), HasSubstr(what))));
+    EXPECT_THROWS(table(times), InputError, "expected \"unit\"", what);
   };
   refused("0 300000000000", "us (then 2 events take 300000 s) or ns (300 s)");
   refused("0.5 300000000", "s (then 2 events take 3e+08 s) or us (300 s)");
@@ -241,7 +233,7 @@ TEST_F(TableRecordingTest, AsksWhatTimesCountThatMayBeTwoThings) {
     return open("t.csv");
   };
   const auto asks = [&](int events, double span, const std::string& readings) {
-    EXPECT_THAT([&] { open_evenly(events, span); }, ThrowsMessage<InputError>(HasSubstr(readings)));
+    EXPECT_THROWS(open_evenly(events, span), InputError, readings);
   };
   asks(100'000, 9'999, "us (then 100000 events take 0.009999 s) or ms (9.999 s)");
   asks(2'000, 0, "or ms (0 s)");

@@ -11,6 +11,7 @@
 #include "stages/recordings/readers/recording.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -94,20 +95,24 @@ TEST(Aedat4Writer, OfNothingIsARecordingWithoutEvents) {
 TEST(Aedat4Writer, RefusesWhatTheFormatDoesNotHold) {
   const TemporaryFolder folder;
   for (const ImageSize size : {ImageSize{0, 5}, {5, 0}, {32768, 5}, {5, 32768}}) {
-    EXPECT_THROW(Aedat4Writer(folder / "a.aedat4", size), std::invalid_argument);
+    EXPECT_THROWS(Aedat4Writer(folder / "a.aedat4", size), std::invalid_argument,
+                  "expected a sensor of 1 to 32767 pixels a side for AEDAT 4.0");
   }
   Aedat4Writer writer(folder / "a.aedat4", {1, 2});
   const std::vector<std::uint8_t> grey{1, 2}, more{1, 2, 3};
   writer.add_frame(40, grey);
   writer.add_events(std::vector<StampedEvent>{{50, 1, 0, true}});
-  for (const StampedEvent& wrong :
-       {StampedEvent{49, 0, 0, true}, {50, 2, 0, true}, {50, 0, 1, true}}) {
-    EXPECT_THROW(writer.add_events(std::span(&wrong, 1)), std::invalid_argument);
+  for (const auto& [wrong, words] :
+       {std::pair(StampedEvent{49, 0, 0, true}, "events in time order"),
+        {{50, 2, 0, true}, "events within the size"},
+        {{50, 0, 1, true}, "events within the size"}}) {
+    EXPECT_THROWS(writer.add_events(std::span(&wrong, 1)), std::invalid_argument, words);
   }
-  EXPECT_THROW(writer.add_frame(49, grey), std::invalid_argument);
-  EXPECT_THROW(writer.add_frame(60, more), std::invalid_argument);
+  const char* const in_order = "expected a frame after the one before and not before any event";
+  EXPECT_THROWS(writer.add_frame(49, grey), std::invalid_argument, in_order);
+  EXPECT_THROWS(writer.add_frame(60, more), std::invalid_argument, "one or three channels");
   writer.add_frame(50, grey);
-  EXPECT_THROW(writer.add_frame(50, grey), std::invalid_argument);
+  EXPECT_THROWS(writer.add_frame(50, grey), std::invalid_argument, in_order);
   writer.commit();
   const auto recording = open(folder / "a.aedat4");
   EXPECT_EQ(recording->events_in(0, 1).size(), 1U);

@@ -14,6 +14,7 @@
 #include "stages/base/hdf5/hdf5.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -100,18 +101,22 @@ TEST(EventColumnsWriter, NoEventsAndNoTime) {
 TEST(EventColumnsWriter, RefusesWhatBreaksItsRules) {
   const testing::TemporaryFolder folder;
   constexpr std::int64_t kBeyond = std::int64_t{std::numeric_limits<std::uint32_t>::max()} + 1;
-  EXPECT_THROW(EventColumnsWriter(folder / "a", ColumnFile::kDsec, {0, 1}), std::invalid_argument);
-  EXPECT_THROW(EventColumnsWriter(folder / "a", ColumnFile::kDsec, {1, 65537}),
-               std::invalid_argument);
+  for (const ImageSize size : {ImageSize{0, 1}, {1, 65537}}) {
+    EXPECT_THROWS(EventColumnsWriter(folder / "a", ColumnFile::kDsec, size), std::invalid_argument,
+                  "expected an image size of 1x1 to 65536x65536");
+  }
   EventColumnsWriter writer(folder / "a", ColumnFile::kDsec, kOfColumns, 100);
   const auto add = [&](StampedEvent event) { writer.add_events(std::span(&event, 1)); };
-  EXPECT_THROW(add({99, 0, 0, true}), std::invalid_argument);
-  EXPECT_THROW(add({100, 6, 0, true}), std::invalid_argument);
-  EXPECT_THROW(add({100, 0, 4, true}), std::invalid_argument);
-  EXPECT_THROW(add({100 + kBeyond, 0, 0, true}), std::invalid_argument);
+  const auto refuses = [&](StampedEvent event, const char* words) {
+    EXPECT_THROWS(add(event), std::invalid_argument, words);
+  };
+  refuses({99, 0, 0, true}, "events in time order, not before the recording's begin");
+  refuses({100, 6, 0, true}, "expected events within the size");
+  refuses({100, 0, 4, true}, "expected events within the size");
+  refuses({100 + kBeyond, 0, 0, true}, "expected events within 2^32 microseconds");
   add({200, 0, 0, true});
-  EXPECT_THROW(add({199, 0, 0, true}), std::invalid_argument);
-  EXPECT_THROW(writer.commit(199), std::invalid_argument);
+  refuses({199, 0, 0, true}, "expected events in time order");
+  EXPECT_THROWS(writer.commit(199), std::invalid_argument, "an end that is not before the last");
   EXPECT_FALSE(std::filesystem::exists(folder / "a"));
   writer.commit(200);
   EXPECT_EQ(numbers<std::uint32_t>(folder / "a", "events/t"), std::vector<std::uint32_t>{100});

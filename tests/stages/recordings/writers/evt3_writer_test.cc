@@ -11,6 +11,7 @@
 #include "stages/recordings/readers/recording.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -119,16 +120,20 @@ TEST(Evt3Writer, OfNoEventsTellsItsEndAlone) {
 TEST(Evt3Writer, RefusesWhatTheFormatDoesNotHold) {
   const TemporaryFolder folder;
   for (const ImageSize size : {ImageSize{0, 5}, {5, 0}, {2049, 5}, {5, 2049}}) {
-    EXPECT_THROW(Evt3Writer(folder / "a.raw", size), std::invalid_argument);
+    EXPECT_THROWS(Evt3Writer(folder / "a.raw", size), std::invalid_argument,
+                  "expected a sensor of 1 to 2048 pixels a side for EVT 3.0");
   }
   Evt3Writer writer(folder / "a.raw", {4, 6});
   const std::vector<StampedEvent> in_order{{50, 5, 3, true}};
   writer.add_events(in_order);
-  for (const StampedEvent& wrong :
-       {StampedEvent{49, 0, 0, true}, {50, 6, 0, true}, {50, 0, 4, true}}) {
-    EXPECT_THROW(writer.add_events(std::span(&wrong, 1)), std::invalid_argument);
+  for (const auto& [wrong, words] :
+       {std::pair(StampedEvent{49, 0, 0, true}, "events in time order"),
+        {{50, 6, 0, true}, "events within the size"},
+        {{50, 0, 4, true}, "events within the size"}}) {
+    EXPECT_THROWS(writer.add_events(std::span(&wrong, 1)), std::invalid_argument, words);
   }
-  EXPECT_THROW(writer.commit(49), std::invalid_argument);
+  EXPECT_THROWS(writer.commit(49), std::invalid_argument,
+                "an end that is not before the last event");
   writer.commit(50);
   EXPECT_EQ(decode(words_of(testing::read_file(folder / "a.raw"))).size(), 1U);
 }
