@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "manifests/values/events.h"
+#include "pipeline/runtime/handover.h"
 #include "pipeline/runtime/memory.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/runtime/trace.h"
@@ -43,10 +44,14 @@ class Cursor {
       slot_ = 0;
       if (!shard_) return nullptr;
     }
-    auto message = std::make_shared<SampleMessage>();
+    Message message(new SampleMessage, [](SampleMessage* done) {
+      take_over(done);
+      delete done;
+    });
     message->number = number_++;
     message->shard = shard_;
     message->slot = static_cast<int>(slot_++);
+    hand_over(message.get());
     return message;
   }
 
@@ -105,8 +110,10 @@ std::size_t run_graph(const std::function<const PlannedShard*()>& next_shard,
   std::atomic<bool> stop = false;
   std::atomic<const PlannedShard*> at_writer = nullptr;
   std::size_t arrived = 0;  // touched by the serial writer alone
+  const Tasks tasks;
 
   flow::input_node<Message> source(graph, [&](oneapi::tbb::flow_control& control) -> Message {
+    const Tasks::Work work(tasks, &cursor);
     const StopOrder now = order();  // before at_writer is read, else an order that comes between
                                     // finds no shard at the writer and breaks off its first one
     Message message = stop ? nullptr : cursor.next(now, at_writer);
@@ -117,13 +124,15 @@ std::size_t run_graph(const std::function<const PlannedShard*()>& next_shard,
   flow::limiter_node<Message> limiter(graph, limits.in_flight);
   const auto parallel = [&](Stage stage, int at_once,
                             const std::function<void(SampleMessage&)>& body) {
-    return flow::function_node<Message, Message>(graph, static_cast<std::size_t>(at_once),
-                                                 [&body, &order, stage, trace](Message message) {
-                                                   if (order() == StopOrder::kAbort) return message;
-                                                   const SampleSpan span(trace, stage, *message);
-                                                   body(*message);
-                                                   return message;
-                                                 });
+    return flow::function_node<Message, Message>(
+        graph, static_cast<std::size_t>(at_once),
+        [&body, &order, &tasks, stage, trace](Message message) {
+          const Tasks::Work work(tasks, message.get());
+          if (order() == StopOrder::kAbort) return message;
+          const SampleSpan span(trace, stage, *message);
+          body(*message);
+          return message;
+        });
   };
   auto read = parallel(Stage::kRead, limits.threads, bodies.read);
   auto generate = parallel(Stage::kGenerate, limits.generators, bodies.generate);
@@ -132,6 +141,7 @@ std::size_t run_graph(const std::function<const PlannedShard*()>& next_shard,
                                           [](const Message& message) { return message->number; });
   flow::function_node<Message, flow::continue_msg> write(
       graph, flow::serial, [&](const Message& message) {
+        const Tasks::Work work(tasks, message.get()), in_turn(tasks, &arrived);
         ++arrived;
         at_writer = message->shard;
         const SampleSpan span(trace, Stage::kWrite, *message);

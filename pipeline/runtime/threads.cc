@@ -12,6 +12,7 @@
 #include <ctime>
 
 #include "pipeline/runtime/control_groups.h"
+#include "pipeline/runtime/handover.h"
 
 namespace eventgan {
 
@@ -30,11 +31,13 @@ void for_each_index(std::size_t count, int threads, const std::function<void(std
   const oneapi::tbb::global_control budget(oneapi::tbb::global_control::max_allowed_parallelism,
                                            static_cast<std::size_t>(threads));
   oneapi::tbb::task_arena arena(threads);
+  const Tasks tasks;
   // A task an index: each is long, and what waited behind one in its task could not be taken over.
   arena.execute([&] {
     oneapi::tbb::parallel_for(
         oneapi::tbb::blocked_range<std::size_t>(0, count),
         [&](const auto& range) {
+          const Tasks::Work task(tasks, &range);
           for (std::size_t i = range.begin(); i != range.end(); ++i) work(i);
         },
         oneapi::tbb::simple_partitioner());

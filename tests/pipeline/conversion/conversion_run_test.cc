@@ -7,10 +7,12 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstdlib>
 #include <deque>
 #include <map>
 #include <mutex>
 #include <stdexcept>
+#include <thread>
 
 #include "tests/pipeline/runtime/trace_reading.h"
 #include "tests/testing/fake_generator.h"
@@ -290,6 +292,28 @@ TEST_P(ConversionGraph, TracesEachStageOfEachSample) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Threads, ConversionGraph, ::testing::Values(1, 2, 5));
+
+#ifdef __SANITIZE_THREAD__
+/// What is not built for the sanitizer must not hide it.
+TEST(ConversionGraphUnderTheSanitizer, FindsARaceOfTheBodies) {
+  const auto race = [] {
+    const PlannedShard two = shard("s", 2);
+    std::atomic<int> here = 0;
+    int shared = 0;
+    Recorder recorder;
+    ConversionBodies bodies = recorder.bodies();
+    bodies.generate = [&](SampleMessage&) {
+      here.fetch_add(1, std::memory_order_relaxed);
+      while (here.load(std::memory_order_relaxed) < 2) std::this_thread::yield();
+      ++shared;
+    };
+    run_conversion_graph(one_by_one({&two}), bodies, {2, 3, 2}, go_on);
+    std::exit(0);
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(race(), ::testing::ExitedWithCode(66), "ThreadSanitizer: data race");
+}
+#endif
 
 constexpr std::size_t kMuch = std::size_t{1} << 50;
 const testing::FakeGenerator kGenerator;

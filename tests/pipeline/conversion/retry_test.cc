@@ -116,6 +116,21 @@ TEST_F(Retry, RedoesOnlyWhatWasQuarantined) {
   }
 }
 
+TEST_F(Retry, AGoodSampleStaysThoughItsFramesAreGone) {
+  spoil(5);  // pairs 4 and 5: slots 0 and 1 of the second shard
+  run();
+  const fs::path shard = out_ / "job-train-00001-of-00003.h5";
+  const std::vector<std::byte> before = ShardReader(shard).stored_chunk(2);
+  mend(5);
+  spoil(7);  // of pairs 6 and 7: slots 2 and 3
+  const RetryReport report = again();
+  EXPECT_EQ(report.mended, 2);
+  EXPECT_EQ(report.quarantined, 0);
+  const ShardReader after(shard);
+  EXPECT_EQ(after.stored_chunk(2), before);
+  for (int slot = 0; slot < 4; ++slot) EXPECT_TRUE(after.sample(slot).valid) << slot;
+}
+
 TEST_F(Retry, AFileOfTheSameSizeGivesTheShardsOfAFreshRun) {
   // An image whose bytes are wrong and whose size is right: the plan is the same, so all is.
   std::string bytes = testing::read_file(image(5));

@@ -69,6 +69,24 @@ void work() {
   }
 }
 
+#ifdef __SANITIZE_THREAD__
+/// What is not built for the sanitizer must not hide it.
+TEST(ForEachIndex, ARaceInItsTasksIsFound) {
+  const auto race = [] {
+    std::atomic<int> here = 0;
+    int shared = 0;
+    for_each_index(2, 2, [&](std::size_t) {
+      here.fetch_add(1, std::memory_order_relaxed);
+      while (here.load(std::memory_order_relaxed) < 2) std::this_thread::yield();
+      ++shared;
+    });
+    std::exit(0);
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(race(), ::testing::ExitedWithCode(66), "ThreadSanitizer: data race");
+}
+#endif
+
 TEST(ProcessorTime, OfTheProcessHoldsThatOfEveryThread) {
   const std::int64_t thread_ns = thread_processor_ns();
   const std::int64_t process_ns = process_processor_ns();
