@@ -2,17 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "manifests/documents/commit_record.h"
-#include "manifests/documents/json_text.h"
+#include "manifests/documents/report.h"
 #include "manifests/values/text.h"
 
 namespace eventgan {
 namespace {
-
-constexpr std::size_t kListedFaults = 20;
 
 double ratio(const ConversionReport& report) {
   return report.stored_bytes == 0 ? 0.0 : double(report.volume_bytes) / double(report.stored_bytes);
@@ -60,7 +57,73 @@ std::string labels_text(const ConversionReport& report) {
                     " with joints");
   }
   if (parts.empty()) parts.emplace_back("NO LABELS: no boxes and no persons with joints");
-  return fmt::format("\n{}", fmt::join(parts, "; "));
+  return fmt::format("{}", fmt::join(parts, "; "));
+}
+
+std::string size_text(const ConversionReport& report) {
+  std::string text =
+      fmt::format("{}, volumes compressed {:.1f}x, {:.1f} s", bytes_text(report.stored_bytes),
+                  ratio(report), report.wall_seconds);
+  if (report.stage_seconds.empty()) return text;
+  return text + "; busy seconds: " + joined(report.stage_seconds, " ", [](const auto& stage) {
+           return fmt::format("{} {:.1f}", stage.first, stage.second);
+         });
+}
+
+std::string unpaired_text(const ConversionReport& report) {
+  const char* const noun = report.is_labelled ? "labelled frame" : "frame";
+  return count_text(report.unpaired_frames, noun, " without a paired frame") +
+         (report.unpaired_frames == report.unpaired
+              ? ""
+              : " for at least one of their gaps, " + count_text(report.unpaired, "pair") +
+                    " in total") +
+         " (listed in plan.json)";
+}
+
+Report table_of(const ConversionReport& report) {
+  constexpr std::ptrdiff_t kListed = 20;
+  return {{"event", "report"},
+          {"part", report.part},
+          part_text(report) + shards_text(report),
+          {"planned", report.planned},
+          {"written", report.written},
+          {"shards_planned", report.shards_planned},
+          {"shards_done", report.shards_done},
+          {"shards_done_before", report.shards_done_before},
+          {"shards_done_by_others", report.shards_done_by_others},
+          {"plan_pairs", report.plan_pairs},
+          {"plan_shards", report.plan_shards},
+          size_text(report),
+          {"stored_bytes", report.stored_bytes},
+          {"volume_bytes", report.volume_bytes},
+          {"compression_ratio", ratio(report)},
+          {"stage_seconds", report.stage_seconds},
+          {"wall_seconds", report.wall_seconds},
+          labels_text(report),
+          {"boxes", report.boxes},
+          {"persons", report.persons},
+          {"unpaired", report.unpaired, unpaired_text(report)},
+          {"unpaired_frames", report.unpaired_frames},
+          {"quarantined",
+           json_list(report.quarantined,
+                     [](const QuarantinedSample& sample) -> nlohmann::json {
+                       return {{"sample_id", sample.sample_id}, {"reason", sample.reason}};
+                     }),
+           listed(report.quarantined, kListed, " (in the shards' commit records)",
+                  [](const QuarantinedSample& sample) { return "quarantined: " + sample.reason; })},
+          {"quarantined_elsewhere", report.quarantined_elsewhere},
+          {"too_many_faults", report.too_many_faults},
+          {"damaged", report.damaged},
+          {"lost", report.lost},
+          {"complete", report.complete()},
+          {"stopped", report.stopped, "stopped on request; run the same command again to resume"},
+          {"notes", report.notes, notes_text(report.notes)},
+          {"folder", report.folder,
+           report.folder + (report.finalized ? ": dataset.json, dataset.h5" : "")},
+          {"finalized", report.finalized},
+          report.quarantined.empty()
+              ? ""
+              : "next, once the inputs are fixed:  eventgan retry " + report.folder};
 }
 
 }  // namespace
@@ -77,78 +140,7 @@ void add_shard(const CommitRecord& record, std::int64_t volume_bytes, Conversion
                             record.quarantined.end());
 }
 
-std::string to_text(const ConversionReport& report) {
-  std::string text = part_text(report) + shards_text(report);
-  text += fmt::format("\n{}, volumes compressed {:.1f}x, {:.1f} s", bytes_text(report.stored_bytes),
-                      ratio(report), report.wall_seconds);
-  if (!report.stage_seconds.empty()) {
-    text += "; busy seconds:";
-    for (const auto& [stage, seconds] : report.stage_seconds) {
-      text += fmt::format(" {} {:.1f}", stage, seconds);
-    }
-  }
-  text += labels_text(report);
-  if (report.unpaired > 0) {
-    const char* const noun = report.is_labelled ? "labelled frame" : "frame";
-    text += "\n" + count_text(report.unpaired_frames, noun, " without a paired frame");
-    if (report.unpaired_frames != report.unpaired) {
-      text +=
-          " for at least one of their gaps, " + count_text(report.unpaired, "pair") + " in total";
-    }
-    text += " (listed in plan.json)";
-  }
-  const std::size_t listed = std::min(report.quarantined.size(), kListedFaults);
-  for (std::size_t i = 0; i < listed; ++i) {
-    text += "\nquarantined: " + escape_controls(report.quarantined[i].reason);
-  }
-  if (listed < report.quarantined.size()) {
-    text += fmt::format("\n... and {} more (in the shards' commit records)",
-                        report.quarantined.size() - listed);
-  }
-  if (report.stopped) text += "\nstopped on request; run the same command again to resume";
-  text += "\n" + notes_text(report.notes) + report.folder;
-  text += report.finalized ? ": dataset.json, dataset.h5\n" : "\n";
-  if (!report.quarantined.empty()) {
-    text += "next, once the inputs are fixed:  eventgan retry " + report.folder + "\n";
-  }
-  return text;
-}
-
-std::string to_json(const ConversionReport& report) {
-  nlohmann::json quarantined = nlohmann::json::array();
-  for (const QuarantinedSample& sample : report.quarantined) {
-    quarantined.push_back({{"sample_id", sample.sample_id}, {"reason", sample.reason}});
-  }
-  const nlohmann::json json = {{"event", "report"},
-                               {"folder", report.folder},
-                               {"part", report.part},
-                               {"planned", report.planned},
-                               {"written", report.written},
-                               {"quarantined", quarantined},
-                               {"boxes", report.boxes},
-                               {"persons", report.persons},
-                               {"unpaired", report.unpaired},
-                               {"unpaired_frames", report.unpaired_frames},
-                               {"notes", report.notes},
-                               {"shards_planned", report.shards_planned},
-                               {"shards_done", report.shards_done},
-                               {"shards_done_before", report.shards_done_before},
-                               {"shards_done_by_others", report.shards_done_by_others},
-                               {"damaged", report.damaged},
-                               {"lost", report.lost},
-                               {"plan_pairs", report.plan_pairs},
-                               {"plan_shards", report.plan_shards},
-                               {"quarantined_elsewhere", report.quarantined_elsewhere},
-                               {"stopped", report.stopped},
-                               {"finalized", report.finalized},
-                               {"complete", report.complete()},
-                               {"stored_bytes", report.stored_bytes},
-                               {"volume_bytes", report.volume_bytes},
-                               {"compression_ratio", ratio(report)},
-                               {"stage_seconds", report.stage_seconds},
-                               {"wall_seconds", report.wall_seconds},
-                               {"too_many_faults", report.too_many_faults}};
-  return dump_json(json) + "\n";
-}
+std::string to_text(const ConversionReport& report) { return text_of(table_of(report)); }
+std::string to_json(const ConversionReport& report) { return json_text_of(table_of(report)); }
 
 }  // namespace eventgan

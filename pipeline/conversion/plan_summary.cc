@@ -9,7 +9,7 @@
 #include <numeric>
 #include <utility>
 
-#include "manifests/documents/json_text.h"
+#include "manifests/documents/report.h"
 #include "manifests/values/text.h"
 #include "pipeline/conversion/sample_stages.h"
 #include "pipeline/runtime/progress.h"
@@ -132,38 +132,60 @@ std::string unpaired_text(const SourceSpec& spec, const SourceSummary& summary,
                             escape_controls(some_of(ids, 5)));
 }
 
-std::string source_text(const SourceSpec& spec, const SourceSummary& summary,
-                        const std::map<int, std::int64_t>& unpaired, std::int64_t shards) {
-  std::string text = fmt::format("{} {} ({})\n", to_string(spec.dataset),
-                                 escape_controls(spec.root), escape_controls(spec.split));
-  if (has_events(spec.dataset)) {
-    text += fmt::format("  windows          {}\n", pairs_of(summary));
-  } else {
-    text +=
-        fmt::format("  {:<15}  {}\n", has_labels(spec) ? "labelled frames" : "frames, NO LABELS",
-                    summary.labelled_frames);
-    text += fmt::format("  pairs            {}{}\n", pairs_of(summary),
-                        by_gap_text(summary.pairs_by_gap));
-    if (spec.pairs.stills) {
-      text += spec.pairs.clip_frames
-                  ? fmt::format("  clips of stills, {} frames each\n", *spec.pairs.clip_frames)
-                  : fmt::format("  stills under a drawn motion: {}\n", pairs_of(summary));
-    }
-    if (!spec.pairs.stills || summary.unpaired > 0) text += unpaired_text(spec, summary, unpaired);
-  }
-  if (summary.faults > 0) {
-    text += fmt::format(
-        "  to quarantine    {}  (a frame is missing inside the sequence, or a note says why)\n",
-        summary.faults);
-  }
-  for (const std::string& note : summary.notes) text += "  note: " + escape_controls(note) + "\n";
-  return text + fmt::format("  shards           {}\n", shards);
-}
-
 nlohmann::json by_gap_json(const std::map<int, std::int64_t>& counts) {
   nlohmann::json json = nlohmann::json::object();
   for (const auto& [gap, count] : counts) json[std::to_string(gap)] = count;
   return json;
+}
+
+Report table_of(const SourceSpec& spec, const SourceSummary& summary,
+                const std::map<int, std::int64_t>& unpaired, std::int64_t shards) {
+  const bool is_of_frames = !has_events(spec.dataset);
+  const std::int64_t pairs = pairs_of(summary);
+  const auto of_frames = [&](const std::string& text) { return is_of_frames ? text : ""; };
+  return {
+      fmt::format("{} {} ({})", to_string(spec.dataset), escape_controls(spec.root),
+                  escape_controls(spec.split)),
+      {"dataset", to_string(spec.dataset)},
+      {"root", spec.root},
+      {"split", spec.split},
+      of_frames(fmt::format("  {:<15}  {}",
+                            has_labels(spec) ? "labelled frames" : "frames, NO LABELS",
+                            summary.labelled_frames)),
+      {"labelled_frames", summary.labelled_frames},
+      is_of_frames
+          ? fmt::format("  pairs            {}{}", pairs, by_gap_text(summary.pairs_by_gap))
+          : fmt::format("  windows          {}", pairs),
+      {"pairs", pairs},
+      {"pairs_by_gap", by_gap_json(summary.pairs_by_gap)},
+      of_frames(!spec.pairs.stills ? ""
+                : spec.pairs.clip_frames
+                    ? fmt::format("  clips of stills, {} frames each", *spec.pairs.clip_frames)
+                    : fmt::format("  stills under a drawn motion: {}", pairs)),
+      {"stills", spec.pairs.stills ? pairs : 0},
+      is_of_frames && (!spec.pairs.stills || summary.unpaired > 0)
+          ? unpaired_text(spec, summary, unpaired)
+          : std::string(),
+      {"unpaired", summary.unpaired},
+      {"unpaired_by_gap", by_gap_json(unpaired)},
+      {"unpaired_frames", summary.unpaired_ids.size()},
+      {"unpaired_ids", summary.unpaired_ids},
+      {"missing_frames", summary.faults,
+       fmt::format("  to quarantine    {}  (a frame is missing inside the sequence, or a note says "
+                   "why)",
+                   summary.faults)},
+      {"notes", summary.notes, listed(summary.notes, "  note: {}")},
+      {"shards", shards},
+      fmt::format("  shards           {}", shards)};
+}
+
+std::vector<Report> tables_of_sources(const JobManifest& manifest, const PlannedJob& job) {
+  std::vector<Report> tables;
+  for (std::size_t i = 0; i < job.plan.sources.size(); ++i) {
+    tables.push_back(table_of(manifest.sources[i], job.plan.sources[i], job.unpaired_by_gap[i],
+                              shards_of(job.plan, static_cast<int>(i))));
+  }
+  return tables;
 }
 
 std::string estimate_text(const TrialEstimate& estimate, int threads, Device device) {
@@ -183,10 +205,7 @@ std::string plan_text(const JobManifest& manifest, const PlannedJob& job,
                       const TrialEstimate& estimate, int threads) {
   const Plan& plan = job.plan;
   std::string text;
-  for (std::size_t i = 0; i < plan.sources.size(); ++i) {
-    text += source_text(manifest.sources[i], plan.sources[i], job.unpaired_by_gap[i],
-                        shards_of(plan, static_cast<int>(i)));
-  }
+  for (const Report& source : tables_of_sources(manifest, job)) text += text_of(source);
   return text +
          fmt::format("total: {} in {}, ", count_text(plan.sample_count(), "pair"),
                      count_text(std::ssize(plan.shards), "shard")) +
@@ -195,35 +214,16 @@ std::string plan_text(const JobManifest& manifest, const PlannedJob& job,
 
 std::string plan_summary_json(const JobManifest& manifest, const PlannedJob& job,
                               const TrialEstimate& estimate, int threads) {
-  const Plan& plan = job.plan;
-  nlohmann::json sources = nlohmann::json::array();
-  for (std::size_t i = 0; i < plan.sources.size(); ++i) {
-    const SourceSummary& summary = plan.sources[i];
-    sources.push_back({{"dataset", to_string(manifest.sources[i].dataset)},
-                       {"root", manifest.sources[i].root},
-                       {"split", manifest.sources[i].split},
-                       {"labelled_frames", summary.labelled_frames},
-                       {"pairs", pairs_of(summary)},
-                       {"stills", manifest.sources[i].pairs.stills ? pairs_of(summary) : 0},
-                       {"pairs_by_gap", by_gap_json(summary.pairs_by_gap)},
-                       {"unpaired", summary.unpaired},
-                       {"unpaired_by_gap", by_gap_json(job.unpaired_by_gap[i])},
-                       {"unpaired_frames", summary.unpaired_ids.size()},
-                       {"unpaired_ids", summary.unpaired_ids},
-                       {"missing_frames", summary.faults},
-                       {"notes", summary.notes},
-                       {"shards", shards_of(plan, static_cast<int>(i))}});
-  }
-  const nlohmann::json json = {{"name", plan.name},
-                               {"sources", sources},
-                               {"pairs", plan.sample_count()},
-                               {"shards", plan.shards.size()},
-                               {"threads", threads},
-                               {"pairs_measured", estimate.pairs_measured},
-                               {"seconds_per_pair", estimate.seconds_per_pair},
-                               {"estimated_seconds", estimate.seconds},
-                               {"estimated_bytes", estimate.stored_bytes}};
-  return dump_json(json, JsonLayout::kIndented) + "\n";
+  return json_text_of({{"name", job.plan.name},
+                       {"sources", json_list(tables_of_sources(manifest, job), json_of)},
+                       {"pairs", job.plan.sample_count()},
+                       {"shards", job.plan.shards.size()},
+                       {"threads", threads},
+                       {"pairs_measured", estimate.pairs_measured},
+                       {"seconds_per_pair", estimate.seconds_per_pair},
+                       {"estimated_seconds", estimate.seconds},
+                       {"estimated_bytes", estimate.stored_bytes}},
+                      JsonLayout::kIndented);
 }
 
 }  // namespace eventgan

@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text.h"
 #include "manifests/documents/plan.h"
+#include "manifests/documents/report.h"
 #include "manifests/files/file_lock.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
@@ -360,79 +360,54 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
 
 namespace {
 
-constexpr std::size_t kListedSamples = 20;
+/// What came of the samples that were tried; nothing if the shards were only renamed.
+std::string tried_text(const RetryReport& report) {
+  if (report.tried > 0 || report.quarantined > 0) {
+    return fmt::format("{} of {} fixed, {} rewritten; still quarantined: {} of {}", report.mended,
+                       count_text(report.tried, "quarantined sample"),
+                       count_text(report.shards_rewritten, "shard"), report.quarantined,
+                       count_text(report.planned, "sample"));
+  }
+  if (report.shards_renamed > 0 || report.stopped) return "";
+  return "nothing to retry: no sample of a committed shard is quarantined";
+}
+
+Report table_of(const RetryReport& report) {
+  constexpr std::ptrdiff_t kListed = 20;
+  return {
+      {"event", "report"},
+      {"damaged_shards", report.damaged_shards,
+       listed(report.damaged_shards, "{}; eventgan convert makes it again")},
+      {"shards_missing", report.shards_missing,
+       count_text(report.shards_missing, "shard") + " not made yet: run eventgan convert"},
+      {"changed_inputs", report.changed_inputs,
+       fmt::format("inputs changed since the plan was frozen ({}): recorded, eventgan convert will "
+                   "accept them",
+                   fmt::join(report.changed_inputs, ", "))},
+      {"shards_renamed", report.shards_renamed,
+       "classes were added: named in " + count_text(report.shards_renamed, "shard")},
+      tried_text(report),
+      {"planned", report.planned},
+      {"tried", report.tried},
+      {"mended", report.mended},
+      {"shards_rewritten", report.shards_rewritten},
+      {"quarantined", report.quarantined},
+      {"failed", report.failed,
+       listed(report.failed, kListed, " (in the shards' commit records)",
+              [](const QuarantinedSlot& sample) { return "quarantined: " + sample.reason; })},
+      {"dataset_outdated", report.dataset_outdated,
+       "dataset.json and dataset.h5 told of the shards as they were and are removed: run eventgan "
+       "finalize again"},
+      {"stopped", report.stopped, "stopped before all were done: run again"},
+      {"notes", report.notes, notes_text(report.notes)},
+      {"folder", report.folder, report.folder},
+      {"too_many_faults", report.too_many_faults},
+      {"wall_seconds", report.wall_seconds}};
+}
 
 }  // namespace
 
-std::string to_text(const RetryReport& report) {
-  std::string text;
-  for (const std::string& fault : report.damaged_shards) {
-    text += fault + "; eventgan convert makes it again\n";
-  }
-  if (report.shards_missing > 0) {
-    text += count_text(report.shards_missing, "shard") + " not made yet: run eventgan convert\n";
-  }
-  if (!report.changed_inputs.empty()) {
-    text += fmt::format(
-        "inputs changed since the plan was frozen ({}): recorded, eventgan convert will accept "
-        "them\n",
-        fmt::join(report.changed_inputs, ", "));
-  }
-  if (report.shards_renamed > 0) {
-    text += "classes were added: named in " + count_text(report.shards_renamed, "shard") + "\n";
-  }
-  if (report.tried == 0 && report.quarantined == 0) {
-    const bool is_all = report.shards_renamed == 0 && !report.stopped;
-    if (is_all) text += "nothing to retry: no sample of a committed shard is quarantined\n";
-  } else {
-    text += fmt::format("{} of {} fixed, {} rewritten; still quarantined: {} of {}\n",
-                        report.mended, count_text(report.tried, "quarantined sample"),
-                        count_text(report.shards_rewritten, "shard"), report.quarantined,
-                        count_text(report.planned, "sample"));
-  }
-  const std::size_t listed = std::min(report.failed.size(), kListedSamples);
-  for (std::size_t i = 0; i < listed; ++i) {
-    text += "quarantined: " + escape_controls(report.failed[i].reason) + "\n";
-  }
-  if (listed < report.failed.size()) {
-    text += fmt::format("... and {} more (in the shards' commit records)\n",
-                        report.failed.size() - listed);
-  }
-  if (report.dataset_outdated) {
-    text +=
-        "dataset.json and dataset.h5 told of the shards as they were and are removed: run eventgan "
-        "finalize again\n";
-  }
-  if (report.stopped) text += "stopped before all were done: run again\n";
-  return text + notes_text(report.notes) + report.folder + "\n";
-}
-
-std::string to_json(const RetryReport& report) {
-  nlohmann::json failed = nlohmann::json::array();
-  for (const QuarantinedSlot& sample : report.failed) {
-    failed.push_back({{"sample_id", sample.sample_id},
-                      {"shard", sample.shard},
-                      {"slot", sample.slot},
-                      {"reason", sample.reason}});
-  }
-  const nlohmann::json json = {{"event", "report"},
-                               {"folder", report.folder},
-                               {"planned", report.planned},
-                               {"tried", report.tried},
-                               {"mended", report.mended},
-                               {"failed", failed},
-                               {"quarantined", report.quarantined},
-                               {"shards_rewritten", report.shards_rewritten},
-                               {"shards_renamed", report.shards_renamed},
-                               {"damaged_shards", report.damaged_shards},
-                               {"shards_missing", report.shards_missing},
-                               {"changed_inputs", report.changed_inputs},
-                               {"notes", report.notes},
-                               {"stopped", report.stopped},
-                               {"too_many_faults", report.too_many_faults},
-                               {"dataset_outdated", report.dataset_outdated},
-                               {"wall_seconds", report.wall_seconds}};
-  return dump_json(json) + "\n";
-}
+std::string to_text(const RetryReport& report) { return text_of(table_of(report)); }
+std::string to_json(const RetryReport& report) { return json_text_of(table_of(report)); }
 
 }  // namespace eventgan

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "manifests/documents/job_manifest.h"
-#include "manifests/documents/json_text.h"
+#include "manifests/documents/report.h"
 #include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
@@ -221,32 +221,28 @@ Json source_entry(const DatasetParts& parts, std::size_t index) {
   return source;
 }
 
-Json quarantined_json(const DatasetParts& parts) {
-  Json list = Json::array();
+std::vector<QuarantinedSlot> quarantined_in(const DatasetParts& parts) {
+  std::vector<QuarantinedSlot> slots;
   for (const ShardState& shard : parts.done) {
     for (const QuarantinedSample& sample : shard.record->quarantined) {
-      list.push_back({{"sample_id", sample.sample_id},
-                      {"shard", shard.outline.name},
-                      {"slot", sample.slot},
-                      {"reason", sample.reason}});
+      slots.push_back({shard.outline.name, sample.slot, sample.sample_id, sample.reason});
     }
   }
-  return list;
+  return slots;
 }
 
 Json view_entry(const DatasetView& view) {
   const VolumeShape& volume = view.header.volume;
-  Json splits = Json::array();
-  for (const SplitRange& split : view.layout.splits) {
-    splits.push_back(
-        {{"name", split.name}, {"first", split.samples.first}, {"rows", split.samples.count}});
-  }
   return {{"group", view.group.empty() ? "/" : view.group},
           {"dataset", view.header.dataset},
           {"dtype", to_string(view.header.dtype)},
           {"volume_shape", {volume.channels(), volume.size.height, volume.size.width}},
           {"samples", view.layout.sample_count()},
-          {"splits", splits}};
+          {"splits", json_list(view.layout.splits, [](const SplitRange& split) -> Json {
+             return {{"name", split.name},
+                     {"first", split.samples.first},
+                     {"rows", split.samples.count}};
+           })}};
 }
 
 /// What the settings do not say of what decided the bytes: inputs, versions, the processor. The
@@ -255,14 +251,6 @@ std::map<std::string, std::string> circumstances(const DatasetParts& parts) {
   auto fields = amended(parts.frozen.plan.fingerprint, parts.amendments);
   std::erase_if(fields, [](const auto& field) { return field.first.starts_with("manifest "); });
   return fields;
-}
-
-Json amendments_json(const std::vector<Amendment>& amendments) {
-  Json list = Json::array();
-  for (const Amendment& amendment : amendments) {
-    list.push_back({{"fields", amendment.fields}, {"samples", amendment.samples}});
-  }
-  return list;
 }
 
 /// The manifest, which may have comments; it was parsed strictly before.
@@ -298,18 +286,19 @@ Json description(const DatasetParts& parts) {
                {"generator", header.generator},
                {"settings", settings(parts.frozen.plan.manifest_text)},
                {"counts", counts_json(parts)}};
-  json["missing"] = Json::array();
-  for (const ShardState& shard : parts.missing) json["missing"].push_back(shard.outline.name);
+  json["missing"] =
+      json_list(parts.missing, [](const ShardState& shard) { return shard.outline.name; });
   json["sources"] = Json::array();
   for (std::size_t i = 0; i < parts.manifest.sources.size(); ++i) {
     json["sources"].push_back(source_entry(parts, i));
   }
-  json["shards"] = Json::array();
-  for (const ShardState& shard : parts.done) {
-    json["shards"].push_back(shard_entry(parts, shard));
-  }
-  json["quarantined"] = quarantined_json(parts);
-  if (!parts.amendments.empty()) json["amendments"] = amendments_json(parts.amendments);
+  json["shards"] =
+      json_list(parts.done, [&](const ShardState& shard) { return shard_entry(parts, shard); });
+  json["quarantined"] = quarantined_in(parts);
+  if (parts.amendments.empty()) return json;
+  json["amendments"] = json_list(parts.amendments, [](const Amendment& amendment) -> Json {
+    return {{"fields", amendment.fields}, {"samples", amendment.samples}};
+  });
   return json;
 }
 
@@ -324,8 +313,7 @@ std::string describe_dataset(const DatasetParts& parts, const std::vector<Datase
   json["view"] = {{"name", kViewName},
                   {"sha256", receipt.sha256},
                   {"size_bytes", receipt.size_bytes},
-                  {"views", Json::array()}};
-  for (const DatasetView& view : views) json["view"]["views"].push_back(view_entry(view));
+                  {"views", json_list(views, view_entry)}};
   return text_of(json);
 }
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "manifests/documents/json_text.h"
+#include "manifests/documents/report.h"
 #include "manifests/files/atomic_file.h"
 #include "manifests/files/input_file.h"
 #include "manifests/values/job.h"
@@ -53,59 +53,53 @@ FinalizationReport finalize(const std::filesystem::path& folder,
 
 namespace {
 
-constexpr std::size_t kListedShards = 100;
-
 /// "missing", or what is wrong with what is there.
 std::string why(const ShardState& shard) {
   return shard.faults.empty() ? to_string(shard.condition) : shard.faults.front();
 }
 
+std::string outcome_text(const FinalizationReport& report) {
+  if (!report.written) {
+    return report.counts.shards == 0 ? "not finalized: no shard is done"
+                                     : "not finalized: incomplete (--partial to allow it)";
+  }
+  return (report.complete() ? "" : "PARTIAL: finalize again when the rest is done\n") +
+         report.folder + ": " + kDescriptionName + ", " + kViewName;
+}
+
+Report table_of(const FinalizationReport& report) {
+  constexpr std::ptrdiff_t kListed = 100;
+  const DatasetCounts& counts = report.counts;
+  return {{"missing",
+           json_list(report.missing,
+                     [](const ShardState& shard) -> nlohmann::json {
+                       return {{"shard", shard.outline.name}, {"why", why(shard)}};
+                     }),
+           listed(report.missing, kListed, " (--json lists them)",
+                  [](const ShardState& shard) {  // what is wrong with a shard names its file
+                    return (shard.faults.empty() ? shard.outline.name + ": " : "") + why(shard);
+                  })},
+          {"shards_planned", report.shards_planned},
+          {"shards_done", counts.shards},
+          {"samples", counts.samples},
+          {"valid", counts.valid},
+          {"quarantined", counts.quarantined()},
+          {"boxes", counts.boxes},
+          {"persons", counts.persons},
+          fmt::format("{} of {}: {}", counts.shards, count_text(report.shards_planned, "shard"),
+                      contents_text(counts)),
+          {"notes", report.notes, notes_text(report.notes)},
+          {"folder", report.folder},
+          {"written", report.written},
+          {"complete", report.complete()},
+          {"views", report.views},
+          {"too_many_faults", report.too_many_faults},
+          outcome_text(report)};
+}
+
 }  // namespace
 
-std::string to_text(const FinalizationReport& report) {
-  std::string text;
-  const std::size_t listed = std::min(report.missing.size(), kListedShards);
-  for (std::size_t i = 0; i < listed; ++i) {
-    const ShardState& shard = report.missing[i];
-    // What is wrong with a shard names its file.
-    text += escape_controls((shard.faults.empty() ? shard.outline.name + ": " : "") + why(shard)) +
-            "\n";
-  }
-  if (listed < report.missing.size()) {
-    text += fmt::format("... and {} more (--json lists them)\n", report.missing.size() - listed);
-  }
-  const DatasetCounts& counts = report.counts;
-  text += fmt::format("{} of {}: {}\n", counts.shards, count_text(report.shards_planned, "shard"),
-                      contents_text(counts));
-  text += notes_text(report.notes);
-  if (!report.written) {
-    return text + (counts.shards == 0 ? "not finalized: no shard is done\n"
-                                      : "not finalized: incomplete (--partial to allow it)\n");
-  }
-  if (!report.complete()) text += "PARTIAL: finalize again when the rest is done\n";
-  return text + report.folder + ": " + kDescriptionName + ", " + kViewName + "\n";
-}
-
-std::string to_json(const FinalizationReport& report) {
-  nlohmann::json missing = nlohmann::json::array();
-  for (const ShardState& shard : report.missing) {
-    missing.push_back({{"shard", shard.outline.name}, {"why", why(shard)}});
-  }
-  const nlohmann::json json = {{"folder", report.folder},
-                               {"complete", report.complete()},
-                               {"written", report.written},
-                               {"shards_planned", report.shards_planned},
-                               {"shards_done", report.counts.shards},
-                               {"missing", missing},
-                               {"samples", report.counts.samples},
-                               {"valid", report.counts.valid},
-                               {"quarantined", report.counts.quarantined()},
-                               {"boxes", report.counts.boxes},
-                               {"persons", report.counts.persons},
-                               {"notes", report.notes},
-                               {"views", report.views},
-                               {"too_many_faults", report.too_many_faults}};
-  return dump_json(json) + "\n";
-}
+std::string to_text(const FinalizationReport& report) { return text_of(table_of(report)); }
+std::string to_json(const FinalizationReport& report) { return json_text_of(table_of(report)); }
 
 }  // namespace eventgan

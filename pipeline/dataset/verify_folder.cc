@@ -16,7 +16,7 @@
 
 #include "manifests/documents/commit_record.h"
 #include "manifests/documents/job_manifest.h"
-#include "manifests/documents/json_text.h"
+#include "manifests/documents/report.h"
 #include "manifests/files/input_file.h"
 #include "manifests/files/sha256.h"
 #include "manifests/files/unfinished_files.h"
@@ -288,42 +288,44 @@ std::string line_of(const ShardCheck& shard, bool deep) {
   return text;
 }
 
+Report table_of(const FolderCheck& check, bool deep, const fs::path& folder) {
+  const std::string shards = count_text(check.shards(), "shard");
+  return {
+      {"folder", folder.string()},
+      {"notes", check.notes, listed(check.notes, "note: {}")},
+      {"shards",
+       json_list(check.by_shard,
+                 [](const ShardCheck& shard) -> nlohmann::json {
+                   return {{"shard", shard.name},
+                           {"condition", to_string(shard.condition)},
+                           {"size_bytes", shard.size_bytes},
+                           {"samples", shard.samples},
+                           {"quarantined", shard.quarantined},
+                           {"compared", shard.compared},
+                           {"faults", shard.faults}};
+                 }),
+       joined(check.by_shard, "",
+              [&](const ShardCheck& shard) { return line_of(shard, deep) + "\n"; })},
+      {"faults", check.faults, listed(check.faults)},
+      {"compared", check.compared},
+      deep ? "labels of " + count_text(check.compared, "sample") + " compared with their sources"
+           : "",
+      {"sound", check.sound()},
+      {"samples", check.samples},
+      {"valid", check.valid},
+      {"quarantined", check.samples - check.valid},
+      check.sound() ? fmt::format("sound: {}, {}, {} of them quarantined", shards,
+                                  count_text(check.samples, "sample"), check.samples - check.valid)
+                    : count_text(std::ssize(check.faults), "fault") + " in " + shards};
+}
+
 }  // namespace
 
 std::string to_text(const FolderCheck& check, bool deep) {
-  std::string text;
-  for (const std::string& note : check.notes) text += "note: " + escape_controls(note) + "\n";
-  for (const ShardCheck& shard : check.by_shard) text += line_of(shard, deep) + "\n";
-  for (const std::string& fault : check.faults) text += escape_controls(fault) + "\n";
-  if (deep)
-    text += "labels of " + count_text(check.compared, "sample") + " compared with their sources\n";
-  if (!check.sound()) {
-    return text + count_text(std::ssize(check.faults), "fault") + " in " +
-           count_text(check.shards(), "shard") + "\n";
-  }
-  return text + fmt::format("sound: {}, {}, {} of them quarantined\n",
-                            count_text(check.shards(), "shard"),
-                            count_text(check.samples, "sample"), check.samples - check.valid);
+  return text_of(table_of(check, deep, {}));
 }
-
 std::string to_json(const FolderCheck& check, const fs::path& folder) {
-  nlohmann::json shards = nlohmann::json::array();
-  for (const ShardCheck& shard : check.by_shard) {
-    shards.push_back({{"shard", shard.name},
-                      {"condition", to_string(shard.condition)},
-                      {"size_bytes", shard.size_bytes},
-                      {"samples", shard.samples},
-                      {"quarantined", shard.quarantined},
-                      {"compared", shard.compared},
-                      {"faults", shard.faults}});
-  }
-  const nlohmann::json json = {
-      {"folder", folder.string()},  {"sound", check.sound()},
-      {"shards", shards},           {"samples", check.samples},
-      {"valid", check.valid},       {"quarantined", check.samples - check.valid},
-      {"compared", check.compared}, {"faults", check.faults},
-      {"notes", check.notes}};
-  return dump_json(json) + "\n";
+  return json_text_of(table_of(check, false, folder));
 }
 
 }  // namespace eventgan

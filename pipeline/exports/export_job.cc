@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "manifests/documents/json_text.h"
+#include "manifests/documents/report.h"
 #include "manifests/files/atomic_file.h"
 #include "manifests/files/input_file.h"
 #include "manifests/files/sha256.h"
@@ -158,30 +158,30 @@ ExportReport run_export(const std::filesystem::path& folder, const ExportOptions
   return report;
 }
 
-std::string to_text(const ExportReport& report) {
-  std::string text = fmt::format("{}: {}, {} left out (listed in export.json)\n", report.folder,
-                                 count_text(report.samples, "sample"),
-                                 count_text(report.quarantined, "quarantined sample"));
-  for (const auto& [what, count] : report.left_out) {
-    text += fmt::format("left out: {} {}\n", count, what);
-  }
-  for (const std::string& note : report.notes) text += "note: " + note + "\n";
-  if (!report.missing.empty()) {
-    text += "PARTIAL: without " + count_text(std::ssize(report.missing), "shard") +
-            ", missing when the folder was finalized\n";
-  }
-  return text;
+namespace {
+
+Report table_of(const ExportReport& report) {
+  return {{"event", "report"},
+          {"folder", report.folder},
+          {"samples", report.samples},
+          {"quarantined", report.quarantined},
+          fmt::format("{}: {}, {} left out (listed in export.json)", report.folder,
+                      count_text(report.samples, "sample"),
+                      count_text(report.quarantined, "quarantined sample")),
+          {"left_out", report.left_out,
+           joined(report.left_out, "",
+                  [](const auto& what) {
+                    return fmt::format("left out: {} {}\n", what.second, what.first);
+                  })},
+          {"notes", report.notes, listed(report.notes, "note: {}")},
+          {"missing_shards", report.missing,
+           "PARTIAL: without " + count_text(std::ssize(report.missing), "shard") +
+               ", missing when the folder was finalized"}};
 }
 
-std::string to_json(const ExportReport& report) {
-  return dump_json(nlohmann::json{{"event", "report"},
-                                  {"folder", report.folder},
-                                  {"samples", report.samples},
-                                  {"quarantined", report.quarantined},
-                                  {"left_out", report.left_out},
-                                  {"notes", report.notes},
-                                  {"missing_shards", report.missing}}) +
-         "\n";
-}
+}  // namespace
+
+std::string to_text(const ExportReport& report) { return text_of(table_of(report)); }
+std::string to_json(const ExportReport& report) { return json_text_of(table_of(report)); }
 
 }  // namespace eventgan

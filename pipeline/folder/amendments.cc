@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/documents/json_text.h"
+#include "manifests/documents/report.h"
 #include "manifests/documents/strict_json.h"
 #include "manifests/files/atomic_file.h"
 #include "manifests/files/file_lock.h"
@@ -89,14 +89,13 @@ void record_amendment(const fs::path& folder, const std::string& plan_hash,
   std::vector<Amendment> all = read_amendments(folder, plan_hash);
   if (!all.empty() && all.back() == amendment) return;  // by another who found the same
   all.push_back(amendment);
-  nlohmann::json amendments = nlohmann::json::array();
-  for (const auto& [fields, samples] : all) {
-    amendments.push_back({{"fields", fields}, {"samples", samples}});
-  }
-  const nlohmann::json json = {{"format", kFormat},
-                               {"version", kVersion},
-                               {"plan_hash", plan_hash},
-                               {"amendments", amendments}};
+  const nlohmann::json json = {
+      {"format", kFormat},
+      {"version", kVersion},
+      {"plan_hash", plan_hash},
+      {"amendments", json_list(all, [](const Amendment& one) -> nlohmann::json {
+         return {{"fields", one.fields}, {"samples", one.samples}};
+       })}};
   write_file_atomically(folder / kName, dump_json(json, JsonLayout::kIndented) + "\n");
 }
 

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "manifests/documents/commit_record.h"
-#include "manifests/documents/json_text.h"
 #include "manifests/documents/plan.h"
+#include "manifests/documents/report.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
 #include "pipeline/runtime/progress.h"
@@ -202,33 +202,35 @@ namespace {
 /// Lists for a person end here; --json has everything.
 constexpr std::size_t kListed = 20;
 
-/// Rows of cells, the columns aligned, each row indented; cut after kListed rows.
-std::string table(std::vector<std::vector<std::string>> rows) {
-  const std::size_t shown = std::min(rows.size(), kListed);
+using Cells = std::vector<std::string>;
+
+/// A title, and a row of cells for each item, the columns aligned, each row indented; cut after
+/// kListed rows. Nothing where there is no item.
+template <class Items, class CellsOf>
+std::string section(const std::string& title, const Items& items, const CellsOf& cells_of) {
+  std::vector<Cells> rows;
   std::vector<std::size_t> widths;
-  for (std::size_t i = 0; i < shown; ++i) {
-    for (std::string& cell : rows[i]) cell = escape_controls(cell);
-    widths.resize(std::max(widths.size(), rows[i].size()));
-    for (std::size_t j = 0; j < rows[i].size(); ++j) {
-      widths[j] = std::max(widths[j], rows[i][j].size());
+  for (const auto& item : items) {
+    if (rows.size() == kListed) break;
+    Cells& row = rows.emplace_back(cells_of(item));
+    widths.resize(std::max(widths.size(), row.size()));
+    for (std::size_t j = 0; j < row.size(); ++j) {
+      row[j] = escape_controls(row[j]);
+      widths[j] = std::max(widths[j], row[j].size());
     }
   }
-  std::string text;
-  for (std::size_t i = 0; i < shown; ++i) {
+  std::string text = title + "\n";
+  for (const Cells& row : rows) {
     text += "  ";
-    for (std::size_t j = 0; j + 1 < rows[i].size(); ++j) {
-      text += rows[i][j] + std::string(widths[j] - rows[i][j].size() + 2, ' ');
+    for (std::size_t j = 0; j + 1 < row.size(); ++j) {
+      text += row[j] + std::string(widths[j] - row[j].size() + 2, ' ');
     }
-    text += rows[i].back() + "\n";
+    text += row.back() + "\n";
   }
-  if (rows.size() > shown) {
-    text += fmt::format("  ... and {} more (--json lists them)\n", rows.size() - shown);
+  if (items.size() > rows.size()) {
+    text += fmt::format("  ... and {} more (--json lists them)\n", items.size() - rows.size());
   }
   return text;
-}
-
-std::string section(const std::string& title, const std::vector<std::vector<std::string>>& rows) {
-  return rows.empty() ? "" : title + "\n" + table(rows);
 }
 
 std::string age_text(const UnfinishedFile& file) {
@@ -236,31 +238,8 @@ std::string age_text(const UnfinishedFile& file) {
   return file.silent_s < 0 ? "dated " + span + " ahead" : "last wrote " + span + " ago";
 }
 
-std::vector<std::vector<std::string>> running_rows(const FolderStatus& status) {
-  std::vector<std::vector<std::string>> rows;
-  for (const auto& [shard, file] : status.running) {
-    rows.push_back({shard, file.name.host, "pid " + std::to_string(file.name.pid),
-                    to_string(file.writer), age_text(file)});
-  }
-  return rows;
-}
-
-std::vector<std::vector<std::string>> left_over_rows(const FolderStatus& status) {
-  std::vector<std::vector<std::string>> rows;
-  for (const UnfinishedFile& file : status.left_over) {
-    rows.push_back({file.path.filename().string(), to_string(file.writer), age_text(file)});
-  }
-  return rows;
-}
-
-std::vector<std::vector<std::string>> damaged_rows(const FolderStatus& status) {
-  std::vector<std::vector<std::string>> rows;
-  for (const std::string& fault : status.damaged) rows.push_back({fault});
-  return rows;
-}
-
 /// A row a reason, the commonest first, with one of its samples.
-std::vector<std::vector<std::string>> reason_rows(const FolderStatus& status) {
+std::vector<Cells> reason_rows(const FolderStatus& status) {
   std::map<std::string, std::vector<const QuarantinedSlot*>> by_kind;
   for (const QuarantinedSlot& sample : status.quarantined) {
     by_kind[fault_kind(sample.reason)].push_back(&sample);
@@ -270,7 +249,7 @@ std::vector<std::vector<std::string>> reason_rows(const FolderStatus& status) {
   std::stable_sort(kinds.begin(), kinds.end(), [](const auto& one, const auto& other) {
     return one.second.size() > other.second.size();
   });
-  std::vector<std::vector<std::string>> rows;
+  std::vector<Cells> rows;
   for (const auto& [kind, samples] : kinds) {
     const QuarantinedSlot& first = *samples.front();
     rows.push_back({std::to_string(samples.size()),
@@ -309,94 +288,76 @@ std::string under_way_text(const FolderStatus& status) {
              : fmt::format("{} more in unfinished shards, ", status.samples_under_way);
 }
 
-}  // namespace
-
-std::string status_text(const FolderStatus& status) {
-  return fmt::format("folder   {}\n", status.folder.string()) +
-         fmt::format("plan     {:.16}\n", status.plan_hash) +
-         fmt::format("shards   {}\n", shards_text(status)) +
-         fmt::format("samples  {} of {} written, {}{} quarantined\n", status.samples_written,
-                     status.samples_planned, under_way_text(status), status.quarantined.size()) +
-         fmt::format("work     {}\n", work_text(status)) +
-         section("running", running_rows(status)) +
-         section("left over by dead writers (deleted by the next convert)",
-                 left_over_rows(status)) +
-         section("damaged (made again by the next convert)", damaged_rows(status)) +
-         section("quarantined (eventgan retry makes them once their inputs are fixed)",
-                 reason_rows(status)) +
-         notes_text(status.notes);
+nlohmann::json number(const std::optional<double>& value) {
+  return value ? nlohmann::json(*value) : nlohmann::json();
 }
 
-namespace {
-
-using nlohmann::json;
-
-json number(const std::optional<double>& value) { return value ? json(*value) : json(); }
-
-json writer_json(const UnfinishedFile& file) {
-  return {{"host", file.name.host},
+nlohmann::json writer_json(const UnfinishedFile& file, const char* key, const std::string& name) {
+  return {{key, name},
+          {"host", file.name.host},
           {"pid", file.name.pid},
           {"silent_s", file.silent_s},
           {"writer", to_string(file.writer)}};
 }
 
-json running_json(const FolderStatus& status) {
-  json list = json::array();
-  for (const ShardAtWork& work : status.running) {
-    list.push_back(writer_json(work.file));
-    list.back()["shard"] = work.shard;
-  }
-  return list;
-}
-
-json left_over_json(const FolderStatus& status) {
-  json list = json::array();
-  for (const UnfinishedFile& file : status.left_over) {
-    list.push_back(writer_json(file));
-    list.back()["file"] = file.path.filename().string();
-  }
-  return list;
-}
-
-json quarantined_json(const FolderStatus& status) {
-  json list = json::array();
-  for (const QuarantinedSlot& sample : status.quarantined) {
-    list.push_back({{"sample_id", sample.sample_id},
-                    {"shard", sample.shard},
-                    {"slot", sample.slot},
-                    {"reason", sample.reason}});
-  }
-  return list;
+Report table_of(const FolderStatus& status) {
+  std::map<std::string, int> reasons;
+  for (const QuarantinedSlot& sample : status.quarantined) ++reasons[fault_kind(sample.reason)];
+  const std::string folder = status.folder.string();
+  return {{"folder", folder, "folder   " + folder},
+          {"plan_hash", status.plan_hash, fmt::format("plan     {:.16}", status.plan_hash)},
+          {"complete", status.complete()},
+          {"shards",
+           {{"planned", status.shards_planned},
+            {"done", status.shards_done},
+            {"running", status.shards_running},
+            {"missing", status.shards_missing()}},
+           "shards   " + shards_text(status)},
+          {"samples",
+           {{"planned", status.samples_planned},
+            {"written", status.samples_written},
+            {"under_way", status.samples_under_way},
+            {"quarantined", status.quarantined.size()}},
+           fmt::format("samples  {} of {} written, {}{} quarantined", status.samples_written,
+                       status.samples_planned, under_way_text(status), status.quarantined.size())},
+          {"workers", status.writers},
+          {"pairs_per_second", number(status.pairs_per_second())},
+          {"seconds_left", number(status.seconds_left())},
+          "work     " + work_text(status),
+          {"running",
+           json_list(
+               status.running,
+               [](const ShardAtWork& work) { return writer_json(work.file, "shard", work.shard); }),
+           section("running", status.running,
+                   [](const ShardAtWork& work) -> Cells {
+                     return {work.shard, work.file.name.host,
+                             "pid " + std::to_string(work.file.name.pid),
+                             to_string(work.file.writer), age_text(work.file)};
+                   })},
+          {"left_over",
+           json_list(status.left_over,
+                     [](const UnfinishedFile& file) {
+                       return writer_json(file, "file", file.path.filename().string());
+                     }),
+           section("left over by dead writers (deleted by the next convert)", status.left_over,
+                   [](const UnfinishedFile& file) -> Cells {
+                     return {file.path.filename().string(), to_string(file.writer), age_text(file)};
+                   })},
+          {"damaged", status.damaged,
+           section("damaged (made again by the next convert)", status.damaged,
+                   [](const std::string& fault) -> Cells { return {fault}; })},
+          {"quarantined_by_reason", reasons},
+          {"quarantined", status.quarantined,
+           section("quarantined (eventgan retry makes them once their inputs are fixed)",
+                   reason_rows(status), std::identity())},
+          {"notes", status.notes, notes_text(status.notes)}};
 }
 
 }  // namespace
 
+std::string status_text(const FolderStatus& status) { return text_of(table_of(status)); }
 std::string status_json(const FolderStatus& status) {
-  std::map<std::string, int> reasons;
-  for (const QuarantinedSlot& sample : status.quarantined) ++reasons[fault_kind(sample.reason)];
-  const json document = {{"folder", status.folder.string()},
-                         {"plan_hash", status.plan_hash},
-                         {"complete", status.complete()},
-                         {"shards",
-                          {{"planned", status.shards_planned},
-                           {"done", status.shards_done},
-                           {"running", status.shards_running},
-                           {"missing", status.shards_missing()}}},
-                         {"samples",
-                          {{"planned", status.samples_planned},
-                           {"written", status.samples_written},
-                           {"under_way", status.samples_under_way},
-                           {"quarantined", status.quarantined.size()}}},
-                         {"running", running_json(status)},
-                         {"left_over", left_over_json(status)},
-                         {"damaged", status.damaged},
-                         {"quarantined_by_reason", reasons},
-                         {"quarantined", quarantined_json(status)},
-                         {"notes", status.notes},
-                         {"workers", status.writers},
-                         {"pairs_per_second", number(status.pairs_per_second())},
-                         {"seconds_left", number(status.seconds_left())}};
-  return dump_json(document, JsonLayout::kIndented) + "\n";
+  return json_text_of(table_of(status), JsonLayout::kIndented);
 }
 
 }  // namespace eventgan

@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/documents/json_text.h"
+#include "manifests/documents/report.h"
 #include "manifests/files/atomic_file.h"
 #include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
@@ -212,46 +212,43 @@ OutlineMasksReport make_outline_masks(const JobManifest& manifest,
   return report;
 }
 
-std::string to_text(const OutlineMasksReport& report) {
-  constexpr std::size_t kMostFaults = 20, kMostEllipses = 5;
-  std::string text;
-  for (std::size_t i = 0; i < std::min(kMostFaults, report.faults.size()); ++i) {
-    text += escape_controls(report.faults[i]) + "\n";
-  }
-  if (report.faults.size() > kMostFaults) {
-    text += fmt::format("... and {} more\n", report.faults.size() - kMostFaults);
-  }
-  text += fmt::format("masks: {} made, {} kept, {} failed\n", report.made, report.kept,
-                      report.faults.size());
-  text += "outlines: " + to_text(report.outlines);
-  if (!report.of_ellipses.empty()) {
-    text += " in " + escape_controls(some_of(report.of_ellipses, kMostEllipses));
-  }
-  text += "\n";
-  for (const auto& [root, outlines] : report.sources) {
-    text += fmt::format("for the source of {} in the manifest:  \"outlines\": {}\n",
-                        escape_controls(root), dump_json(nlohmann::json(outlines)));
-  }
-  return text;
+namespace {
+
+Report table_of(const OutlineMasksReport& report) {
+  constexpr std::ptrdiff_t kMostFaults = 20;
+  constexpr std::size_t kMostEllipses = 5;
+  using Source = decltype(report.sources)::value_type;
+  return {{"event", "report"},
+          {"faults", report.faults, listed(report.faults, kMostFaults, "", std::identity())},
+          {"images", report.images},
+          {"made", report.made},
+          {"kept", report.kept},
+          fmt::format("masks: {} made, {} kept, {} failed", report.made, report.kept,
+                      report.faults.size()),
+          {"given", report.outlines.given},
+          {"cut", report.outlines.cut},
+          {"ellipses", report.outlines.ellipses},
+          {"of_ellipses", report.of_ellipses},
+          "outlines: " + to_text(report.outlines) +
+              (report.of_ellipses.empty()
+                   ? ""
+                   : " in " + escape_controls(some_of(report.of_ellipses, kMostEllipses))),
+          {"sources",
+           json_list(report.sources,
+                     [](const Source& source) -> nlohmann::json {
+                       return {{"root", source.root}, {"outlines", source.outlines}};
+                     }),
+           joined(report.sources, "", [](const Source& source) {
+             return fmt::format("for the source of {} in the manifest:  \"outlines\": {}\n",
+                                escape_controls(source.root),
+                                dump_json(nlohmann::json(source.outlines)));
+           })}};
 }
 
-std::string to_json(const OutlineMasksReport& report) {
-  nlohmann::json sources = nlohmann::json::array();
-  for (const auto& [root, outlines] : report.sources) {
-    sources.push_back({{"root", root}, {"outlines", outlines}});
-  }
-  const nlohmann::json json = {{"event", "report"},
-                               {"images", report.images},
-                               {"made", report.made},
-                               {"kept", report.kept},
-                               {"given", report.outlines.given},
-                               {"cut", report.outlines.cut},
-                               {"ellipses", report.outlines.ellipses},
-                               {"of_ellipses", report.of_ellipses},
-                               {"faults", report.faults},
-                               {"sources", sources}};
-  return dump_json(json) + "\n";
-}
+}  // namespace
+
+std::string to_text(const OutlineMasksReport& report) { return text_of(table_of(report)); }
+std::string to_json(const OutlineMasksReport& report) { return json_text_of(table_of(report)); }
 
 namespace {
 

@@ -6,11 +6,12 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "manifests/documents/json_text.h"
+#include "manifests/documents/report.h"
 #include "manifests/values/text.h"
 #include "stages/events/realism/realism_scores.h"
 
@@ -67,14 +68,19 @@ std::string table_row(const std::string& label, BetterScore better, std::optiona
   return text + "\n";
 }
 
-std::vector<Cell> cells_of(const RealismReport& report, double RealismScores::*member) {
+/// What `cell_of` says of each method.
+template <class CellOf>
+std::vector<Cell> cells_of(const RealismReport& report, const CellOf& cell_of) {
   std::vector<Cell> cells;
-  for (const MethodSummary& method : report.methods) {
-    Cell& cell = cells.emplace_back();
-    cell.value = method.mean.*member;
-    if (method.bounds) cell.bounds = {method.bounds->low.*member, method.bounds->high.*member};
-  }
+  std::ranges::transform(report.methods, std::back_inserter(cells), cell_of);
   return cells;
+}
+
+std::vector<Cell> score_cells(const RealismReport& report, double RealismScores::*member) {
+  return cells_of(report, [&](const MethodSummary& method) -> Cell {
+    if (!method.bounds) return {method.mean.*member, {}};
+    return {method.mean.*member, {method.bounds->low.*member, method.bounds->high.*member}};
+  });
 }
 
 std::optional<double> real_value(const RealismReport& report, const ScoreRow& row) {
@@ -84,22 +90,20 @@ std::optional<double> real_value(const RealismReport& report, const ScoreRow& ro
 
 /// How far the methods' shares of the events by bin and polarity are from the camera's.
 std::string share_row(const RealismReport& report, const std::string& label) {
-  std::vector<Cell> cells;
-  for (const MethodSummary& method : report.methods) {
-    cells.push_back({share_distance(method.mean, report.real.mean), {}});
-  }
-  return table_row(label, BetterScore::kLower, std::nullopt, cells);
+  return table_row(label, BetterScore::kLower, std::nullopt,
+                   cells_of(report, [&](const MethodSummary& method) -> Cell {
+                     return {share_distance(method.mean, report.real.mean), {}};
+                   }));
 }
 
 std::string bin_rows(const RealismReport& report) {
   std::string text;
   const std::vector<double> real = report.real.mean.events_per_bin();
   for (std::size_t bin = 0; bin < real.size(); ++bin) {
-    std::vector<Cell> cells;
-    for (const MethodSummary& method : report.methods) {
-      cells.push_back({method.mean.events_per_bin()[bin], {}});
-    }
-    text += table_row("  in bin " + std::to_string(bin), BetterScore::kLikeReal, real[bin], cells);
+    text += table_row("  in bin " + std::to_string(bin), BetterScore::kLikeReal, real[bin],
+                      cells_of(report, [&](const MethodSummary& method) -> Cell {
+                        return {method.mean.events_per_bin()[bin], {}};
+                      }));
   }
   return text + share_row(report, "  distance of shares");
 }
@@ -107,11 +111,9 @@ std::string bin_rows(const RealismReport& report) {
 constexpr const char* kDirectionLabel = "direction within 30 deg";
 
 std::vector<Cell> direction_cells(const RealismReport& report) {
-  std::vector<Cell> cells;
-  for (const MethodSummary& method : report.methods) {
-    cells.push_back({direction_fraction(method.direction), method.direction_bounds});
-  }
-  return cells;
+  return cells_of(report, [](const MethodSummary& method) -> Cell {
+    return {direction_fraction(method.direction), method.direction_bounds};
+  });
 }
 
 std::string direction_rows(const RealismReport& report) {
@@ -165,7 +167,8 @@ std::string column_heads(const RealismReport& report) {
 std::string one_recording(const RealismReport& report) {
   std::string text;
   for (const ScoreRow& row : kScoreRows) {
-    text += table_row(row.label, row.better, real_value(report, row), cells_of(report, row.member));
+    text +=
+        table_row(row.label, row.better, real_value(report, row), score_cells(report, row.member));
     if (row.member == &RealismScores::events_per_pixel) text += bin_rows(report);
   }
   return text + direction_rows(report);
@@ -212,9 +215,9 @@ std::string several_recordings(std::span<const RealismReport> reports) {
     text += row.label + std::string(" ") + symbol(row.better) + "\n";
     for (const RealismReport& report : reports) {
       text += table_row("  " + short_name(report.recording), row.better, real_value(report, row),
-                        cells_of(report, row.member));
+                        score_cells(report, row.member));
     }
-    text += table_row("  mean", row.better, real_value(mean, row), cells_of(mean, row.member));
+    text += table_row("  mean", row.better, real_value(mean, row), score_cells(mean, row.member));
   }
   text += "distance of shares by bin and polarity ↓\n";
   for (const RealismReport& report : reports) {
@@ -322,40 +325,36 @@ nlohmann::json method_json(const MethodSummary& method, const RealismScores& rea
 }
 
 nlohmann::json report_json(const RealismReport& report) {
-  nlohmann::json pairs = nlohmann::json::array();
-  for (const IntervalSummary& interval : report.intervals) {
-    pairs.push_back({{"first_frame", interval.interval.first},
-                     {"last_frame", interval.interval.last},
-                     {"gap", interval.interval.gap()},
-                     {"duration_s", interval.duration_s},
-                     {"events", interval.event_count}});
-  }
-  nlohmann::json methods = nlohmann::json::array();
-  for (const MethodSummary& method : report.methods) {
-    methods.push_back(method_json(method, report.real.mean, report.intervals));
-  }
+  const auto pair_json = [](const IntervalSummary& interval) -> nlohmann::json {
+    return {{"first_frame", interval.interval.first},
+            {"last_frame", interval.interval.last},
+            {"gap", interval.interval.gap()},
+            {"duration_s", interval.duration_s},
+            {"events", interval.event_count}};
+  };
+  const auto scores_of = [&](const MethodSummary& method) {
+    return method_json(method, report.real.mean, report.intervals);
+  };
   return {{"recording", report.recording},
           {"height", report.size.height},
           {"width", report.size.width},
           {"bins", report.bins},
           {"seed", report.seed},
-          {"pairs", pairs},
-          {"real", method_json(report.real, report.real.mean, report.intervals)},
-          {"methods", methods},
+          {"pairs", json_list(report.intervals, pair_json)},
+          {"real", scores_of(report.real)},
+          {"methods", json_list(report.methods, scores_of)},
           {"wall_seconds", report.wall_seconds}};
 }
 
 }  // namespace
 
 std::string to_json(std::span<const RealismReport> reports) {
-  nlohmann::json recordings = nlohmann::json::array();
-  for (const RealismReport& report : reports) recordings.push_back(report_json(report));
   const RealismReport mean = mean_report(reports);
   nlohmann::json means = {{mean.real.name, scores_json(mean.real.mean, std::nullopt)}};
   for (const MethodSummary& method : mean.methods) {
     means[method.name] = scores_json(method.mean, std::nullopt);
   }
-  const nlohmann::json json = {{"recordings", recordings}, {"mean", means}};
+  const nlohmann::json json = {{"recordings", json_list(reports, report_json)}, {"mean", means}};
   return dump_json(json, JsonLayout::kIndented) + "\n";
 }
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text.h"
+#include "manifests/documents/report.h"
 #include "manifests/files/atomic_file.h"
 #include "manifests/files/input_file.h"
 #include "manifests/files/unfinished_files.h"
@@ -309,35 +309,29 @@ double RecordingSummary::events_per_pixel_second() const {
   return pixel_seconds > 0 ? static_cast<double>(events) / pixel_seconds : 0;
 }
 
-std::string to_text(const SimulationReport& report) {
-  std::string text;
-  if (!report.made.empty()) {
-    text = fmt::format("{:24} {:>8} {:>12} {:>10} {:>10}\n", "recording", "frames", "events",
-                       "per px s", "px a frame");
-    for (const RecordingSummary& recording : report.made) text += table_line(recording);
-  }
+namespace {
+
+Report table_of(const SimulationReport& report) {
   const RecordingSummary total = sum(report.made);
-  if (report.made.size() > 1) text += table_line(total);
-  return text +
-         fmt::format("{} made, {} kept from earlier runs; {:.1f} s, {:.2f} s per frame\n{}\n",
-                     count_text(std::ssize(report.made), "recording"), report.kept.size(),
-                     report.wall_seconds,
-                     total.frames > 0 ? report.wall_seconds / static_cast<double>(total.frames) : 0,
-                     report.folder);
+  return {
+      {"event", "report"},
+      {"made", json_list(report.made, summary_json),
+       fmt::format("{:24} {:>8} {:>12} {:>10} {:>10}\n", "recording", "frames", "events",
+                   "per px s", "px a frame") +
+           joined(report.made, "", table_line)},
+      {"total", summary_json(total), report.made.size() > 1 ? table_line(total) : ""},
+      {"kept", report.kept},
+      {"wall_seconds", report.wall_seconds},
+      fmt::format("{} made, {} kept from earlier runs; {:.1f} s, {:.2f} s per frame",
+                  count_text(std::ssize(report.made), "recording"), report.kept.size(),
+                  report.wall_seconds,
+                  total.frames > 0 ? report.wall_seconds / static_cast<double>(total.frames) : 0),
+      {"folder", report.folder, report.folder}};
 }
 
-std::string to_json(const SimulationReport& report) {
-  nlohmann::json recordings = nlohmann::json::array();
-  for (const RecordingSummary& recording : report.made) {
-    recordings.push_back(summary_json(recording));
-  }
-  const nlohmann::json json = {{"event", "report"},
-                               {"folder", report.folder},
-                               {"made", recordings},
-                               {"kept", report.kept},
-                               {"total", summary_json(sum(report.made))},
-                               {"wall_seconds", report.wall_seconds}};
-  return dump_json(json) + "\n";
-}
+}  // namespace
+
+std::string to_text(const SimulationReport& report) { return text_of(table_of(report)); }
+std::string to_json(const SimulationReport& report) { return json_text_of(table_of(report)); }
 
 }  // namespace eventgan

@@ -6,7 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "manifests/documents/json_text.h"
+#include "manifests/documents/report.h"
+#include "manifests/values/text.h"
 
 namespace eventgan {
 namespace {
@@ -60,37 +61,35 @@ ProgressText TrainingProgress::describe(std::chrono::steady_clock::time_point no
                                    {"losses", losses_}})};
 }
 
-std::string to_text(const TrainingReport& report) {
-  std::string text = fmt::format(
-      "{}: {}\n"
-      "  next step   {} {}\n"
-      "  this run    {} steps in {:.0f} s, {:.0f} s with earlier runs\n",
-      report.complete ? "complete" : "stopped, run again to resume", report.folder,
-      to_string(report.position.phase), report.position.step, report.steps_made, report.run_seconds,
-      report.total_seconds);
-  for (const auto& [name, value] : report.losses) {
-    text += fmt::format("  {} {:.6g} (mean of the last steps)\n", name, value);
-  }
-  if (!report.weights.empty()) {
-    text +=
-        fmt::format("  weights     {}\n  SHA-256     {}\n", report.weights, report.weights_sha256);
-  }
-  return text;
+namespace {
+
+Report table_of(const TrainingReport& report) {
+  return {
+      {"event", "report"},
+      {"folder", report.folder,
+       (report.complete ? "complete: " : "stopped, run again to resume: ") + report.folder},
+      {"complete", report.complete},
+      {"phase", to_string(report.position.phase),
+       fmt::format("  next step   {} {}", to_string(report.position.phase), report.position.step)},
+      {"next_step", report.position.step},
+      fmt::format("  this run    {} steps in {:.0f} s, {:.0f} s with earlier runs",
+                  report.steps_made, report.run_seconds, report.total_seconds),
+      {"steps_made", report.steps_made},
+      {"run_seconds", report.run_seconds},
+      {"total_seconds", report.total_seconds},
+      {"losses", report.losses,
+       joined(report.losses, "",
+              [](const auto& loss) {
+                return fmt::format("  {} {:.6g} (mean of the last steps)\n", loss.first,
+                                   loss.second);
+              })},
+      {"weights", report.weights, "  weights     " + report.weights},
+      {"weights_sha256", report.weights_sha256, "  SHA-256     " + report.weights_sha256}};
 }
 
-std::string to_json(const TrainingReport& report) {
-  const nlohmann::json json = {{"event", "report"},
-                               {"folder", report.folder},
-                               {"complete", report.complete},
-                               {"phase", to_string(report.position.phase)},
-                               {"next_step", report.position.step},
-                               {"steps_made", report.steps_made},
-                               {"run_seconds", report.run_seconds},
-                               {"total_seconds", report.total_seconds},
-                               {"losses", report.losses},
-                               {"weights", report.weights},
-                               {"weights_sha256", report.weights_sha256}};
-  return dump_json(json) + "\n";
-}
+}  // namespace
+
+std::string to_text(const TrainingReport& report) { return text_of(table_of(report)); }
+std::string to_json(const TrainingReport& report) { return json_text_of(table_of(report)); }
 
 }  // namespace eventgan
