@@ -99,6 +99,9 @@ StopMonitor::StopMonitor(SinceRequest since_request, double grace_s, Left left)
   });
 }
 
+// Here, since users of oneTBB are compiled without the thread sanitizer, which must see this.
+StopMonitor::~StopMonitor() = default;
+
 StopOrder StopMonitor::order() const {
   if (!since_request_) return StopOrder::kGoOn;
   const StopOrder now = stop_order(since_request_(), grace_s_, left_());

@@ -84,6 +84,7 @@ class StopMonitor {
   /// Both functions are called from other threads, too; they must be thread safe and not throw.
   /// Without `since_request` the order is always kGoOn. The first order holds on return.
   StopMonitor(SinceRequest since_request, double grace_s, Left left);
+  ~StopMonitor();
 
   /// Thread safe, and cheap enough to ask for every sample.
   StopOrder order() const;
