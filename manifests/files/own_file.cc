@@ -95,6 +95,35 @@ bool has_own_mark(std::string_view beginning) {
   });
 }
 
+bool is_own_output(const fs::path& folder) {
+  std::error_code unknown;
+  if (fs::exists(folder / ".export" / "export.txt", unknown)) return true;
+  const auto is_there = [&](const char* name, OwnFile kind) {
+    return fs::exists(folder / name, unknown) && is_replaceable(folder / name, kind);
+  };
+  try {
+    if (!is_there("plan.json", OwnFile::kPlan) && !is_there("run.json", OwnFile::kRunRecord)) {
+      return false;
+    }
+  } catch (const std::runtime_error&) {  // nobody may read it
+    return false;
+  }
+  const auto is_result = [&](const fs::path& file) {
+    const std::string extension = file.extension().string();
+    return extension == ".json" || extension == ".html" || extension == ".index" ||
+           (extension == ".h5" && fs::exists(fs::path(file).replace_extension(".json"), unknown));
+  };
+  fs::directory_iterator entry(folder, unknown);
+  for (; !unknown && entry != fs::directory_iterator(); entry.increment(unknown)) {
+    const bool is_hidden = entry->path().filename().string().starts_with('.');
+    std::error_code gone;
+    const bool is_own =
+        entry->is_directory(gone) ? is_own_output(entry->path()) : is_result(entry->path());
+    if (!is_hidden && !is_own) return false;
+  }
+  return !unknown;
+}
+
 void require_replaceable(const fs::path& file, OwnFile kind) {
   if (is_replaceable(file, kind)) return;
   throw UsageError("expected " + std::string(kOwnFiles[static_cast<std::size_t>(kind)].title) +

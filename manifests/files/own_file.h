@@ -40,6 +40,11 @@ bool is_replaceable(const std::filesystem::path& file, OwnFile kind);
 /// shows it.
 bool has_own_mark(std::string_view beginning);
 
+/// Whether a folder is an export, or an output folder of `convert` or `plan` with nothing but their
+/// results: no images, no other recordings, and of folders only such ones. A search for images,
+/// labels and recordings passes over it.
+bool is_own_output(const std::filesystem::path& folder);
+
 /// Throws UsageError "expected ..., or no file, got another file, in PATH" unless is_replaceable.
 /// Every command asks it of all that it is about to write, before it writes anything: no person's
 /// file is replaced or removed. Thread safe.

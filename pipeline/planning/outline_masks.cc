@@ -97,6 +97,31 @@ std::vector<MaskWork> list_work(const JobManifest& manifest,
   return works;
 }
 
+/// Throws UsageError if the masks would be read as images by the next search: among the images
+/// themselves, or in a folder that is searched, since no images lie right above it.
+void require_apart(const JobManifest& manifest, const std::vector<MaskWork>& works) {
+  std::set<fs::path> images;
+  const auto on_disk = [&](const fs::path& path) {
+    return fs::weakly_canonical(fs::absolute(manifest.directory / path));
+  };
+  for (const MaskWork& work : works) {
+    images.insert(fs::path(work.frame.frame.path).parent_path());
+  }
+  std::set<fs::path> canonical;
+  for (const fs::path& folder : images) canonical.insert(on_disk(folder));
+  for (const MaskWork& work : works) {
+    const fs::path masks = fs::weakly_canonical(fs::absolute(work.source->folder));
+    const fs::path root = on_disk(work.source->spec->root);
+    const fs::path below = masks.lexically_relative(root);
+    const bool is_in_root = !below.empty() && *below.begin() != "..";
+    if (!canonical.contains(masks) && (!is_in_root || canonical.contains(masks.parent_path()))) {
+      continue;
+    }
+    throw UsageError("expected a folder for masks where none is taken for an image, got one in " +
+                     root.string() + ", in " + masks.string() + " (choose another --out)");
+  }
+}
+
 /// Draws an object's number where its outline is.
 void draw(const Outline& outline, std::uint16_t number, ImageSize size,
           std::vector<std::uint16_t>& indices) {
@@ -178,6 +203,7 @@ OutlineMasksReport make_outline_masks(const JobManifest& manifest,
                                       const OutlineMasksOptions& options) {
   const std::vector<OutlinedSource> sources = open_sources(manifest, options.out);
   std::vector<MaskWork> works = list_work(manifest, sources);
+  require_apart(manifest, works);
   std::set<fs::path> folders;
   for (const MaskWork& work : works) folders.insert(work.mask.parent_path());
   for (const fs::path& folder : folders) {

@@ -19,6 +19,7 @@
 #include "stages/base/videos/video_file.h"
 #include "stages/events/images/image_output.h"
 #include "stages/events/images/preview_image.h"
+#include "stages/frames/listing/image_folder.h"
 
 namespace eventgan {
 namespace {
@@ -264,6 +265,7 @@ std::vector<fs::path> preview(const fs::path& where, const PreviewOptions& optio
     const Sequence sequence = read_sequence(shards, options);
     const fs::path video = options.out / (file_name(sequence.name) + ".mp4");
     require_replaceable(video, OwnFile::kVideo);
+    require_no_images(options.out);
     fs::create_directories(options.out);
     auto sample = sequence.samples.begin();
     write_video(video, sequence.frames_per_second, [&]() -> std::optional<ColourFrame> {
@@ -282,6 +284,7 @@ std::vector<fs::path> preview(const fs::path& where, const PreviewOptions& optio
   }
   if (options.sheet) images = {options.out / "sheet.png"};
   for (const fs::path& image : images) require_replaceable(image, OwnFile::kPicture);
+  require_no_images(options.out);
   fs::create_directories(options.out);
   if (options.sheet) {
     constexpr int kColumns = 3, kTileWidth = 400;

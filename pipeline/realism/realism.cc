@@ -15,6 +15,7 @@
 #include "pipeline/realism/real_interval.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/events/images/comparison_image.h"
+#include "stages/frames/listing/image_folder.h"
 
 namespace eventgan {
 namespace {
@@ -295,7 +296,10 @@ RealismReport measure_realism(
   const int threads = thread_count(options.threads);
   MethodMaker maker(recording, intervals, options, threads);
   const std::vector<std::unique_ptr<VolumeMethod>> methods = maker.make();
-  if (!options.images.empty()) std::filesystem::create_directories(options.images);
+  if (!options.images.empty()) {
+    require_no_images(options.images);
+    std::filesystem::create_directories(options.images);
+  }
 
   const auto progress =
       make_progress ? make_progress(static_cast<std::int64_t>(intervals.size())) : nullptr;

@@ -27,6 +27,7 @@
 #include "pipeline/simulation/still_scenes.h"
 #include "stages/events/simulation/sensor.h"
 #include "stages/events/simulation/simulate_pair.h"
+#include "stages/frames/listing/image_folder.h"
 #include "stages/recordings/writers/evt3_writer.h"
 
 namespace eventgan {
@@ -234,6 +235,7 @@ SimulationReport simulate(const SimulationManifest& manifest, const SimulationOp
   const fs::path folder = options.output.value_or(resolve(manifest, manifest.output_directory));
   SimulationReport report;
   report.folder = folder.string();
+  require_no_images(folder);
   fs::create_directories(folder);
   remove_stale_temporaries(folder);
   std::vector<std::string> faults;

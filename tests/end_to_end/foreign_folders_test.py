@@ -10,6 +10,7 @@ import subprocess
 import h5py
 
 import program
+from moving_texture import write_images
 from program import run
 from small_job import small_job
 
@@ -243,6 +244,56 @@ class ForeignFolders(program.InFolder):
             for arguments in [["finalize", taken], ["retry", taken]]:
                 self.assertIn(str(taken / name), self.one_line(*arguments, codes=(64,)))
                 self.assertEqual(snapshot(taken), before)
+
+    def test_what_is_written_among_images_is_not_read_as_such(self):
+        """Into a folder of images, or one in it: the next search finds what it found before, or the command is refused
+        before it writes."""
+        images, out, manifest = self.folder / "images", self.folder / "images" / "out", self.scratch / "job.json"
+        for name, seed in [("a", 1), ("b", 2)]:
+            write_images(images / name, [0, 2, 4], 48, 64, seed)
+        frames = [{"id": i, "file_name": f"{name}/frame_{i % 3:02d}.png", "height": 48, "width": 64}
+                  for i, name in enumerate("aaabbb")]
+        boxes = [{"id": i, "image_id": i, "category_id": 1, "area": 1, "iscrowd": 0, "bbox": [9, 9, 20, 20]}
+                 for i in range(6)]
+        (images / "labels.json").write_text(json.dumps(
+            {"images": frames, "annotations": boxes, "categories": [{"id": 1, "name": "car"}]}))
+        simulation = self.scratch / "simulation.json"
+        simulation.write_text(json.dumps({
+            "format": "eventgan-simulation", "version": 1, "name": "s", "seed": 1,
+            "sources": [{"path": str(images / "a"), "name": "s"}], "output": {"directory": "s"}}))
+
+        def found():
+            told, _ = run("init", images, "--out", manifest)
+            manifest.unlink()
+            return [line for line in told.splitlines() if not line.startswith("note: ")]
+
+        before = found()
+        self.assertIn("6 labelled frames of 2 sequences", before[0])
+        taken = [["convert", images, "--output", out], ["report", out],
+                 ["preview", out, "--out", images / "previews"], ["preview", out, "--out", out / "drawn"],
+                 ["export", out, "--to", "yolo", "--images", "png", "--out", images / "yolo"],
+                 ["export", out, "--to", "coco", "--images", "png", "--out", images / "coco"],
+                 ["export", out, "--to", "rvt", "--out", images / "rvt"],
+                 ["export", out, "--to", "raw", "--out", images / "raw"],
+                 ["simulate", simulation, "--output", images / "simulated"],
+                 ["outline", out / "manifest.json", "--out", images / "a" / "masks"],
+                 ["convert", images, "--output", images], ["preview", images, "--out", images / "more"]]
+        refused = [["preview", out, "--out", images / "a"], ["preview", out, "--out", images / "b", "--sheet"],
+                   ["preview", out, "--out", images / "a", "--video"],
+                   ["outline", out / "manifest.json", "--out", images / "a"],
+                   ["outline", out / "manifest.json", "--out", images / "masks"],
+                   ["simulate", simulation, "--output", images / "a"],
+                   ["export", out, "--to", "coco", "--out", images / "a"]]
+        for arguments in taken:
+            with self.subTest(taken=" ".join(map(str, arguments))):
+                run(*arguments)
+                self.assertEqual(found(), before)
+        files = snapshot(images)
+        for arguments in refused:
+            with self.subTest(refused=" ".join(map(str, arguments))):
+                self.assertIn(str(images), self.one_line(*arguments, codes=(64,)))
+                self.assertEqual(snapshot(images), files)
+        run("convert", out / "manifest.json")  # the plan is that of the first time
 
 
 if __name__ == "__main__":

@@ -1,7 +1,10 @@
 """Labels as tools write them beside images: `convert FOLDER` finds them, or stops and says why not."""
 
+import io
 import json
+import struct
 import unicodedata
+import zlib
 
 import h5py
 import numpy as np
@@ -127,6 +130,31 @@ class FoundLabels(program.InFolder):
                 self.assertNotIn("labelled frames", told)
                 told, _ = run("convert", manifest, "--output", self.folder / "out", "--progress", "none")
                 self.assertIn("\nNO LABELS: no boxes and no persons with joints\n", told)
+
+    def test_what_is_compressed_is_looked_into(self):
+        """A MAT file as MATLAB saves it by default, and NumPy's archives."""
+        names = ["frame_00.png", "frame_01.png"]
+
+        def element(kind, data):
+            return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+        text = element(14, element(6, struct.pack("<II", 4, 0)) + element(5, struct.pack("<ii", 1, len(names[0])))
+                       + element(1, b"name") + element(17, names[0].encode("utf-16-le")))
+        packed = zlib.compress(text)
+        mat = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + struct.pack("<II", 15, len(packed)) + packed
+        arrays = {}
+        for kind, values in {"U": names, "S": [name.encode() for name in names]}.items():
+            stream = io.BytesIO()
+            np.savez_compressed(stream, boxes=np.ones((2, 4)), names=np.array(values))
+            arrays[f"boxes_{kind}.npz"] = stream.getvalue()
+        for name, content in {"boxes.mat": mat, **arrays}.items():
+            with self.subTest(name):
+                self.setUp()
+                self.images("images")
+                self.write(name, content)
+                self.assertNotIn(names[0].encode(), content)
+                self.assertIn(f"{self.folder}/{name} names these images and is not read: no reader of its format",
+                              self.convert(expect=66)[1])
 
     def test_going_without_labels_is_said(self):
         self.images("images")

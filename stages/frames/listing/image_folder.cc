@@ -9,6 +9,9 @@
 #include <tuple>
 #include <utility>
 
+#include "manifests/files/input_file.h"
+#include "manifests/files/own_file.h"
+#include "manifests/values/faults.h"
 #include "stages/frames/listing/numbered_sequence.h"
 #include "stages/frames/listing/source_folders.h"
 
@@ -60,6 +63,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t kBeforePixels = 4096;  // of a PNG: the mark stands there
+
 /// The place of the extension in kImageExtensions; its size if it is none of them.
 std::size_t extension_rank(const fs::path& name) {
   return static_cast<std::size_t>(std::ranges::find(kImageExtensions, lower_extension(name)) -
@@ -88,17 +93,35 @@ NumberedSequence number(const Images& images) {
                           NumberedSequence::Stride::kInferred);
 }
 
+bool is_png(const fs::path& name) { return lower_extension(name) == ".png"; }
+
+bool is_own_picture(const fs::path& file) {
+  std::string reason, start(kBeforePixels, '\0');
+  const auto opened = InputFile::open(file, reason);
+  if (!opened) return false;  // said where it is read
+  start.resize(opened->read_some(0, start));
+  return has_own_mark(start);
+}
+
 }  // namespace
 
 ImageFolder list_image_folder(const fs::path& folder) {
   const auto is_hidden = [](const std::string& name) { return name.starts_with('.'); };
-  auto [folders, files, unnameable] = list_folder(folder);
+  auto [folders, files, passed_over] = list_folder(folder);
   std::erase_if(folders, is_hidden);
   std::erase_if(files, is_hidden);
 
   ImageFolder listed;
   listed.folders = std::move(folders);
-  listed.left_out = std::move(unnameable);
+  listed.left_out = std::move(passed_over);
+  const auto first_png = std::ranges::find_if(files, is_png);
+  if (first_png != files.end() && is_own_picture(folder / *first_png)) {
+    std::erase_if(files, [&](const std::string& name) {
+      if (!is_png(name) || !is_own_picture(folder / name)) return false;
+      listed.left_out.push_back(name + " (eventgan's picture)");
+      return true;
+    });
+  }
   Images images(natural_less);
   for (const fs::path name : files) {
     const std::size_t rank = extension_rank(name);
@@ -128,6 +151,18 @@ ImageFolder list_image_folder(const fs::path& folder) {
   });
   listed.frames = number(images);
   return listed;
+}
+
+void require_no_images(const fs::path& folder) {
+  const auto refuse = [&](const std::string& name) {
+    throw UsageError("expected a folder without images of others, got " + name + ", in " +
+                     folder.string() + " (choose another folder to write to)");
+  };
+  const ImageFolder listed = list_image_folder(folder);
+  if (!listed.frames.empty()) refuse(listed.frames.frames().front().second);
+  for (const std::string& name : listed.left_out) {
+    if (is_video_name(name) && !is_replaceable(folder / name, OwnFile::kVideo)) refuse(name);
+  }
 }
 
 namespace {

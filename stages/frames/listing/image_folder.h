@@ -37,14 +37,19 @@ struct ImageFolder {
   std::map<std::string, std::string> sidecars;
   std::vector<std::string> folders;  ///< names of the folders in it, sorted
   /// Other files, images and .json files that give way to another of their name, and what no plan
-  /// can name (FolderListing::unnameable); sorted.
+  /// can name, the program's own output and pictures (FolderListing::passed_over); sorted.
   std::vector<std::string> left_out;
 };
 
 /// Lists `folder`, passing over hidden entries. Of two images of one name the one of the
-/// extension that comes first in kImageExtensions counts. An absent folder is empty. Throws
-/// InputError if it cannot be listed.
+/// extension that comes first in kImageExtensions counts. Where the first PNG is a picture of
+/// `preview` or `realism`, all of these are left out. An absent folder is empty. Throws InputError
+/// if it cannot be listed.
 ImageFolder list_image_folder(const std::filesystem::path& folder);
+
+/// Throws UsageError if images or videos lie in `folder` that the program has not drawn: among
+/// these, what a command is about to draw could not be told from them.
+void require_no_images(const std::filesystem::path& folder);
 
 /// Frames that follow each other, as the names of a folder's images tell.
 struct NamedSequence {

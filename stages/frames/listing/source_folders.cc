@@ -10,6 +10,7 @@
 
 #include "manifests/documents/json_text.h"
 #include "manifests/files/input_file.h"
+#include "manifests/files/own_file.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 
@@ -30,12 +31,16 @@ FolderListing list_folder(const std::filesystem::path& folder) {
     std::string name = entries->path().filename().string();
     if (name.starts_with("._")) continue;
     if (!utf8::is_valid(name)) {
-      listing.unnameable.push_back(escape_controls(name) + " (no UTF-8)");
+      listing.passed_over.push_back(escape_controls(name) + " (no UTF-8)");
       continue;
     }
     std::error_code ignored;  // a dangling link is a file that cannot be read later
-    auto& names = entries->is_directory(ignored) ? listing.folders : listing.files;
-    names.push_back(std::move(name));
+    const bool is_folder = entries->is_directory(ignored);
+    if (is_folder && is_own_output(entries->path())) {
+      listing.passed_over.push_back(escape_controls(name) + " (eventgan's output)");
+      continue;
+    }
+    (is_folder ? listing.folders : listing.files).push_back(std::move(name));
   }
   if (error) {
     throw InputError("expected a readable folder, got '" + error.message() + "', in " +
@@ -43,7 +48,7 @@ FolderListing list_folder(const std::filesystem::path& folder) {
   }
   std::ranges::sort(listing.folders);
   std::ranges::sort(listing.files);
-  std::ranges::sort(listing.unnameable);
+  std::ranges::sort(listing.passed_over);
   return listing;
 }
 

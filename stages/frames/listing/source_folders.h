@@ -16,8 +16,9 @@ struct FolderListing {
   std::vector<std::string> folders;
   std::vector<std::string> files;  ///< all that is no folder, dangling links too
   /// "NAME (no UTF-8)" of files and folders with such names, as they come out of other systems'
-  /// archives, other bytes written as \xff: plans, shards and JSON cannot name them.
-  std::vector<std::string> unnameable;
+  /// archives, other bytes written as \xff: plans, shards and JSON cannot name them. And "NAME
+  /// (eventgan's output)" of folders (is_own_output).
+  std::vector<std::string> passed_over;
 };
 
 /// What a note says of some files: "2 labels without an image in clip: a.json, b.json". After

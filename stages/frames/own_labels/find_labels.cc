@@ -18,6 +18,7 @@
 #include "stages/frames/listing/source_folders.h"
 #include "stages/frames/naming/found_frames.h"
 #include "stages/frames/own_labels/label_readers.h"
+#include "stages/frames/own_labels/yolo_text.h"
 
 namespace eventgan {
 namespace fs = std::filesystem;
@@ -61,7 +62,13 @@ FoundFrames frames_in(const fs::path& root, WholeFiles& files) {
   return frames;
 }
 
-/// The first of the formats; masks beside boxes are their outlines, the others are remarks.
+/// Whether YOLO's texts in a folder have numbers alone for classes.
+bool has_no_names(const fs::path& labels) {
+  return yolo_names_file(labels).empty() && yolo_names_file(labels.parent_path()).empty();
+}
+
+/// The first of the formats, but VOC's or a table's names before YOLO's numbers; masks beside boxes
+/// are their outlines, the others are remarks.
 std::optional<FoundLabels> find_any(const FoundFrames& frames, std::vector<std::string>& remarks) {
   std::optional<FoundLabels> found;
   for (const LabelReader* const reader : kLabelReaders) {
@@ -72,8 +79,12 @@ std::optional<FoundLabels> find_any(const FoundFrames& frames, std::vector<std::
     } else if (reader->format == LabelFormat::kMasks) {
       found->outlines = *path;
     } else {
-      remarks.push_back("labels in another format (" + std::string(to_string(reader->format)) +
-                        ") left out: " + path->string());
+      FoundLabels other{reader->format, *path};
+      if (found->format == LabelFormat::kYolo && has_no_names(found->path)) {
+        std::swap(*found, other);
+      }
+      remarks.push_back("labels in another format (" + std::string(to_string(other.format)) +
+                        ") left out: " + other.path.string());
     }
   }
   return found;

@@ -1,3 +1,5 @@
+#include <zlib.h>
+
 #include <algorithm>
 #include <array>
 #include <deque>
@@ -361,10 +363,21 @@ constexpr std::array kUnreadFormats{
     UnreadFormat{"KITTI's", ".txt",
                  [](const LabelFile& file) { return file.is_of_image && is_kitti_text(file); },
                  "texts as KITTI has them are read as the dataset kitti_object",
-                 "name the folders training/image_2 and training/label_2, and give the one above"},
+                 "name the folders training/image_2 and training/label_2, and give the one above; "
+                 "of other classes than KITTI's (Car, Van, Pedestrian, ...) convert them to COCO"},
     UnreadFormat{"DOTA's", ".txt",
                  [](const LabelFile& file) { return file.is_of_image && is_dota_text(file); },
                  kNoReader, "convert them to COCO or YOLO with upright boxes"},
+    UnreadFormat{"a table of", ".csv",
+                 [](const LabelFile& file) {
+                   const std::string header =
+                       in_small_letters(file.text.substr(0, file.text.find('\n')));
+                   const bool has_scores =
+                       header.find("score") != header.npos || header.find("conf") != header.npos;
+                   return has_scores && is_table(file);
+                 },
+                 "it has a column of scores, as a detector's results",
+                 "if it is the ground truth, take that column out"},
     UnreadFormat{"a table of", ".csv", is_table, "its columns or names of images are others",
                  "name them image,class,left,top,right,bottom in a first line"},
     UnreadFormat{"a table of", ".tsv", is_table, "tables are .csv", "rename it to .csv"},
@@ -482,11 +495,77 @@ Said said_by_json(const LabelFile& file) {
   return said;
 }
 
+/// Appends what a deflated stream begins with.
+void inflate_into(std::string& text, std::string_view stream, int window_bits) {
+  constexpr std::size_t kMost = std::size_t{1} << 18;
+  z_stream state{};
+  if (inflateInit2(&state, window_bits) != Z_OK) return;
+  std::string inflated(kMost, '\0');
+  state.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(stream.data()));
+  state.avail_in = static_cast<uInt>(stream.size());
+  state.next_out = reinterpret_cast<Bytef*>(inflated.data());
+  state.avail_out = static_cast<uInt>(kMost);
+  inflate(&state, Z_SYNC_FLUSH);  // what is cut off or damaged ends it
+  text.append(inflated, 0, kMost - state.avail_out);
+  inflateEnd(&state);
+}
+
+/// The beginning of a MAT file (version 5) or of an .npz, and what lies deflated in it.
+std::string with_inflated(std::string_view bytes) {
+  constexpr std::size_t kMost = std::size_t{1} << 22, kTag = 8, kMatHeader = 128, kMember = 30;
+  const auto number = [&](std::size_t at, std::size_t width, bool little = true) {
+    std::size_t value = 0;
+    for (std::size_t i = 0; i < width; ++i) {
+      value = value << 8 | static_cast<unsigned char>(bytes[at + (little ? width - 1 - i : i)]);
+    }
+    return value;
+  };
+  std::string text(bytes);
+  if (bytes.starts_with("MATLAB 5.0")) {
+    constexpr std::size_t kCompressed = 15;
+    const bool little = bytes.substr(0, kMatHeader).ends_with("IM");
+    for (std::size_t at = kMatHeader; at + kTag <= bytes.size() && text.size() < kMost;) {
+      const std::size_t size = number(at + 4, 4, little);
+      if (number(at, 4, little) == kCompressed) {
+        inflate_into(text, bytes.substr(at + kTag, size), MAX_WBITS);
+      }
+      at += kTag + size;
+    }
+  }
+  constexpr std::string_view kSignature = "PK\3\4";
+  for (std::size_t at = bytes.starts_with(kSignature) ? 0 : bytes.npos;
+       at < bytes.size() && at + kMember <= bytes.size() && text.size() < kMost;
+       at = bytes.find(kSignature, at + 1)) {
+    const std::size_t data = at + kMember + number(at + 26, 2) + number(at + 28, 2);
+    const bool is_deflated = number(at + 8, 2) == Z_DEFLATED;
+    if (is_deflated && data < bytes.size()) inflate_into(text, bytes.substr(data), -MAX_WBITS);
+  }
+  return text;
+}
+
+/// Whether an array of texts of one length, as NumPy has them, begins with one of the images.
+bool has_array_of_names(std::string_view text, const ImageNames& images) {
+  for (const auto& [type, letter_bytes] : {std::pair("'<U", 4), std::pair("'|S", 1)}) {
+    const std::size_t at = text.find(type);
+    if (at == text.npos) continue;
+    const std::size_t digits = at + 3, end = text.find('\'', digits), begin = text.find('\n', at);
+    if (end == text.npos || begin == text.npos) continue;
+    const auto letters = parse_whole(text.substr(digits, end - digits));
+    if (!letters || *letters <= 0 || *letters > 1000) continue;
+    std::string name(
+        text.substr(begin + 1, static_cast<std::size_t>(*letters) * std::size_t(letter_bytes)));
+    std::erase(name, '\0');
+    if (images.find(name) != nullptr) return true;
+  }
+  return false;
+}
+
 /// Of XML, MAT and NumPy files; letters of two or four bytes have zeros between them.
 Said said_by_bytes(const LabelFile& file) {
-  std::string text = file.text;
-  std::erase(text, '\0');
+  std::string text = with_inflated(file.text);
   Said said;
+  said.names_images = has_array_of_names(text, file.images);
+  std::erase(text, '\0');
   for (std::size_t begin = 0; begin < text.size() && !said.names_images;) {
     constexpr std::string_view kOfNames =
         "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./\\";

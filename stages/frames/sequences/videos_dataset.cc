@@ -166,7 +166,7 @@ class VideosDataset final : public Dataset {
       std::vector<std::string>& left_out) {
     std::map<std::string, std::string> videos;
     left_out = listing.folders;
-    left_out.insert(left_out.end(), listing.unnameable.begin(), listing.unnameable.end());
+    left_out.insert(left_out.end(), listing.passed_over.begin(), listing.passed_over.end());
     for (const fs::path name : listing.files) {
       if (!is_video_name(name) || name.string().starts_with('.')) continue;
       const auto [video, is_new] = videos.try_emplace(name.stem().string(), name.string());

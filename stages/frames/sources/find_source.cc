@@ -11,6 +11,7 @@
 #include "stages/frames/listing/image_folder.h"
 #include "stages/frames/listing/numbered_sequence.h"
 #include "stages/frames/listing/source_folders.h"
+#include "stages/frames/naming/found_frames.h"
 #include "stages/frames/sources/dataset_kinds.h"
 #include "stages/recordings/readers/recording.h"
 
@@ -47,6 +48,16 @@ std::optional<Place> look_at(const fs::path& root, std::optional<DatasetKind> da
   return std::nullopt;
 }
 
+/// Whether `simulate` wrote a recording there, as its settings tell: perhaps of frames beside it.
+bool is_simulated(const Place& place) {
+  constexpr std::string_view kSettings = "\"libraries\":\"OpenCV ";
+  if (!has_events(place.dataset)) return false;
+  return std::ranges::any_of(look_into(place.root).files, [&](const std::string& name) {
+    const std::string text = beginning_of(place.root / name);
+    return text.find(kSettings) != text.npos;
+  });
+}
+
 std::optional<Place> look_around(const fs::path& path, std::optional<DatasetKind> dataset) {
   if (auto found = look_at(path, dataset, /*own_too=*/false)) return found;
   const std::vector<std::string> folders = look_into(path).folders;
@@ -58,7 +69,7 @@ std::optional<Place> look_around(const fs::path& path, std::optional<DatasetKind
     return below;
   };
   std::vector<Place> below = look_below(/*own_too=*/false);
-  if (below.empty()) {
+  if (std::ranges::all_of(below, is_simulated)) {
     if (auto own = look_at(path, dataset, /*own_too=*/true)) return own;
   }
   if (below.size() == 1) return below.front();

@@ -80,6 +80,29 @@ INSTANTIATE_TEST_SUITE_P(
                     "\x89PNG\r\n\x1a\ntEXtSoftware\0GIMP"s},
         OwnFileCase{OwnFile::kTrace, "trace.json", "{\"traceEvents\":[\n", "{\"events\":[\n"}));
 
+TEST(OwnFile, AFolderOfResultsAloneIsTheProgramsOwn) {
+  const TemporaryFolder folder;
+  const auto is_own = [&] { return is_own_output(folder / "out"); };
+  EXPECT_FALSE(is_own()) << "nothing is there";
+  write_file(folder / "out/plan.json", R"({"format":"other"})");
+  EXPECT_FALSE(is_own()) << "a person's plan";
+  write_file(folder / "out/plan.json", R"({"format":"eventgan-plan"})");
+  write_file(folder / "out/a-train-00000-of-00001.h5", "");
+  EXPECT_FALSE(is_own()) << "a recording, or a shard that is not done";
+  write_file(folder / "out/a-train-00000-of-00001.json", "{}");
+  EXPECT_TRUE(is_own());
+  write_file(folder / "out/more/plan.json", R"({"format":"eventgan-plan"})");
+  EXPECT_TRUE(is_own()) << "with a folder of the same kind";
+  for (const char* mine : {"out/1.png", "out/notes/1.png"}) {
+    write_file(folder / mine, "");
+    EXPECT_FALSE(is_own()) << mine;
+    std::filesystem::remove(folder / mine);
+  }
+  write_file(folder / "export/.export/export.txt", "");
+  write_file(folder / "export/images/1.png", "");
+  EXPECT_TRUE(is_own_output(folder / "export"));
+}
+
 TEST(OwnFile, AMarkMayLieAnywhere) {
   const TemporaryFolder folder;
   const auto file = folder / "a.h5";

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "manifests/values/faults.h"
+#include "stages/frames/listing/image_folder.h"
 #include "tests/testing/npy_bytes.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -495,6 +496,9 @@ TEST_F(FindSource, WhatLooksLikeLabelsAndIsNotReadIsNamed) {
                     HasSubstr("; "))))
         << name;
   }
+  EXPECT_THAT(find("unread" + std::to_string(number - 1)).unread.front(),
+              HasSubstr("it has a column of scores"));
+  EXPECT_THAT(find("unread6").unread.front(), HasSubstr("of other classes than KITTI's"));
   write("none/1.jpg");
   write("none/1.txt", "a street with two cars\n");
   write("none/captions.json", R"([{"image": "1.jpg", "caption": "a street"}])");
@@ -639,6 +643,65 @@ TEST_F(FindSource, LabelsThatAreLeftOutAreRemarks) {
   EXPECT_THAT(found.remarks,
               Contains(AllOf(HasSubstr("a table left out, expected columns image, class, "),
                              HasSubstr("got \"score\": " + at("d/near.csv").string()))));
+}
+
+TEST_F(FindSource, NamesOfClassesGoBeforeYolosNumbers) {
+  write("a/images/1.jpg");
+  write("a/labels/1.txt", "0 .5 .5 .2 .2\n");
+  const auto expect = [&](LabelFormat format, const char* left_out) {
+    const FoundSource found = find("a");
+    EXPECT_EQ(found.labels->format, format);
+    EXPECT_THAT(found.remarks, Contains(HasSubstr(std::string("labels in another format (") +
+                                                  left_out + ") left out: ")));
+  };
+  write("a/xml/1.xml", "<annotation/>");
+  expect(LabelFormat::kVoc, "yolo");
+  write("a/classes.txt", "walker\n");
+  expect(LabelFormat::kYolo, "voc");
+  fs::remove_all(at("a/xml"));
+  write("a/boxes.csv", "image,class,left,top,right,bottom\n1.jpg,walker,0,0,1,1\n");
+  expect(LabelFormat::kYolo, "csv");
+  fs::remove(at("a/classes.txt"));
+  expect(LabelFormat::kCsv, "yolo");
+}
+
+/// Among or beside images, what the program has made is neither image nor label nor recording.
+TEST_F(FindSource, TheProgramsOwnOutputIsPassedOver) {
+  const std::string picture("\x89PNG\r\n\x1a\n....tEXtSoftware\0eventgan", 33);
+  for (const char* name : {"a/1.jpg", "a/2.jpg", "b/1.jpg"}) write(std::string("set/") + name);
+  const auto sequences = [&] {
+    const ImageFolder top = list_image_folder(at("set"));
+    std::vector<std::string> names;
+    for (const std::string& name : top.folders) {
+      if (!list_image_folder(at("set") / name).frames.empty()) names.push_back(name);
+    }
+    return names;
+  };
+  const std::vector<std::string> before = sequences();
+  write("set/out/plan.json", R"({"format":"eventgan-plan"})");
+  write("set/out/labels.json", R"({"images": [{"file_name": "1.jpg"}], "annotations": []})");
+  write("set/yolo/.export/export.txt", "format yolo\n");
+  write("set/yolo/images/train/1.png");
+  write("set/previews/s_0000.png", picture);
+  write("set/previews/s_0001.png", picture);
+  EXPECT_EQ(sequences(), before);
+  EXPECT_THAT(list_image_folder(at("set")).left_out,
+              ::testing::ElementsAre("out (eventgan's output)", "yolo (eventgan's output)"));
+  EXPECT_THAT(list_image_folder(at("set/previews")).left_out,
+              Contains("s_0001.png (eventgan's picture)"));
+  EXPECT_FALSE(find("set").labels);
+  EXPECT_THAT(find("set").remarks, IsEmpty());
+  EXPECT_EQ(find("set/yolo").root, at("set/yolo/images")) << "given, it is read";
+  write("set/previews/mine.png");  // among pictures it is an image still
+  EXPECT_EQ(list_image_folder(at("set/previews")).frames.frames().size(), 1u);
+  EXPECT_NO_THROW(require_no_images(at("set/out")));
+  for (const char* name : {"set/previews", "set/a"}) {
+    EXPECT_THAT([&] { require_no_images(at(name)); },
+                ThrowsMessage<UsageError>(HasSubstr("expected a folder without images of others")));
+  }
+  // A folder of images with results among them is not the program's.
+  write("set/b/run.json", R"({"manifest_folder": "/a"})");
+  EXPECT_THAT(sequences(), Contains("b"));
 }
 
 TEST_F(FindSource, ImagesThatAreLeftOutAreWarnings) {
