@@ -50,7 +50,7 @@ AGAIN = 40  # batches for the batch norms' means
 PLACES = 4  # a crop is that of so many places where the frames differ most: most of a frame at rest has no events
 GAIN, GAMMA = (0.3, 1.5), (0.8, 1.25)  # of the frames' brightness, with which the shipped weights were trained, too
 LONGEST = 346  # side of a frame in pixels, that of a DAVIS346; larger ones are reduced, for time
-FARTHEST, PARTS = 32, 8  # pixels of a constant flow, parts of a pixel to which it is found
+FARTHEST = 32  # pixels of a constant flow in x and in y
 FITTING = 0.5  # least correlation of a pair's events with what changes between its frames
 REAL = "real"
 ROWS = [*recordings.METHODS, REAL]
@@ -364,27 +364,30 @@ def moved_by(previous: torch.Tensor, flow: tuple[float, float]) -> torch.Tensor:
 
 
 def best_constant_flow(pairs: Sequence[Pair]) -> tuple[float, float]:
-    """The x and y in pixels by which all previous frames, moved, have the least mean error: no flow that is the same at
-    all pixels and in all pairs does better.
+    """The x and y in pixels, the same at all pixels of all pairs, by which the previous frames, moved, have the least
+    mean error.
 
-    Every whole pixel up to 32 is tried, then every eighth of one around the best of these.
+    All whole pixels up to 32 are tried, then halves, quarters and eighths of one around the best so far.
     """
-    previous, following, volumes = tensors(pairs)
-    there = (volumes.sum(1, keepdim=True) > 0).float()
+    previous, following, _ = tensors(pairs)
+    masks = [volume.any(0).astype(np.uint8) for _, _, volume in pairs]
+    there = torch.from_numpy(np.stack(masks))[:, None]
     shares = there / there.sum((1, 2, 3), keepdim=True)  # each pair counts the same
-    height, width = previous.shape[2:]
-    padded = functional.pad(previous, [FARTHEST] * 4, mode="replicate")
-
-    def error_of(images: torch.Tensor) -> float:
-        return float(((images - following).abs() * shares).sum())
+    padded = [np.pad(image, FARTHEST, "edge") for image, _, _ in pairs]
+    height, width = masks[0].shape
 
     def error_of_whole(flow: tuple[int, int]) -> float:
         x, y = (FARTHEST + each for each in flow)
-        return error_of(padded[..., y:y + height, x:x + width])
+        return sum(cv2.norm(image[y:y + height, x:x + width], pair[1], cv2.NORM_L1, mask) / cv2.countNonZero(mask)
+                   for image, pair, mask in zip(padded, pairs, masks))
 
-    x, y = min(itertools.product(range(-FARTHEST, FARTHEST + 1), repeat=2), key=error_of_whole)
-    parts = np.arange(-PARTS, PARTS + 1) / PARTS
-    return min(itertools.product(x + parts, y + parts), key=lambda flow: error_of(moved_by(previous, flow)))
+    def error_of(flow: tuple[float, float]) -> float:
+        return float(((moved_by(previous, flow) - following).abs() * shares).sum())
+
+    best = min(itertools.product(range(-FARTHEST, FARTHEST + 1), repeat=2), key=error_of_whole)
+    for step in (0.5, 0.25, 0.125):
+        best = min(itertools.product(*((each - step, each, each + step) for each in best)), key=error_of)
+    return best
 
 
 def blurred(images: torch.Tensor) -> torch.Tensor:
