@@ -9,7 +9,8 @@ The networks and their losses are those that `eventgan train` has besides the ge
 flow network learns from events how each pixel moves: the previous frame, moved by the flow, should look like the next
 one. The reconstruction network learns the next frame from the previous one and the events' sum. Each way of making
 events has its row; a row's networks see its events alone, of the same crops in the same order as every other row's, and
-the row "real" those of the camera: the bound.
+the row "real" those of the camera: the bound. Controls learn nothing: a flow that is no better than the previous frame
+blurred has not been learnt. `--with` and no row measures them alone.
 
 Recordings are of MVSEC's layout, and of one camera and scene if their names begin with the same word (up to _). Every
 second such group is one half: the networks that learn on one half are tested on the other, so every recording is tested
@@ -21,6 +22,7 @@ from __future__ import annotations
 import argparse
 import collections
 import csv
+import functools
 import io
 import itertools
 import json
@@ -48,6 +50,7 @@ AGAIN = 40  # batches for the batch norms' means
 PLACES = 4  # a crop is that of so many places where the frames differ most: most of a frame at rest has no events
 GAIN, GAMMA = (0.3, 1.5), (0.8, 1.25)  # of the frames' brightness, with which the shipped weights were trained, too
 LONGEST = 346  # side of a frame in pixels, that of a DAVIS346; larger ones are reduced, for time
+FARTHEST = 32  # pixels of a constant flow in x and in y
 FITTING = 0.5  # least correlation of a pair's events with what changes between its frames
 REAL = "real"
 ROWS = [*recordings.METHODS, REAL]
@@ -322,7 +325,7 @@ def learn(what: str, pairs: Sequence[Pair], seed: int, steps: int) -> UNet:
 
 
 def moved(previous: torch.Tensor, flow: torch.Tensor) -> torch.Tensor:
-    """The previous frame [1, 1, H, W], moved by a flow [1, 2, H, W] in pixels; beyond the edge its outermost pixels.
+    """Previous frames [B, 1, H, W], moved by flows [B, 2, H, W] in pixels; beyond the edge their outermost pixels.
     Zero flow moves nothing, unlike in the loss."""
     height, width = flow.shape[2:]
     y, x = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
@@ -354,6 +357,58 @@ def mean_scores(pairs: Sequence[Pair], images: Callable[[Pair], tuple[torch.Tens
     return {name: float(np.mean([each[name] for each in scores])) for name in scores[0]}
 
 
+def moved_by(previous: torch.Tensor, flow: tuple[float, float]) -> torch.Tensor:
+    """`moved` by the same x and y everywhere."""
+    flows = torch.tensor(flow, dtype=torch.float32)[None, :, None, None]
+    return moved(previous, flows.expand(len(previous), 2, *previous.shape[2:]))
+
+
+def best_constant_flow(pairs: Sequence[Pair]) -> tuple[float, float]:
+    """The x and y in pixels, the same at all pixels of all pairs, by which the previous frames, moved, have the least
+    mean error.
+
+    All whole pixels up to 32 are tried, then halves, quarters and eighths of one around the best so far.
+    """
+    previous, following, _ = tensors(pairs)
+    masks = [volume.any(0).astype(np.uint8) for _, _, volume in pairs]
+    there = torch.from_numpy(np.stack(masks))[:, None]
+    shares = there / there.sum((1, 2, 3), keepdim=True)  # each pair counts the same
+    padded = [np.pad(image, FARTHEST, "edge") for image, _, _ in pairs]
+    height, width = masks[0].shape
+
+    def error_of_whole(flow: tuple[int, int]) -> float:
+        x, y = (FARTHEST + each for each in flow)
+        return sum(cv2.norm(image[y:y + height, x:x + width], pair[1], cv2.NORM_L1, mask) / cv2.countNonZero(mask)
+                   for image, pair, mask in zip(padded, pairs, masks))
+
+    def error_of(flow: tuple[float, float]) -> float:
+        return float(((moved_by(previous, flow) - following).abs() * shares).sum())
+
+    best = min(itertools.product(range(-FARTHEST, FARTHEST + 1), repeat=2), key=error_of_whole)
+    for step in (0.5, 0.25, 0.125):
+        best = min(itertools.product(*((each - step, each, each + step) for each in best)), key=error_of)
+    return best
+
+
+def blurred(images: torch.Tensor) -> torch.Tensor:
+    """[B, 1, H, W] by a Gaussian of 1 pixel."""
+    return torch.from_numpy(np.stack([cv2.GaussianBlur(image, (0, 0), 1) for image in images[:, 0].numpy()])[:, None])
+
+
+# By name a function of a recording's pairs. It returns what makes of the previous frame the one that is scored.
+CONTROLS: dict[str, Callable[[Sequence[Pair]], Callable[[torch.Tensor], torch.Tensor]]] = {
+    "previous frame as it is": lambda _: lambda previous: previous,
+    "previous frame blurred by 1 px": lambda _: blurred,
+    "previous frame moved by half a pixel": lambda _: lambda previous: moved_by(previous, (0.5, 0.0)),
+    "best constant flow of the recording": lambda pairs: functools.partial(moved_by, flow=best_constant_flow(pairs)),
+}
+
+
+def control_scores(name: str, pairs: Sequence[Pair]) -> dict[str, float]:
+    change = CONTROLS[name](pairs)
+    return mean_scores(pairs, lambda pair: (change(tensors([pair])[0]),) * 2)
+
+
 def read_args() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--program", default="eventgan", help="the eventgan program")
@@ -366,10 +421,11 @@ def read_args() -> argparse.Namespace:
                         "same command again to resume")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--steps", type=int, default=400, help="batches that each network learns from")
-    parser.add_argument("--with", nargs="+", choices=ROWS, dest="rows", metavar="ROW",
-                        help=f"only these rows, of: {'; '.join(ROWS)}")
+    parser.add_argument("--with", nargs="*", choices=ROWS, dest="rows", metavar="ROW",
+                        help=f"only these rows, of: {'; '.join(ROWS)}; without one only the controls")
     args = parser.parse_args()
-    args.rows = args.rows or [row for row in ROWS if args.peers or not row.startswith("v2e")]
+    if args.rows is None:
+        args.rows = [row for row in ROWS if args.peers or not row.startswith("v2e")]
     args.out = args.out.resolve()
     return args
 
@@ -392,22 +448,21 @@ def write(file: pathlib.Path, content: str) -> None:
 
 
 def table_of(scores: dict[str, dict[str, list[dict[str, float]]]],
-             reference: dict[str, dict[str, float]]) -> Iterator[list[str]]:
-    """The lines of table.csv. `scores`: by row and recording those of each seed; `reference`: by recording those of the
-    previous frame as it is, neither moved nor changed. sd: standard deviation over the seeds. In means each recording
-    counts the same; that of the error is of shares of the error without flow."""
+             recording_names: Sequence[str]) -> Iterator[list[str]]:
+    """The lines of table.csv. `scores`: by row and recording those of each seed; the first row is the previous frame as
+    it is, neither moved nor changed. sd: standard deviation over the seeds. In means each recording counts the same;
+    that of the error is of shares of the error without flow."""
     yield ["score", "learnt on", "recording", "value", "sd"]
     for title, name, digits, of_mean in (("error in grey levels", "error", 1, "error as a share of that without flow"),
                                          ("ssim", "ssim", 3, "ssim"),
                                          ("ssim at pixels with events", "ssim_at_events", 3,
                                           "ssim at pixels with events")):
-        plain = np.array([[each[name]] for each in reference.values()])  # [recording, 1]
-        rows = {"previous frame as it is": plain}
-        rows |= {row: np.array([[each[name] for each in by_recording[recording]] for recording in reference])
-                 for row, by_recording in scores.items()}
+        rows = {row: np.array([[each[name] for each in by_recording[recording]] for recording in recording_names])
+                for row, by_recording in scores.items()}
+        plain = next(iter(rows.values()))  # [recording, 1]
         for row, values in rows.items():  # [recording, seed]
             means = (values / plain if name == "error" else values).mean(0)
-            for score, recording, of_seeds, places in (*((title, *each, digits) for each in zip(reference, values)),
+            for score, recording, of_seeds, places in (*((title, *each, digits) for each in zip(recording_names, values)),
                                                        (of_mean, "mean", means, 3)):
                 yield [score, row, recording, f"{of_seeds.mean():.{places}f}",
                        f"{of_seeds.std():.{places}f}" if len(of_seeds) > 1 else ""]
@@ -473,8 +528,10 @@ def main() -> None:
         raise SystemExit(f"expected the settings {results['settings']}, as when this run started, got {settings}, "
                          f"in {file}")
     runs, tests = results["runs"], {path.stem: read_pairs(args, REAL, path) for half in halves for path in half}
-    results["reference"] = {name: mean_scores(pairs, lambda pair: (tensors([pair])[0],) * 2)
-                            for name, pairs in tests.items()}
+    if "controls" not in results:
+        results["controls"] = {control: {name: [control_scores(control, pairs)] for name, pairs in tests.items()}
+                               for control in CONTROLS}
+        write(file, json.dumps(results, indent=1) + "\n")
 
     def weights(row: str, half: int) -> pathlib.Path:
         return args.out / "networks" / f"{row} {half}.pt".replace(",", "").replace(" ", "-")
@@ -496,10 +553,11 @@ def main() -> None:
             print(run,
                   {name: {key: round(value, 3) for key, value in scores.items()} for name, scores in runs[run].items()},
                   flush=True)
-    scores = {row: {path.stem: [runs[f"{row} {half} {seed}"][path.stem] for seed in range(args.seeds)]
-                    for half in (0, 1) for path in halves[1 - half]} for row in args.rows}
+    scores = results["controls"] | {
+        row: {path.stem: [runs[f"{row} {half} {seed}"][path.stem] for seed in range(args.seeds)]
+              for half in (0, 1) for path in halves[1 - half]} for row in args.rows}
     table = io.StringIO()
-    csv.writer(table, lineterminator="\n").writerows(table_of(scores, results["reference"]))
+    csv.writer(table, lineterminator="\n").writerows(table_of(scores, list(tests)))
     write(args.out / "table.csv", table.getvalue())
     print(table.getvalue())
     for half in (0, 1):

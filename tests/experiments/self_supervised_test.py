@@ -93,6 +93,54 @@ def test_the_error_is_in_grey_levels_and_of_the_pixels_with_events():
     assert scores["ssim_at_events"] < scores["ssim"] < 1
 
 
+def pair_moved_by(flow, pattern):
+    """A pair of which each pixel of the second frame is the first one's at its place plus `flow`, in whole pixels, with
+    events where they differ; the first one's edges go on, as in `moved`."""
+    (x, y), (height, width) = flow, pattern.shape
+    following = np.pad(pattern, 40, "edge")[40 + y:40 + y + height, 40 + x:40 + x + width]
+    volume = np.zeros((18, height, width), np.float16)
+    volume[0] = pattern != following
+    return pattern, following, volume
+
+
+@pytest.fixture
+def pattern():
+    return np.random.default_rng(7).integers(0, 256, (60, 80), np.uint8)
+
+
+def test_zero_flow_leaves_the_whole_error_and_the_best_constant_flow_none_of_a_constant_motion(pattern):
+    pairs = [pair_moved_by((5, -3), image) for image in (pattern, pattern[::-1])]
+    assert self_supervised.best_constant_flow(pairs) == (5, -3)
+    errors = {control: self_supervised.control_scores(control, pairs)["error"] for control in self_supervised.CONTROLS}
+    plain = np.mean([np.abs(previous.astype(float) - following)[volume[0] > 0].mean()
+                     for previous, following, volume in pairs])
+    assert errors["previous frame as it is"] == pytest.approx(plain, rel=1e-5)
+    assert errors["best constant flow of the recording"] < 1e-3 * plain
+
+
+def test_the_best_constant_flow_is_that_of_all_pairs_to_an_eighth_of_a_pixel(pattern):
+    # Five eighths of the image moved by 1 px and three of that moved by 2: interpolated by 1.375.
+    (previous, one, volume), (_, two, _) = (pair_moved_by((x, 0), pattern // 8 * 8) for x in (1, 2))
+    assert self_supervised.best_constant_flow([(previous, one // 8 * 5 + two // 8 * 3, volume)]) == (1.375, 0)
+    # What suits two of three pairs is best.
+    pairs = [pair_moved_by(flow, pattern) for flow in ((0, 2), (0, 2), (4, 0))]
+    assert self_supervised.best_constant_flow(pairs) == (0, 2)
+
+
+def test_a_pair_at_rest_has_only_the_error_of_the_control():
+    """Of a lone white pixel the Gaussian leaves the share of its middle, a shift by half a pixel a half."""
+    frame = np.zeros((21, 21), np.uint8)
+    frame[10, 10] = 255
+    volume = np.zeros((18, 21, 21), np.float16)
+    volume[3, 10, 10] = 1
+    errors = {control: self_supervised.control_scores(control, [(frame, frame, volume)])["error"]
+              for control in self_supervised.CONTROLS}
+    middle = 1 / np.exp(-np.arange(-4, 5) ** 2 / 2).sum()
+    assert errors["previous frame blurred by 1 px"] == pytest.approx(255 * (1 - middle**2), rel=1e-4)
+    assert errors["previous frame moved by half a pixel"] == pytest.approx(255 / 2, rel=1e-4)
+    assert errors["best constant flow of the recording"] == pytest.approx(0, abs=1e-3)
+
+
 def test_volumes_are_reduced_by_summing_and_divided_by_their_98th_percentile():
     volume = np.arange(18 * 5 * 7, dtype=np.float32).reshape(18, 5, 7)
     small = self_supervised.reduced(volume, 2)
