@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <exception>
 #include <memory>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
-#include <string>
 #include <utility>
 
 #include "manifests/values/outlines.h"

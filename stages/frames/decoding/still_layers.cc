@@ -1,13 +1,11 @@
 #include "stages/frames/decoding/detail/still_layers.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 #include "manifests/values/outlines.h"
 #include "stages/frames/decoding/prepared_frame.h"

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <utility>
 
 #include "manifests/values/text.h"
 #include "stages/base/archives/array_json.h"
