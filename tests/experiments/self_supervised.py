@@ -462,8 +462,8 @@ def table_of(scores: dict[str, dict[str, list[dict[str, float]]]],
         plain = next(iter(rows.values()))  # [recording, 1]
         for row, values in rows.items():  # [recording, seed]
             means = (values / plain if name == "error" else values).mean(0)
-            for score, recording, of_seeds, places in (*((title, *each, digits) for each in zip(recording_names, values)),
-                                                       (of_mean, "mean", means, 3)):
+            lines = [(title, *each, digits) for each in zip(recording_names, values)]
+            for score, recording, of_seeds, places in (*lines, (of_mean, "mean", means, 3)):
                 yield [score, row, recording, f"{of_seeds.mean():.{places}f}",
                        f"{of_seeds.std():.{places}f}" if len(of_seeds) > 1 else ""]
 
