@@ -75,7 +75,7 @@ Person parse_mpii_list_row(const Json& row, MpiiListForm form) {
   const Json& joints = joint_array(row, joints_name);
   const Json* visible = row.contains(visible_name) ? &joint_array(row, visible_name) : nullptr;
   for (std::size_t i = 0; i < kMpiiJointCount; ++i) {
-    const std::string place = "[" + std::to_string(i) + "]";
+    const std::string place = '[' + std::to_string(i) + ']';
     Joint& joint = person.joints[i];
     joint.at = parse_point(joints[i], missing_joint, joints_name + place);
     const int seen =

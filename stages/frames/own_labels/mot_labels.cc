@@ -366,13 +366,13 @@ class MotLabels : public ReadLabels {
                    std::int64_t last_number, const std::string& path) const {
     if (source().is_video || source().frames[frames.begin()->second].is_numbered) return;
     const std::int64_t count = std::ssize(frames);
-    const auto length = info ? info->length : std::nullopt;
-    if (length ? count == *length : count >= last_number) return;
+    const bool is_told = info && info->length;
+    const std::int64_t length = is_told ? *info->length : last_number;
+    if (is_told ? count == length : count >= length) return;
     const std::filesystem::path first(source().frames[frames.begin()->second].name);
     throw InputError(fmt::format(
-        "expected numbered images, or all {} frames of {}, got {} without numbers, in {}",
-        length.value_or(last_number), path, count,
-        source().root.written(first.parent_path().generic_string())));
+        "expected numbered images, or all {} frames of {}, got {} without numbers, in {}", length,
+        path, count, source().root.written(first.parent_path().generic_string())));
   }
 
   void read_sequence(const std::string& sequence, const std::string& file, const Frames& frames) {
