@@ -1,25 +1,15 @@
 #include "stages/frames/decoding/pair_reader.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <hdf5.h>
-
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "tests/stages/base/images/test_images.h"
 #include "tests/stages/frames/decoding/test_video.h"
-#include "tests/testing/shared_data.h"
-#include "tests/testing/temporary_folder.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::FloatEq;
-using ::testing::HasSubstr;
-using testing::TemporaryFolder;
 
 /// Grey level back from the network's input.
 int level(float x) { return static_cast<int>(std::lround((x / 2 + 0.5f) * 255)); }
@@ -135,9 +125,7 @@ TEST(PairReader, ABadFrameOfEitherSideIsAFault) {
   cv::imwrite((folder / "a.png").string(), testing::gradient_image({5, 7}));
   const PairReader reader(folder.path(), {});
   for (const auto& pair : {pair_of("none.png", "a.png"), pair_of("a.png", "none.png")}) {
-    const auto outcome = reader.read(pair);
-    ASSERT_TRUE(is_fault(outcome));
-    EXPECT_THAT(outcome.fault().reason, HasSubstr("in none.png"));
+    EXPECT_THAT(fault_of(reader.read(pair)), HasSubstr("in none.png"));
   }
 }
 
@@ -172,7 +160,7 @@ TEST(PairReader, PairsUnderWayMayComeInAnyOrderAndTheVideoIsOpenedOnce) {
       EXPECT_NEAR(level(input[middle]), 2 * (next - 6), 1);
       EXPECT_NEAR(level(input[middle + input.size() / 2]), 2 * next, 1);
       // The open video outlives its name; opening it a second time fails.
-      std::filesystem::remove(folder / "clip.avi");
+      fs::remove(folder / "clip.avi");
     }
   }
 }
@@ -195,7 +183,7 @@ TEST(PairReader, OfAThinnedVideoTheFramesTakenAreKept) {
       EXPECT_NEAR(level(input[input.size() / 4]), 2 * (next - 30), 1);
       EXPECT_NEAR(level(input[input.size() / 4 * 3]), 2 * next, 1);
       // The open video outlives its name; opening it a second time fails.
-      std::filesystem::remove(folder / "clip.avi");
+      fs::remove(folder / "clip.avi");
     }
   }
 }
@@ -258,14 +246,14 @@ TEST(PairReader, AStillIsDecodedOnceForAllOfItsClip) {
       return reader.read(pair);
     };
     const auto first = clip("a.png");
-    std::filesystem::rename(folder / "a.png", folder / "away.png");
+    fs::rename(folder / "a.png", folder / "away.png");
     const auto second = clip("a.png");
     ASSERT_FALSE(is_fault(second)) << second.fault().reason;
     EXPECT_EQ(second->input, first->input);
     EXPECT_EQ(level(second->input.front()), 77);
     EXPECT_EQ(level(clip("b.png")->input.front()), 99);
     EXPECT_TRUE(is_fault(clip("a.png"))) << "the last one alone is kept";
-    std::filesystem::rename(folder / "away.png", folder / "a.png");
+    fs::rename(folder / "away.png", folder / "a.png");
   }
 }
 

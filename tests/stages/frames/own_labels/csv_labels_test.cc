@@ -1,15 +1,9 @@
 #include "stages/frames/own_labels/detail/csv_labels.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::SizeIs;
-using ::testing::ThrowsMessage;
 
 constexpr char kTableHeader[] = "image,class,left,top,right,bottom,track\n";
 
@@ -55,14 +49,14 @@ TEST(CsvLabels, ARowThatIsThereAlreadyIsLeftOut) {
   const auto images = read_csv(
       "a.png,car,1,2,3,4,5\na.png,bus,1,2,3,4,\r\na.png,car,1,2,3,4,5\nb.png,bus,1,2,3,4,\n"
       "a.png,bus,1,2,3,4,\n");
-  ASSERT_FALSE(is_fault(images.at("a.png"))) << images.at("a.png").fault().reason;
+  ASSERT_FALSE(is_fault(images.at("a.png"))) << fault_of(images.at("a.png"));
   const auto read = numbered(*images.at("a.png"), {"bus", "car"}, {30, 40}, "labels.csv#a.png");
   ASSERT_THAT(read->boxes, SizeIs(2));
   EXPECT_EQ(read->boxes[0].track_id, 5);
   EXPECT_THAT(read->left_out,
-              ::testing::ElementsAre("expected each line once, got it again, in labels.csv:4",
-                                     "expected each line once, got it again, in labels.csv:6"));
-  EXPECT_THAT(read->left_out_at, ::testing::ElementsAre(2u, 3u));
+              ElementsAre("expected each line once, got it again, in labels.csv:4",
+                          "expected each line once, got it again, in labels.csv:6"));
+  EXPECT_THAT(read->left_out_at, ElementsAre(2u, 3u));
   EXPECT_THAT(images.at("b.png")->boxes, SizeIs(1));
 }
 
@@ -89,7 +83,7 @@ TEST(CsvLabels, ColumnsAreCalledAsToolsCallThem) {
         "frame,image,label,x1,y1,x2,y2\n12,a.png,car,1,2,4,6\n"}) {
     const auto images = parse_csv_labels(table, "labels.csv");
     ASSERT_THAT(images, SizeIs(1)) << table;
-    ASSERT_FALSE(is_fault(images.at("a.png"))) << images.at("a.png").fault().reason;
+    ASSERT_FALSE(is_fault(images.at("a.png"))) << fault_of(images.at("a.png"));
     EXPECT_EQ(images.at("a.png")->boxes.at(0).box.xyxy, expected) << table;
     EXPECT_EQ(images.at("a.png")->boxes.at(0).class_name, "car") << table;
   }
@@ -148,9 +142,7 @@ TEST(CsvLabels, ABadRowSpoilsItsImageAlone) {
 
 TEST(CsvLabels, ARowThatDoesNotTellItsImageIsRefused) {
   const auto refuses = [](const std::string& text, const char* message) {
-    EXPECT_THAT([&] { parse_csv_labels(text, "labels.csv"); },
-                ThrowsMessage<InputError>(HasSubstr(message)))
-        << text;
+    EXPECT_THROWS(parse_csv_labels(text, "labels.csv"), InputError, message) << text;
   };
   const std::string header = kTableHeader;
   refuses("", "expected a header line image,class,left,top,right,bottom, got none, in labels.csv");

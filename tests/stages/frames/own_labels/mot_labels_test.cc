@@ -1,24 +1,12 @@
 #include "stages/frames/own_labels/detail/mot_labels.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <algorithm>
-#include <array>
 #include <sstream>
-#include <vector>
 
-#include "tests/testing/shared_data.h"
-#include "tests/testing/text_file.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
-
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::SizeIs;
-using ::testing::ThrowsMessage;
 
 auto read_mot(const std::string& text, const MotForm& form = {}) {
   return parse_mot_labels(text, form, "gt.txt");
@@ -148,7 +136,7 @@ TEST(MotLabels, MayHaveClassesOfTheirOwn) {
   EXPECT_EQ(boxes[0].box, (Box{.xyxy = {10, 20, 40, 60}, .track_id = 1}));
   EXPECT_EQ(boxes[1].class_name, "dog");
   EXPECT_EQ(boxes[1].box, (Box{.xyxy = {60, 20, 90, 60}, .track_id = 2, .ignore = true}));
-  EXPECT_EQ(frames.at(2).fault().reason, "expected a class from 1 to 3, got '4', in gt.txt:3");
+  EXPECT_EQ(fault_of(frames.at(2)), "expected a class from 1 to 3, got '4', in gt.txt:3");
 }
 
 TEST(MotLabels, VisDronesTablesShowByTheirLastColumns) {
@@ -178,12 +166,10 @@ TEST(MotLabels, VisDronesTablesShowByTheirLastColumns) {
 TEST(MotLabels, ALineThatDoesNotTellItsFrameIsRefused) {
   for (const std::string line : {"0,1,1,1,1,1,1", "-1,1,1,1,1,1,1", "1.5,1,1,1,1,1,1", "x", ",,",
                                  "1000000000,1,1,1,1,1,1", "1 2 3", "99999999999999999999,1"}) {
-    EXPECT_THAT([&] { read_mot("1,1,1,1,1,1,1\n" + line + "\n"); },
-                ThrowsMessage<InputError>(HasSubstr("expected a frame number from 1, got '")))
+    EXPECT_THROWS(read_mot("1,1,1,1,1,1,1\n" + line + "\n"), InputError,
+                  "expected a frame number from 1, got '")
         << line;
-    EXPECT_THAT([&] { read_mot("1,1,1,1,1,1,1\n" + line); },
-                ThrowsMessage<InputError>(HasSubstr("', in gt.txt:2")))
-        << line;
+    EXPECT_THROWS(read_mot("1,1,1,1,1,1,1\n" + line), InputError, "', in gt.txt:2") << line;
   }
 }
 
@@ -224,9 +210,7 @@ TEST(MotSequences, AreRefusedWhereAnythingIsInDoubt) {
   const auto refuses = [](const std::string& from, const std::string& to, const char* message) {
     std::string text = kSeqinfo;
     text.replace(text.find(from), from.size(), to);
-    EXPECT_THAT([&] { parse_mot_sequence(text, "seqinfo.ini"); },
-                ThrowsMessage<InputError>(HasSubstr(message)))
-        << text;
+    EXPECT_THROWS(parse_mot_sequence(text, "seqinfo.ini"), InputError, message) << text;
   };
   refuses("[Sequence]", "[sequence]", "expected [Sequence], got none, in seqinfo.ini");
   refuses("imExt=", "name=", "expected each key once, got 'name=.jpg', in seqinfo.ini:8");
@@ -248,7 +232,7 @@ TEST(MotLabels, OfMot17AreThoseThatAnotherProgramRead) {
   EVENTGAN_SHARED_DATA_OR_SKIP(data);
   const auto folder = data / "labelled_frames" / "mot17_mini";
   if (!exists(folder)) GTEST_SKIP() << "skipped: no " << folder;
-  std::istringstream table(testing::read_file(folder / "boxes.csv"));
+  std::istringstream table(read_file(folder / "boxes.csv"));
   std::map<std::string, std::vector<std::vector<std::string>>> expected;  // by image
   for (std::string line; std::getline(table, line);) {
     std::istringstream fields(line);
@@ -259,7 +243,7 @@ TEST(MotLabels, OfMot17AreThoseThatAnotherProgramRead) {
   ASSERT_EQ(expected.size(), 12u);
   std::size_t compared = 0;
   for (const char* name : {"MOT17-02-FRCNN", "MOT17-04-FRCNN"}) {
-    const std::string text = testing::read_file(folder / name / "gt.txt");
+    const std::string text = read_file(folder / name / "gt.txt");
     std::size_t bytes = 0;
     for (const auto& [number, outcome] : parse_mot_labels(text, {}, "gt.txt")) {
       ASSERT_FALSE(is_fault(outcome)) << outcome.fault().reason;

@@ -1,21 +1,12 @@
 #include "stages/frames/own_labels/detail/voc_labels.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <fstream>
 #include <sstream>
 
-#include "tests/testing/shared_data.h"
-#include "tests/testing/text_file.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
-
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::SizeIs;
 
 constexpr char kBox[] =
     "<bndbox><xmin>1</xmin><ymin>1</ymin><xmax>30</xmax><ymax>20</ymax></bndbox>";
@@ -200,9 +191,9 @@ TEST(VocLabels, OfPedroAreThoseThatAnotherProgramRead) {
   const auto folder = data / "real_labels" / "pedro";
   if (!exists(folder)) GTEST_SKIP() << "skipped: no " << folder;
   std::size_t compared = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+  for (const auto& entry : fs::directory_iterator(folder)) {
     if (entry.path().extension() != ".xml") continue;
-    const ImageLabels labels = read_voc(testing::read_file(entry.path()));
+    const ImageLabels labels = read_voc(read_file(entry.path()));
     EXPECT_EQ(labels.size, (ImageSize{260, 346}));
     auto yolo = entry.path();
     std::ifstream lines(yolo.replace_extension(".txt"));

@@ -1,22 +1,14 @@
 #include "stages/frames/sources/still_clips.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "manifests/values/outlines.h"
 #include "stages/frames/decoding/pair_reader.h"
 #include "stages/frames/sources/class_numbers.h"
+#include "tests/stages/frames/frames_fixture.h"
 #include "tests/testing/fake_dataset.h"
-#include "tests/testing/temporary_folder.h"
 
 namespace eventgan {
 namespace {
@@ -41,7 +33,7 @@ class StillClipsTest : public ::testing::Test {
     cv::Mat image(kStillSize.height, kStillSize.width, CV_8UC1, cv::Scalar(kDark));
     image(cv::Rect(60, 40, 30, 30)) = kFar;
     image(cv::Rect(80, 55, 25, 30)) = kNear;
-    std::filesystem::create_directories(folder_ / "clip");
+    fs::create_directories(folder_ / "clip");
     for (const char* name : {"0000.png", "0001.png"}) {
       cv::imwrite((folder_ / "clip" / name).string(), image);
     }
@@ -87,7 +79,7 @@ class StillClipsTest : public ::testing::Test {
     return both;
   }
 
-  testing::TemporaryFolder folder_;
+  TemporaryFolder folder_;
   JobManifest manifest_;
   Annotation still_;
   std::vector<std::unique_ptr<Dataset>> datasets_;
@@ -325,7 +317,7 @@ TEST_F(CutOutClips, IsDoneOnceForAllFramesOfAClip) {
     return dataset.made_pair(all[static_cast<std::size_t>(i)].label_key)->outlines;
   };
   EXPECT_EQ(counts(0), (OutlineCounts{0, 1, 0}));
-  std::filesystem::remove_all(folder_ / "clip");
+  fs::remove_all(folder_ / "clip");
   EXPECT_EQ(counts(1), OutlineCounts());
   EXPECT_FALSE(is_fault(dataset.annotation(all[20].label_key))) << "the first still is known";
   EXPECT_TRUE(is_fault(dataset.annotation(all[30].label_key))) << "the second is not";
@@ -415,7 +407,7 @@ TEST_F(StillClipsTest, ThereIsNothingToBeMadeOfOtherSources) {
 
 TEST_F(StillClipsTest, AnImageThatIsNotThereIsAFaultOfItsFrames) {
   const Dataset& dataset = open();
-  std::filesystem::remove(folder_ / "clip" / "0000.png");
+  fs::remove(folder_ / "clip" / "0000.png");
   const std::string key = open().labelled_frames()[0].label_key;
   EXPECT_TRUE(is_fault(datasets_[0]->annotation(key)));
   EXPECT_TRUE(is_fault(datasets_[0]->made_pair(key)));
