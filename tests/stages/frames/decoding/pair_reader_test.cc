@@ -129,16 +129,27 @@ TEST(PairReader, ABadFrameOfEitherSideIsAFault) {
   }
 }
 
+FramePair clip_pair(int previous, int next, int gap_frames = 0) {
+  FramePair pair;
+  pair.previous = testing::video_ref("clip.avi", previous);
+  pair.next = testing::video_ref("clip.avi", next);
+  pair.gap_frames = gap_frames;
+  return pair;
+}
+
+/// Frame i of the video is grey of value 2 i.
+void expect_frames(const PairReader& reader, const FramePair& pair) {
+  const auto outcome = reader.read(pair);
+  ASSERT_EQ(fault_of(outcome), "no fault") << pair.next.video_frame;
+  const auto& input = outcome->input;
+  EXPECT_NEAR(level(input[input.size() / 4]), 2 * pair.previous.video_frame, 1);
+  EXPECT_NEAR(level(input[input.size() / 4 * 3]), 2 * pair.next.video_frame, 1);
+}
+
 TEST(PairReader, ReadsPairsFromAVideo) {
   const TemporaryFolder folder;
   testing::write_counting_video(folder / "clip.avi", 20);
-  FramePair pair;
-  pair.previous = testing::video_ref("clip.avi", 10);
-  pair.next = testing::video_ref("clip.avi", 16);
-  const auto outcome = PairReader(folder.path(), {}).read(pair);
-  const auto& input = outcome->input;
-  EXPECT_NEAR(level(input.front()), 20, 1);  // frame i is grey of value 2 i
-  EXPECT_NEAR(level(input.back()), 32, 1);
+  expect_frames(PairReader(folder.path(), {}), clip_pair(10, 16));
 }
 
 TEST(PairReader, PairsUnderWayMayComeInAnyOrderAndTheVideoIsOpenedOnce) {
@@ -150,15 +161,7 @@ TEST(PairReader, PairsUnderWayMayComeInAnyOrderAndTheVideoIsOpenedOnce) {
   const PairReader reader(folder.path(), {}, kUnderWay);
   for (const int first : {6, 6 + kUnderWay}) {
     for (int next = first + kUnderWay - 1; next >= first; --next) {
-      FramePair pair;
-      pair.previous = testing::video_ref("clip.avi", next - 6);
-      pair.next = testing::video_ref("clip.avi", next);
-      const auto outcome = reader.read(pair);
-      ASSERT_FALSE(is_fault(outcome)) << next << ": " << outcome.fault().reason;
-      const auto& input = outcome->input;
-      const std::size_t middle = input.size() / 4;  // of the previous frame
-      EXPECT_NEAR(level(input[middle]), 2 * (next - 6), 1);
-      EXPECT_NEAR(level(input[middle + input.size() / 2]), 2 * next, 1);
+      expect_frames(reader, clip_pair(next - 6, next));
       // The open video outlives its name; opening it a second time fails.
       fs::remove(folder / "clip.avi");
     }
@@ -173,15 +176,7 @@ TEST(PairReader, OfAThinnedVideoTheFramesTakenAreKept) {
   const PairReader reader(folder.path(), {}, /*pairs_under_way=*/2);
   for (int first = 30; first + 5 < 127; first += 10) {
     for (const int next : {first + 5, first}) {
-      FramePair pair;
-      pair.previous = testing::video_ref("clip.avi", next - 30);
-      pair.next = testing::video_ref("clip.avi", next);
-      pair.gap_frames = 6;
-      const auto outcome = reader.read(pair);
-      ASSERT_FALSE(is_fault(outcome)) << next << ": " << outcome.fault().reason;
-      const auto& input = outcome->input;
-      EXPECT_NEAR(level(input[input.size() / 4]), 2 * (next - 30), 1);
-      EXPECT_NEAR(level(input[input.size() / 4 * 3]), 2 * next, 1);
+      expect_frames(reader, clip_pair(next - 30, next, 6));
       // The open video outlives its name; opening it a second time fails.
       fs::remove(folder / "clip.avi");
     }
@@ -193,22 +188,8 @@ TEST(PairReader, OneVideoIsReadWholeAndThinnedByTurns) {
   testing::write_counting_video(folder / "clip.avi", 60);
   const PairReader reader(folder.path(), {});
   for (int next = 12; next < 60; next += 12) {
-    for (const int stride : {1, 4, 6}) {
-      FramePair pair;
-      pair.previous = testing::video_ref("clip.avi", next - 2 * stride);
-      pair.next = testing::video_ref("clip.avi", next);
-      pair.gap_frames = 2;
-      const auto outcome = reader.read(pair);
-      ASSERT_FALSE(is_fault(outcome)) << next << ": " << outcome.fault().reason;
-      const auto& input = outcome->input;
-      EXPECT_NEAR(level(input[input.size() / 4]), 2 * (next - 2 * stride), 1);
-      EXPECT_NEAR(level(input[input.size() / 4 * 3]), 2 * next, 1);
-    }
+    for (const int stride : {1, 4, 6}) expect_frames(reader, clip_pair(next - 2 * stride, next, 2));
   }
-}
-
-std::string reason(const Outcome<PreparedPair>& outcome) {
-  return is_fault(outcome) ? outcome.fault().reason : "no fault";
 }
 
 TEST(PairReader, FramesOfAVideoAndOfAFolderPair) {
@@ -224,10 +205,10 @@ TEST(PairReader, FramesOfAVideoAndOfAFolderPair) {
   std::swap(pair.previous, pair.next);
   EXPECT_EQ(level(reader.read(pair)->input.back()), 77);
   pair.previous.video_frame = 20;
-  EXPECT_EQ(reason(reader.read(pair)),
+  EXPECT_EQ(fault_of(reader.read(pair)),
             "expected a frame at position 20, got a video whose frames end after 20, in clip.avi");
   pair.next = testing::video_ref("clip.avi", 9);
-  EXPECT_EQ(reason(reader.read(pair)),
+  EXPECT_EQ(fault_of(reader.read(pair)),
             "expected a frame at position 20, got a video whose frames end after 20, in clip.avi");
 }
 

@@ -47,8 +47,8 @@ TEST_F(RecordingLabelsTest, OfATableItsFirstLineTellsWhetherItHasLabels) {
     for (int i = 0; i < 100'000; ++i) text += "0,0,1,1250000\n";
     write("table.csv", text);
     const InputCounter counter;
-    EXPECT_EQ(is_label_tableat("table.csv"), is);
-    EXPECT_LE(counter.ofat("table.csv").bytes, 1u << 14);
+    EXPECT_EQ(is_label_table(at("table.csv")), is);
+    EXPECT_LE(counter.of(at("table.csv")).bytes, 1u << 14);
   }
 }
 
@@ -99,10 +99,13 @@ TEST_F(RecordingLabelsTest, JsonHasBoxesAndPersons) {
   EXPECT_THAT(labels.annotations.at(1.5).boxes,
               ElementsAre(Box{.class_id = 0, .xyxy = {1, 2, 3, 4.5}, .difficulty = 2},
                           Box{.class_id = 1, .xyxy = {1, 2, 3, 4}, .track_id = 7}));
-  Person first{.joints = {{{10, 20}, 1}, {kMissingPoint, 0}}, .center = {5, 6}, .scale = 0.5};
+  Person first, second;
+  first.joints = {{{10, 20}, 1}, {kMissingPoint, 0}};
+  first.center = {5, 6};
+  first.scale = 0.5;
   first.head_box = {1, 2, 3, 4};
-  EXPECT_THAT(labels.annotations.at(0.5).persons,
-              ElementsAre(first, Person{.joints = {{{10, 20}, -1}, {{30.5, 40}, 0}}}));
+  second.joints = {{{10, 20}, -1}, {{30.5, 40}, 0}};
+  EXPECT_THAT(labels.annotations.at(0.5).persons, ElementsAre(first, second));
   EXPECT_EQ(labels.annotations.at(2).original, R"({"time_s":2})");
 }
 
@@ -268,7 +271,7 @@ TEST_F(WindowLabelsTest, ClassesAreNamedBesideOrAboveThem) {
   EXPECT_THAT(read("0 0.5 0.5 0.1 0.2").class_names, ElementsAre("person"));
   write("yolo/train/data.yaml", "names: [man, dog]\n");
   EXPECT_THAT(read("0 0.5 0.5 0.1 0.2").class_names, ElementsAre("man", "dog"));
-  EXPECT_THAT(WindowLabels().companions(file_), ElementsAreat("yolo/train/data.yaml"));
+  EXPECT_THAT(WindowLabels().companions(file_), ElementsAre(at("yolo/train/data.yaml")));
 }
 
 TEST_F(WindowLabelsTest, MistakesAreNamedByTheirLine) {

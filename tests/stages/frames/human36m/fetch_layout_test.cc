@@ -248,7 +248,9 @@ TEST_F(FetchLayoutTest, ValuesThatAreNotFiniteAreAFaultOfTheirRow) {
     EXPECT_THAT(fault_of(*dataset, 1),
                 AllOf(HasSubstr("expected finite"), HasSubstr("h36m/S1/Walking-1/annot.h5"),
                       HasSubstr(name)));
-    if (name != "intrinsics/7") EXPECT_EQ(fault_of(*dataset, 0), "no fault");
+    if (name != "intrinsics/7") {
+      EXPECT_EQ(fault_of(*dataset, 0), "no fault");
+    }
   }
 }
 

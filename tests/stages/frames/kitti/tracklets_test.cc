@@ -117,10 +117,10 @@ TEST(Tracklets, ACountThatIsNotThatOfTheItemsIsAnError) {
        "expected 2 poses as <count> says, got 3, in t.xml (tracklet 1)"},
       {"<poses><count>3</count>", "<poses>",
        "expected a whole number for count, got '', in t.xml (tracklet 1)"}};
-  for (const auto& [right, wrong, error] : cases) {
+  for (const auto& [right, wrong, why] : cases) {
     std::string changed = xml;
     changed.replace(changed.find(right), right.size(), wrong);
-    EXPECT_THROWS(Tracklets(changed, "t.xml"), InputError, StrEq(error));
+    EXPECT_THROWS(Tracklets(changed, "t.xml"), InputError, StrEq(why));
   }
 }
 

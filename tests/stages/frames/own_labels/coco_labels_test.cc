@@ -121,7 +121,9 @@ TEST_F(CocoLabels, ACategoryThatNoneHasIsNoClassBesideItsNamesake) {
     of_one(annotations, R"({"id": 0, "name": "fish"}, {"id": 1, "name": "fish"},
                            {"id": 2, "name": "crab"})");
     EXPECT_THAT(open()->label_schema().class_names, ElementsAre("fish", "crab"));
-    if (!annotations.empty()) EXPECT_EQ(annotation().boxes.at(0).class_id, 0);
+    if (!annotations.empty()) {
+      EXPECT_EQ(annotation().boxes.at(0).class_id, 0);
+    }
   }
 }
 
@@ -334,7 +336,9 @@ TEST_F(CocoLabels, AnotherImageIsNotTakenForOne) {
     list(names);
     const auto dataset = open(root);
     const LabelledFrame& found = dataset->labelled_frames().at(frame);
-    if (key != nullptr) EXPECT_EQ(found.label_key, key);
+    if (key != nullptr) {
+      EXPECT_EQ(found.label_key, key);
+    }
     EXPECT_EQ(found.frame.index >= 0, key != nullptr);
   }
   list({"../other/000001.png"});
