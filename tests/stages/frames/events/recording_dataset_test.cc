@@ -249,7 +249,7 @@ TEST_F(RecordingDatasetTest, RefusesWhatDoesNotFit) {
   EXPECT_TRUE(is_fault(dataset->annotation("other/1.75")));
   EXPECT_EQ(dataset->label_place("other/1.75"), "other/1.75");
   spec_.recording.camera = "right";
-  refused("in drive.h5");
+  refused("expected a recording of an event camera, got HDF5 of another layout");
   spec_.root = "absent";
   refused("absent");
   drive("all/a.h5");
