@@ -154,7 +154,8 @@ TEST(TableColumnsTest, GivesRows) {
   const TableColumns table = columns();
   EXPECT_THAT(table.row_of("points", 1), ElementsAre(4, 5, 6));
   EXPECT_EQ(table.whole_number("frame", 0), 7);
-  EXPECT_THROW(table.whole_number("frame", 1), InputError);
+  EXPECT_THROWS(table.whole_number("frame", 1), InputError,
+                "expected a whole number in [0, 10^9), got 7.5", "(frame, row 1)");
   EXPECT_EQ(table.fields(1, 2, "x/").dump(),
             R"({"frame":7.5,"name":"b","points":[[4.0],[5.0],[6.0]]})");
   EXPECT_EQ(table.fields(0, 2)["x/other"], 1);

@@ -84,7 +84,7 @@ TEST_F(MpiiListDatasetTest, LabelsAreInPixelsOfTheFrame) {
 
 TEST_F(MpiiListDatasetTest, AMalformedRowIsAFaultOfItsSampleOnly) {
   write("labels/list.json",
-             R"([{"image": "b.jpg"}, {"image": "b.jpg", "scale": "x"}, {"image": "a.jpg"}])");
+        R"([{"image": "b.jpg"}, {"image": "b.jpg", "scale": "x"}, {"image": "a.jpg"}])");
   const auto dataset = open();
   EXPECT_EQ(fault_of(dataset->annotation("b.jpg")),
             "expected a finite number, got \"x\" at scale of its person 1, in "
