@@ -1,25 +1,15 @@
 #include "stages/frames/decoding/pair_reader.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <hdf5.h>
-
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "tests/stages/base/images/test_images.h"
 #include "tests/stages/frames/decoding/test_video.h"
-#include "tests/testing/shared_data.h"
-#include "tests/testing/temporary_folder.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::FloatEq;
-using ::testing::HasSubstr;
-using testing::TemporaryFolder;
 
 /// Grey level back from the network's input.
 int level(float x) { return static_cast<int>(std::lround((x / 2 + 0.5f) * 255)); }
@@ -135,22 +125,31 @@ TEST(PairReader, ABadFrameOfEitherSideIsAFault) {
   cv::imwrite((folder / "a.png").string(), testing::gradient_image({5, 7}));
   const PairReader reader(folder.path(), {});
   for (const auto& pair : {pair_of("none.png", "a.png"), pair_of("a.png", "none.png")}) {
-    const auto outcome = reader.read(pair);
-    ASSERT_TRUE(is_fault(outcome));
-    EXPECT_THAT(outcome.fault().reason, HasSubstr("in none.png"));
+    EXPECT_THAT(fault_of(reader.read(pair)), HasSubstr("in none.png"));
   }
+}
+
+FramePair clip_pair(int previous, int next, int gap_frames = 0) {
+  FramePair pair;
+  pair.previous = testing::video_ref("clip.avi", previous);
+  pair.next = testing::video_ref("clip.avi", next);
+  pair.gap_frames = gap_frames;
+  return pair;
+}
+
+/// Frame i of the video is grey of value 2 i.
+void expect_frames(const PairReader& reader, const FramePair& pair) {
+  const auto outcome = reader.read(pair);
+  ASSERT_EQ(fault_of(outcome), "no fault") << pair.next.video_frame;
+  const auto& input = outcome->input;
+  EXPECT_NEAR(level(input[input.size() / 4]), 2 * pair.previous.video_frame, 1);
+  EXPECT_NEAR(level(input[input.size() / 4 * 3]), 2 * pair.next.video_frame, 1);
 }
 
 TEST(PairReader, ReadsPairsFromAVideo) {
   const TemporaryFolder folder;
   testing::write_counting_video(folder / "clip.avi", 20);
-  FramePair pair;
-  pair.previous = testing::video_ref("clip.avi", 10);
-  pair.next = testing::video_ref("clip.avi", 16);
-  const auto outcome = PairReader(folder.path(), {}).read(pair);
-  const auto& input = outcome->input;
-  EXPECT_NEAR(level(input.front()), 20, 1);  // frame i is grey of value 2 i
-  EXPECT_NEAR(level(input.back()), 32, 1);
+  expect_frames(PairReader(folder.path(), {}), clip_pair(10, 16));
 }
 
 TEST(PairReader, PairsUnderWayMayComeInAnyOrderAndTheVideoIsOpenedOnce) {
@@ -162,17 +161,9 @@ TEST(PairReader, PairsUnderWayMayComeInAnyOrderAndTheVideoIsOpenedOnce) {
   const PairReader reader(folder.path(), {}, kUnderWay);
   for (const int first : {6, 6 + kUnderWay}) {
     for (int next = first + kUnderWay - 1; next >= first; --next) {
-      FramePair pair;
-      pair.previous = testing::video_ref("clip.avi", next - 6);
-      pair.next = testing::video_ref("clip.avi", next);
-      const auto outcome = reader.read(pair);
-      ASSERT_FALSE(is_fault(outcome)) << next << ": " << outcome.fault().reason;
-      const auto& input = outcome->input;
-      const std::size_t middle = input.size() / 4;  // of the previous frame
-      EXPECT_NEAR(level(input[middle]), 2 * (next - 6), 1);
-      EXPECT_NEAR(level(input[middle + input.size() / 2]), 2 * next, 1);
+      expect_frames(reader, clip_pair(next - 6, next));
       // The open video outlives its name; opening it a second time fails.
-      std::filesystem::remove(folder / "clip.avi");
+      fs::remove(folder / "clip.avi");
     }
   }
 }
@@ -185,17 +176,9 @@ TEST(PairReader, OfAThinnedVideoTheFramesTakenAreKept) {
   const PairReader reader(folder.path(), {}, /*pairs_under_way=*/2);
   for (int first = 30; first + 5 < 127; first += 10) {
     for (const int next : {first + 5, first}) {
-      FramePair pair;
-      pair.previous = testing::video_ref("clip.avi", next - 30);
-      pair.next = testing::video_ref("clip.avi", next);
-      pair.gap_frames = 6;
-      const auto outcome = reader.read(pair);
-      ASSERT_FALSE(is_fault(outcome)) << next << ": " << outcome.fault().reason;
-      const auto& input = outcome->input;
-      EXPECT_NEAR(level(input[input.size() / 4]), 2 * (next - 30), 1);
-      EXPECT_NEAR(level(input[input.size() / 4 * 3]), 2 * next, 1);
+      expect_frames(reader, clip_pair(next - 30, next, 6));
       // The open video outlives its name; opening it a second time fails.
-      std::filesystem::remove(folder / "clip.avi");
+      fs::remove(folder / "clip.avi");
     }
   }
 }
@@ -205,22 +188,8 @@ TEST(PairReader, OneVideoIsReadWholeAndThinnedByTurns) {
   testing::write_counting_video(folder / "clip.avi", 60);
   const PairReader reader(folder.path(), {});
   for (int next = 12; next < 60; next += 12) {
-    for (const int stride : {1, 4, 6}) {
-      FramePair pair;
-      pair.previous = testing::video_ref("clip.avi", next - 2 * stride);
-      pair.next = testing::video_ref("clip.avi", next);
-      pair.gap_frames = 2;
-      const auto outcome = reader.read(pair);
-      ASSERT_FALSE(is_fault(outcome)) << next << ": " << outcome.fault().reason;
-      const auto& input = outcome->input;
-      EXPECT_NEAR(level(input[input.size() / 4]), 2 * (next - 2 * stride), 1);
-      EXPECT_NEAR(level(input[input.size() / 4 * 3]), 2 * next, 1);
-    }
+    for (const int stride : {1, 4, 6}) expect_frames(reader, clip_pair(next - 2 * stride, next, 2));
   }
-}
-
-std::string reason(const Outcome<PreparedPair>& outcome) {
-  return is_fault(outcome) ? outcome.fault().reason : "no fault";
 }
 
 TEST(PairReader, FramesOfAVideoAndOfAFolderPair) {
@@ -236,10 +205,10 @@ TEST(PairReader, FramesOfAVideoAndOfAFolderPair) {
   std::swap(pair.previous, pair.next);
   EXPECT_EQ(level(reader.read(pair)->input.back()), 77);
   pair.previous.video_frame = 20;
-  EXPECT_EQ(reason(reader.read(pair)),
+  EXPECT_EQ(fault_of(reader.read(pair)),
             "expected a frame at position 20, got a video whose frames end after 20, in clip.avi");
   pair.next = testing::video_ref("clip.avi", 9);
-  EXPECT_EQ(reason(reader.read(pair)),
+  EXPECT_EQ(fault_of(reader.read(pair)),
             "expected a frame at position 20, got a video whose frames end after 20, in clip.avi");
 }
 
@@ -258,14 +227,14 @@ TEST(PairReader, AStillIsDecodedOnceForAllOfItsClip) {
       return reader.read(pair);
     };
     const auto first = clip("a.png");
-    std::filesystem::rename(folder / "a.png", folder / "away.png");
+    fs::rename(folder / "a.png", folder / "away.png");
     const auto second = clip("a.png");
     ASSERT_FALSE(is_fault(second)) << second.fault().reason;
     EXPECT_EQ(second->input, first->input);
     EXPECT_EQ(level(second->input.front()), 77);
     EXPECT_EQ(level(clip("b.png")->input.front()), 99);
     EXPECT_TRUE(is_fault(clip("a.png"))) << "the last one alone is kept";
-    std::filesystem::rename(folder / "away.png", folder / "a.png");
+    fs::rename(folder / "away.png", folder / "a.png");
   }
 }
 

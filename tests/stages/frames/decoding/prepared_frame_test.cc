@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "tests/stages/base/images/test_images.h"
+#include "tests/testing/texts.h"
 
 namespace eventgan {
 namespace {
@@ -33,7 +34,8 @@ TEST(PlacedImage, CropKeepsTheMiddle) {
 
 TEST(PlacedImage, RefusesAFrameOfAnotherSize) {
   const Placement placement{{2, 2}, {2, 2}, {2, 2}, 0, 0};
-  EXPECT_THROW(place_colour(plain_frame({2, 3}, 0), placement), std::invalid_argument);
+  EXPECT_THROWS(place_colour(plain_frame({2, 3}, 0), placement), std::invalid_argument,
+                "expected a frame of the placement's source size, got another");
 }
 
 TEST(VisiblePart, StretchIsTheWholeVolume) {
@@ -139,7 +141,8 @@ TEST(PreparedFrame, WhatCannotBePlacedIsRefused) {
   ImageSpec spec;
   spec.size = ImageSize{64, 64};
   spec.fit = ImageFit::kCrop;
-  EXPECT_THROW(prepare_frame({{1, 1 << 26}, nullptr}, spec), std::runtime_error);
+  EXPECT_THROWS(prepare_frame({{1, 1 << 26}, nullptr}, spec), std::runtime_error,
+                "expected a scaled image of at most 2147483647 pixels a side, got 4294967296");
 }
 
 }  // namespace

@@ -1,24 +1,16 @@
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <atomic>
-#include <string>
 #include <thread>
-#include <vector>
 
 #include "stages/frames/decoding/pair_reader.h"
 #include "tests/stages/base/images/test_images.h"
 #include "tests/stages/frames/decoding/test_video.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 // What pairs of one PairReader share.
 
 namespace eventgan {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::TemporaryFolder;
 
 FramePair shared_pair(const std::string& previous, const std::string& next) {
   FramePair pair;
@@ -38,8 +30,8 @@ TEST(PairSharing, PairsThatShareAFrameDecodeItOnce) {
   }
   const PairReader reader(folder.path(), {});
   const auto first = reader.read(shared_pair("a.png", "b.png"));
-  std::filesystem::remove(folder / "a.png");  // a second decoding would fail
-  std::filesystem::remove(folder / "b.png");
+  fs::remove(folder / "a.png");  // a second decoding would fail
+  fs::remove(folder / "b.png");
   for (const auto& pair : {shared_pair("b.png", "c.png"), shared_pair("a.png", "c.png")}) {
     EXPECT_EQ(why_none(reader.read(pair)), "no fault");
   }
@@ -73,7 +65,7 @@ TEST(PairSharing, AnExpectedFileIsOpenedOnce) {
 TEST(FilesAhead, OfTooManyTheOneThatWaitedLongestIsClosed) {
   const TemporaryFolder folder;
   for (std::size_t i = 0; i <= FilesAhead::kMost; ++i) {
-    testing::write_file(folder / std::to_string(i), "x");
+    write_file(folder / std::to_string(i), "x");
   }
   FilesAhead ahead;
   const InputCounter counter;
@@ -111,7 +103,7 @@ TEST(PairSharing, ABadFrameIsTheSameFaultForEachOfItsPairs) {
   cv::imwrite((folder / "a.png").string(), testing::gradient_image({5, 7}));
   cv::imwrite((folder / "c.png").string(), testing::gradient_image({5, 7}));
   cv::imwrite((folder / "b.png").string(), testing::gradient_image({5, 7}));
-  std::filesystem::resize_file(folder / "b.png", 60);
+  fs::resize_file(folder / "b.png", 60);
   const PairReader reader(folder.path(), {});
   const std::string first = why_none(reader.read(shared_pair("a.png", "b.png")));
   EXPECT_THAT(first, HasSubstr("expected a whole PNG, got "));
@@ -163,7 +155,7 @@ TEST(PairSharing, OneFileIsTakenAsStoredAndUpright) {
   const TemporaryFolder folder;
   const auto file = folder / "a.jpg";
   cv::imwrite(file.string(), testing::gradient_image({20, 36}));
-  testing::write_file(file, testing::with_orientation(testing::read_file(file), 6));
+  write_file(file, testing::with_orientation(read_file(file), 6));
   const PairReader reader(folder.path(), {});
   const FramePair pair = shared_pair("a.jpg", "a.jpg");
   for (int turn = 0; turn < 2; ++turn) {
@@ -178,7 +170,7 @@ TEST(PairSharing, OneFileIsTakenAsStoredAndUpright) {
     EXPECT_EQ(upright.input[19], stored.input[0]);
     EXPECT_NE(upright.input[0], upright.input[19]);
   }
-  testing::write_file(folder / "b.jpg", testing::with_orientation(testing::read_file(file), 2));
+  write_file(folder / "b.jpg", testing::with_orientation(read_file(file), 2));
   EXPECT_EQ(why_none(reader.read(shared_pair("b.jpg", "b.jpg"), ImageOrientation::kUpright)),
             "expected an image that is not mirrored, got EXIF orientation 2, in b.jpg");
   EXPECT_EQ(why_none(reader.read(shared_pair("b.jpg", "b.jpg"))), "no fault");

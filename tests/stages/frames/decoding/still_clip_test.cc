@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "tests/testing/texts.h"
+
 namespace eventgan {
 namespace {
 
@@ -80,9 +82,9 @@ TEST(StillClip, TurningMovesCornersFarthest) {
 
 TEST(StillClip, RefusesWhatOpenCvCannotMove) {
   const std::vector<std::uint8_t> pixels(kMostStillSide + 1);
-  EXPECT_THROW(StillClip({{1, kMostStillSide + 1}, pixels.data(), ImageView::Channels::kGrey}, {},
-                         StillPose()),
-               std::runtime_error);
+  const ImageView wide{{1, kMostStillSide + 1}, pixels.data(), ImageView::Channels::kGrey};
+  EXPECT_THROWS(StillClip(wide, {}, StillPose()), std::runtime_error,
+                "expected a still of at most 32766 pixels a side, got 32767x1");
 }
 
 }  // namespace

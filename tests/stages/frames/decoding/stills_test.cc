@@ -1,26 +1,16 @@
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-#include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "manifests/values/counter_random.h"
 #include "stages/frames/decoding/pair_reader.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/labels/label_mapping.h"
 #include "tests/stages/frames/decoding/test_video.h"
-#include "tests/testing/temporary_folder.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::StartsWith;
 
 FramePair still_of(const FrameRef& image, const ImageMotion& motion, double label_position = 1) {
   FramePair pair;
@@ -65,7 +55,7 @@ class Stills : public ::testing::Test {
     return a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0;
   }
 
-  testing::TemporaryFolder folder_;
+  TemporaryFolder folder_;
   ImageSpec spec_;
 };
 
@@ -251,7 +241,7 @@ TEST_F(Stills, OfAVideoItIsOpenedOnceWhateverTheOrder) {
         const cv::Mat moved = frame(*outcome, 0);
         EXPECT_NEAR(moved.at<std::uint8_t>(10, 10), 2 * number, 1);
         // The open video outlives its name; opening it a second time fails.
-        std::filesystem::remove(folder_ / "clip.avi");
+        fs::remove(folder_ / "clip.avi");
       }
     }
   }

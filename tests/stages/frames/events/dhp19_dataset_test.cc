@@ -1,33 +1,20 @@
 #include "stages/frames/events/dhp19_dataset.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <string>
 
-#include "manifests/values/faults.h"
 #include "stages/frames/sources/frame_selection.h"
 #include "stages/frames/sources/open_dataset.h"
 #include "tests/stages/base/archives/mat_writer.h"
+#include "tests/stages/frames/frames_fixture.h"
 #include "tests/testing/hdf5_file.h"
 #include "tests/testing/npy_bytes.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
 namespace mat = testing::mat;
-using ::testing::AllOf;
-using ::testing::Contains;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 using ::testing::UnorderedElementsAre;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -38,7 +25,7 @@ const std::vector<std::string> kNames = {"head",  "shoulderR", "shoulderL", "elb
 /// A recording of 4 poses, 10 ms apart, and a camera with 11 events 3 ms apart from 1,000,000 us
 /// on, at 0, 3, .. 30 ms; of camera c event i is at (20 c + i, i). In windows of 3 events these are
 /// the rows 0..0, 0..1, 1..2 and the end, row floor(2.4) = 2; what is left makes no window.
-class Dhp19Test : public ::testing::Test {
+class Dhp19Test : public FolderTest {
  protected:
   Dhp19Test() {
     spec_.dataset = DatasetKind::kDhp19;
@@ -48,10 +35,10 @@ class Dhp19Test : public ::testing::Test {
     for (const int number : {1, 2, 3, 4}) {
       // P_n: f = 100 n, centre (173, 130), 1 m in front: w = Z + 1000.
       const double f = 100.0 * number;
-      testing::write_file(folder_ / ("dhp19/P_matrices/P" + std::to_string(number) + ".npy"),
-                          testing::npy_doubles({3, 4}, {f, 0, 173, 173'000,  //
-                                                        0, f, 130, 130'000,  //
-                                                        0, 0, 1, 1000}));
+      write_file(folder_ / ("dhp19/P_matrices/P" + std::to_string(number) + ".npy"),
+                 testing::npy_doubles({3, 4}, {f, 0, 173, 173'000,  //
+                                               0, f, 130, 130'000,  //
+                                               0, 0, 1, 1000}));
     }
     write_events("S1/session1/mov1.h5", 11);
     write_poses("S1_1_1", 4);
@@ -74,7 +61,7 @@ class Dhp19Test : public ::testing::Test {
       datasets[group + "y"] = {{1, columns}, y};
       datasets[group + "polarity"] = {{1, columns}, polarity};
     }
-    testing::write_hdf5(folder_ / "dhp19/DVS_movies" / name, datasets);
+    testing::write_hdf5(at("dhp19/DVS_movies") / name, datasets);
   }
 
   /// Joint j of row r is at (100 j + 10 r, 200 - 30 j, 50 r) mm.
@@ -98,33 +85,25 @@ class Dhp19Test : public ::testing::Test {
       fields.emplace_back(joints[joint], mat::array<double>(MAT_C_DOUBLE, MAT_T_DOUBLE, columns,
                                                             static_cast<std::size_t>(rows), 3));
     }
-    mat::write_mat(folder_ / "dhp19/Vicon_data" / (name + ".mat"), "XYZPOS",
-                   mat::structure(fields));
+    mat::write_mat(at("dhp19/Vicon_data") / (name + ".mat"), "XYZPOS", mat::structure(fields));
   }
 
   std::unique_ptr<Dataset> open() const { return open_dhp19_dataset(spec_, folder_.path()); }
 
-  static std::vector<std::string> ids(const std::vector<LabelledFrame>& frames) {
-    std::vector<std::string> names;
-    for (const LabelledFrame& frame : frames) names.push_back(frame.sample_id);
-    return names;
-  }
-
-  testing::TemporaryFolder folder_;
   std::function<bool(int, int)> lost_ = [](int, int) { return false; };
   SourceSpec spec_;
 };
 
 TEST_F(Dhp19Test, CutsTheTwoCamerasIntoWindows) {
   const auto dataset = open();
-  EXPECT_THAT(ids(dataset->labelled_frames()),
+  EXPECT_THAT(ids_of(*dataset),
               ElementsAre("S1/1_1/2/000000", "S1/1_1/2/000001", "S1/1_1/2/000002",
                           "S1/1_1/3/000000", "S1/1_1/3/000001", "S1/1_1/3/000002"));
   EXPECT_EQ(dataset->label_schema().joint_names, kNames);
   const LabelledFrame& frame = dataset->labelled_frames()[1];
-  EXPECT_EQ(frame.frame.path, "dhp19/DVS_movies/S1/session1/mov1.h5");
-  EXPECT_EQ(dataset->paired_frame(frame, -1).frame.index, 3);
-  EXPECT_EQ(dataset->paired_frame(frame, 1).frame.index, 5);
+  EXPECT_THAT(paired(*dataset, 1, {-1, 1}),
+              ElementsAre("present dhp19/DVS_movies/S1/session1/mov1.h5 3",
+                          "present dhp19/DVS_movies/S1/session1/mov1.h5 5"));
   const auto window = *dataset->events(frame.label_key);
   EXPECT_EQ(window.sensor, (ImageSize{260, 346}));
   ASSERT_EQ(window.events.size(), 3u);
@@ -138,8 +117,8 @@ TEST_F(Dhp19Test, CutsTheTwoCamerasIntoWindows) {
       dataset->annotation_files(),
       ElementsAre("dhp19/P_matrices/P1.npy", "dhp19/P_matrices/P2.npy", "dhp19/P_matrices/P3.npy",
                   "dhp19/P_matrices/P4.npy", "dhp19/Vicon_data/S1_1_1.mat"));
-  const FrameOrigin origin = frame_origin(DatasetKind::kDhp19, frame.sequence);
-  EXPECT_EQ(origin, (FrameOrigin{.subject = "S1", .action = "1_1", .camera = "2"}));
+  EXPECT_EQ(frame_origin(DatasetKind::kDhp19, frame.sequence),
+            (FrameOrigin{.subject = "S1", .action = "1_1", .camera = "2"}));
 }
 
 TEST_F(Dhp19Test, ProjectsTheMeanPoseByTheCamerasMatrix) {
@@ -179,18 +158,18 @@ TEST_F(Dhp19Test, ProjectsTheMeanPoseByTheCamerasMatrix) {
 TEST_F(Dhp19Test, RefusesMatricesThatProjectNothing) {
   const std::vector<double> zeros(12), equal(12, 7.0), nan(12, kNan), huge(12, 1e308);
   for (const std::vector<double>& matrix : {zeros, equal, nan, huge}) {
-    testing::write_file(folder_ / "dhp19/P_matrices/P3.npy", testing::npy_doubles({3, 4}, matrix));
-    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(
-                                     AllOf(HasSubstr("expected a projection of full rank, got ["),
-                                           HasSubstr("in dhp19/P_matrices/P3.npy"))));
+    write("dhp19/P_matrices/P3.npy", testing::npy_doubles({3, 4}, matrix));
+    EXPECT_THROWS(open(), InputError, "expected a projection of full rank, got [",
+                  "in dhp19/P_matrices/P3.npy");
   }
 }
 
 TEST_F(Dhp19Test, WindowsThatLastLongerThanThePosesAreLeftOut) {
   write_poses("S1_1_1", 2);  // to 20 ms; the third window ends at 24 ms
   const auto dataset = open();
-  EXPECT_THAT(ids(dataset->labelled_frames()), ElementsAre("S1/1_1/2/000000", "S1/1_1/2/000001",
-                                                           "S1/1_1/3/000000", "S1/1_1/3/000001"));
+  EXPECT_THAT(
+      ids_of(dataset->labelled_frames()),
+      ElementsAre("S1/1_1/2/000000", "S1/1_1/2/000001", "S1/1_1/3/000000", "S1/1_1/3/000001"));
   EXPECT_THAT(dataset->notes(), ElementsAre("2 windows after the last pose left out in "
                                             "dhp19/DVS_movies/S1/session1/mov1.h5"));
   write_poses("S1_1_1", 1);
@@ -205,22 +184,22 @@ TEST_F(Dhp19Test, TakesSubjectsBySplitAndLeavesMovementsOut) {
     }
   }
   spec_.selection.cameras = {"0"};
-  EXPECT_THAT(ids(open()->labelled_frames()),
+  EXPECT_THAT(ids_of(open()->labelled_frames()),
               UnorderedElementsAre("S1/1_1/0/000000", "S1/1_1/0/000001", "S1/1_1/0/000002",
                                    "S2/2_1/0/000000", "S2/2_2/0/000000", "S12/2_1/0/000000",
                                    "S12/2_2/0/000000"));
   spec_.split = "test";
-  EXPECT_THAT(ids(open()->labelled_frames()),
+  EXPECT_THAT(ids_of(open()->labelled_frames()),
               UnorderedElementsAre("S13/2_1/0/000000", "S13/2_2/0/000000"));
   spec_.split = "all";
   EXPECT_EQ(open()->labelled_frames().size(), 9u);
   spec_.selection.subjects = {"S13", "S2"};
   spec_.selection.without_actions = {"2_1"};
   const auto selected = select_frames(open()->labelled_frames(), spec_, folder_.path(), 1);
-  EXPECT_THAT(ids(selected.frames), UnorderedElementsAre("S13/2_2/0/000000", "S2/2_2/0/000000"));
+  EXPECT_THAT(ids_of(selected.frames), UnorderedElementsAre("S13/2_2/0/000000", "S2/2_2/0/000000"));
   spec_.selection.without_actions = {"9_1"};
-  EXPECT_THAT([&] { select_frames(open()->labelled_frames(), spec_, folder_.path(), 1); },
-              ThrowsMessage<InputError>(HasSubstr("1 that it does not have (9_1)")));
+  EXPECT_THROWS(select_frames(open()->labelled_frames(), spec_, folder_.path(), 1), InputError,
+                "1 that it does not have (9_1)");
 }
 
 TEST_F(Dhp19Test, CorruptEventsAreTheFaultOfTheirWindow) {
@@ -233,12 +212,11 @@ TEST_F(Dhp19Test, CorruptEventsAreTheFaultOfTheirWindow) {
     datasets[group + "y"] = {{1, 6}, std::vector<double>{0, 1, 2, 3, 4, 259}};
     datasets[group + "polarity"] = {{6}, std::vector<double>{-1, 1, -1, 1, 1, 1}};
   }
-  testing::write_hdf5(folder_ / "dhp19/DVS_movies/S1/session1/mov1.h5", datasets);
+  testing::write_hdf5(at("dhp19/DVS_movies/S1/session1/mov1.h5"), datasets);
   const auto dataset = open();
   EXPECT_EQ(dataset->events("S1/1_1/2/000000")->events.size(), 3u);
-  const auto outcome = dataset->events("S1/1_1/2/000001");
-  ASSERT_TRUE(is_fault(outcome));
-  EXPECT_THAT(outcome.fault().reason, AllOf(HasSubstr("346"), HasSubstr("cam2, event 4")));
+  EXPECT_THAT(fault_of(dataset->events("S1/1_1/2/000001")),
+              AllOf(HasSubstr("346"), HasSubstr("cam2, event 4")));
 }
 
 TEST_F(Dhp19Test, KeysThatItDoesNotKnowAreFaults) {
@@ -251,34 +229,32 @@ TEST_F(Dhp19Test, KeysThatItDoesNotKnowAreFaults) {
 }
 
 TEST_F(Dhp19Test, NamesWhatIsMissingOrOfAnotherShape) {
-  const auto refuses = [&](const std::string& part) {
-    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr(part)));
-  };
+  const auto refuses = [&](const std::string& part) { EXPECT_THROWS(open(), InputError, part); };
   std::vector<std::string> joints = kNames;
   joints.back() = "toeL";
   write_poses("S1_1_1", 4, joints);
   refuses("expected a field footL, got none");
-  mat::write_mat(folder_ / "dhp19/Vicon_data/S1_1_1.mat", "XYZPOS",
+  mat::write_mat(at("dhp19/Vicon_data/S1_1_1.mat"), "XYZPOS",
                  mat::structure({{"head", mat::number(1)}}));
   refuses("S1_1_1.mat (XYZPOS)");
-  std::filesystem::remove(folder_ / "dhp19/Vicon_data/S1_1_1.mat");
+  fs::remove(at("dhp19/Vicon_data/S1_1_1.mat"));
   refuses("S1_1_1.mat");
   write_poses("S1_1_1", 4);
-  testing::write_hdf5(folder_ / "dhp19/DVS_movies/S1/session1/mov1.h5",
-                      {{"cam0/timeStamp", {{1, 2}, std::vector<double>{0, 1}}},
+  const testing::Hdf5Dataset two{{1, 2}, std::vector<double>{0, 1}};
+  testing::write_hdf5(at("dhp19/DVS_movies/S1/session1/mov1.h5"),
+                      {{"cam0/timeStamp", two},
                        {"cam0/x", {{1, 3}, std::vector<double>{0, 1, 2}}},
-                       {"cam0/y", {{1, 2}, std::vector<double>{0, 1}}},
-                       {"cam0/polarity", {{1, 2}, std::vector<double>{0, 1}}}});
+                       {"cam0/y", two},
+                       {"cam0/polarity", two}});
   refuses("expected as many numbers as timeStamp, 2");
-  testing::write_file(folder_ / "dhp19/P_matrices/P2.npy",
-                      testing::npy_doubles({4, 3}, std::vector<double>(12)));
+  write("dhp19/P_matrices/P2.npy", testing::npy_doubles({4, 3}, std::vector<double>(12)));
   refuses("expected a matrix [3, 4], got [4, 3], in dhp19/P_matrices/P2.npy");
-  std::filesystem::remove(folder_ / "dhp19/P_matrices/P2.npy");
+  fs::remove(at("dhp19/P_matrices/P2.npy"));
   refuses("P2.npy");
-  std::filesystem::remove_all(folder_ / "dhp19/Vicon_data");
+  fs::remove_all(at("dhp19/Vicon_data"));
   refuses("Vicon_data");
   spec_.root = "absent";
-  EXPECT_THROW(open(), InputError);
+  refuses("absent");
 }
 
 }  // namespace

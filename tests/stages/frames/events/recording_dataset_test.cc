@@ -1,58 +1,36 @@
 #include "stages/frames/events/recording_dataset.h"
 
 #include <fmt/core.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-#include <array>
 #include <atomic>
-#include <cmath>
 #include <cstdint>
-#include <filesystem>
-#include <string>
 #include <thread>
 #include <tuple>
-#include <vector>
 
 #include "manifests/files/input_file.h"
-#include "manifests/values/faults.h"
+#include "tests/stages/frames/frames_fixture.h"
 #include "tests/stages/recordings/small_recording.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::Contains;
-using ::testing::Each;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::ThrowsMessage;
-
 constexpr char kLabelHeader[] = "time_s,left,top,right,bottom,class,category\n";
 
 /// The small recording: frames at 1, 1.5 and 2 s; events at 0.5, 1, 1.25, 1.25, 1.75, 2 and 2.5 s.
-class RecordingDatasetTest : public ::testing::Test {
+class RecordingDatasetTest : public FolderTest {
  protected:
   RecordingDatasetTest() {
     spec_.dataset = DatasetKind::kRecording;
     spec_.root = "drive.h5";
-    testing::write_hdf5(folder_ / "drive.h5", testing::small_mvsec());
+    drive("drive.h5");
   }
 
   std::unique_ptr<Dataset> open() const { return open_recording_dataset(spec_, folder_.path()); }
-
-  void label(const std::string& rows) {
-    testing::write_file(folder_ / "drive.csv", kLabelHeader + rows);
+  void drive(const std::string& name) const {
+    testing::write_hdf5(at(name), testing::small_mvsec());
   }
-
-  static std::vector<std::string> ids(const Dataset& dataset) {
-    std::vector<std::string> names;
-    for (const LabelledFrame& frame : dataset.labelled_frames()) names.push_back(frame.sample_id);
-    return names;
-  }
+  void label(const std::string& rows) const { write("drive.csv", kLabelHeader + rows); }
+  void refused(const std::string& why) const { EXPECT_THROWS(open(), InputError, why); }
 
   /// Begin and end of a sample's window.
   static std::array<double, 2> window(const Dataset& dataset, std::size_t sample) {
@@ -60,21 +38,19 @@ class RecordingDatasetTest : public ::testing::Test {
     return {dataset.paired_frame(frame, -1).frame.time_s,
             dataset.paired_frame(frame, 1).frame.time_s};
   }
-
   static std::vector<Event> events(const Dataset& dataset, std::size_t sample) {
     const auto outcome = dataset.events(dataset.labelled_frames().at(sample).label_key);
-    EXPECT_FALSE(is_fault(outcome)) << outcome.fault().reason;
+    EXPECT_EQ(fault_of(outcome), "no fault");
     return outcome->events;
   }
 
-  testing::TemporaryFolder folder_;
   SourceSpec spec_;
   const std::vector<Event> all_ = testing::small_events();
 };
 
 TEST_F(RecordingDatasetTest, WithoutLabelsEachFrameEndsItsInterval) {
   const auto dataset = open();
-  EXPECT_THAT(ids(*dataset), ElementsAre("drive/0000000001.500000", "drive/0000000002.000000"));
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("drive/0000000001.500000", "drive/0000000002.000000"));
   EXPECT_EQ(window(*dataset, 0), (std::array{1.0, 1.5}));
   EXPECT_EQ(window(*dataset, 1), (std::array{1.5, 2.0}));
   EXPECT_THAT(events(*dataset, 0), ElementsAre(all_[2], all_[3]));
@@ -82,9 +58,9 @@ TEST_F(RecordingDatasetTest, WithoutLabelsEachFrameEndsItsInterval) {
   const LabelledFrame& frame = dataset->labelled_frames()[0];
   EXPECT_EQ(dataset->paired_frame(frame, -1).frame, (FrameRef{"drive.h5", 0, 0}));
   EXPECT_EQ(dataset->paired_frame(frame, 1).frame, (FrameRef{"drive.h5", 1, 1}));
-  EXPECT_EQ(dataset->paired_frame(frame, 2).state, PairedFrame::State::kBeyond);
+  EXPECT_THAT(paired(*dataset, 0, {2}), ElementsAre("beyond"));
   EXPECT_EQ(dataset->sensor_size(frame.label_key), (ImageSize{3, 4}));
-  EXPECT_EQ(*dataset->annotation(frame.label_key), Annotation{});
+  EXPECT_EQ(annotation_of(*dataset), Annotation{});
   EXPECT_THAT(dataset->annotation_files(), IsEmpty());
 }
 
@@ -92,15 +68,15 @@ TEST_F(RecordingDatasetTest, LabelsAreAtTheEndOrInTheMiddleOfTheirWindows) {
   // On a frame but for what six decimals lose; between two; without a box.
   label("1.5000004,0,0,2,1,car,easy\n1.75,0,0,1,1,bus,\n2.25\n");
   auto dataset = open();
-  EXPECT_THAT(ids(*dataset), ElementsAre("drive/0000000001.500000", "drive/0000000001.750000",
-                                         "drive/0000000002.250000"));
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("drive/0000000001.500000", "drive/0000000001.750000",
+                                            "drive/0000000002.250000"));
   EXPECT_EQ(window(*dataset, 0), (std::array{1.0, 1.5}));
   EXPECT_EQ(window(*dataset, 1), (std::array{1.25, 1.75}));
   EXPECT_EQ(window(*dataset, 2), (std::array{1.75, 2.25}));  // as long as the last interval
   EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[4]));
   EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("bus", "car"));
-  const auto annotation = dataset->annotation(dataset->labelled_frames()[0].label_key);
-  EXPECT_EQ(annotation->boxes.at(0), (Box{.class_id = 1, .xyxy = {0, 0, 2, 1}, .difficulty = 0}));
+  EXPECT_THAT(annotation_of(*dataset).boxes,
+              ElementsAre(Box{.class_id = 1, .xyxy = {0, 0, 2, 1}, .difficulty = 0}));
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("drive.csv"));
   EXPECT_EQ(dataset->label_place(dataset->labelled_frames()[0].label_key),
             "drive.csv (1.500000 s)");
@@ -113,28 +89,24 @@ TEST_F(RecordingDatasetTest, LabelsAreAtTheEndOrInTheMiddleOfTheirWindows) {
 TEST_F(RecordingDatasetTest, AWindowMayLastSoManySeconds) {
   label("1\n1.5\n2.5\n");
   spec_.window.duration_s = 0.25;
-  auto dataset = open();
-  EXPECT_EQ(window(*dataset, 1), (std::array{1.25, 1.5}));
-  EXPECT_THAT(events(*dataset, 0), ElementsAre(all_[1]));
-  EXPECT_THAT(events(*dataset, 1), IsEmpty());  // 1.25 is no part of it
-  EXPECT_THAT(events(*dataset, 2), ElementsAre(all_[6]));
+  EXPECT_EQ(window(*open(), 1), (std::array{1.25, 1.5}));
+  EXPECT_THAT(events(*open(), 0), ElementsAre(all_[1]));
+  EXPECT_THAT(events(*open(), 1), IsEmpty()) << "1.25 is no part of it";
+  EXPECT_THAT(events(*open(), 2), ElementsAre(all_[6]));
   spec_.window.label = LabelPlace::kMiddle;
-  dataset = open();
-  EXPECT_EQ(window(*dataset, 1), (std::array{1.375, 1.625}));
+  EXPECT_EQ(window(*open(), 1), (std::array{1.375, 1.625}));
 }
 
 TEST_F(RecordingDatasetTest, AWindowMayHoldSoManyEvents) {
   label("0.5\n1.25\n2.5\n");
   spec_.window.events = 3;
-  auto dataset = open();
+  const auto dataset = open();
   EXPECT_THAT(events(*dataset, 0), ElementsAre(all_[0]));  // there are no more
   EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[1], all_[2], all_[3]));
   EXPECT_THAT(events(*dataset, 2), ElementsAre(all_[4], all_[5], all_[6]));
-  EXPECT_TRUE(std::isnan(window(*dataset, 1)[0]));
-  EXPECT_TRUE(std::isnan(window(*dataset, 1)[1]));
+  EXPECT_THAT(window(*dataset, 1), Each(::testing::IsNan()));
   spec_.window.label = LabelPlace::kMiddle;  // one up to the time, two behind it
-  dataset = open();
-  EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[3], all_[4], all_[5]));
+  EXPECT_THAT(events(*open(), 1), ElementsAre(all_[3], all_[4], all_[5]));
 }
 
 TEST_F(RecordingDatasetTest, WithoutLabelsTheFirstFrameEndsAWindowOfItsOwn) {
@@ -151,10 +123,8 @@ TEST_F(RecordingDatasetTest, OneFrameNeedsAWindow) {
   datasets["davis/left/image_raw_ts"] = {{1}, std::vector<double>{1.0}};
   datasets.erase("davis/left/image_raw_event_inds");
   datasets.erase("davis/left/flow_dist");
-  testing::write_hdf5(folder_ / "one.h5", datasets);
-  spec_.root = "one.h5";
-  EXPECT_THAT([&] { open(); },
-              ThrowsMessage<InputError>(HasSubstr("expected two frames or more, or window_s")));
+  testing::write_hdf5(at("drive.h5"), datasets);
+  refused("expected two frames or more, or window_s");
   spec_.window.duration_s = 1;
   EXPECT_THAT(events(*open(), 0), ElementsAre(all_[0], all_[1]));
 }
@@ -162,14 +132,10 @@ TEST_F(RecordingDatasetTest, OneFrameNeedsAWindow) {
 TEST_F(RecordingDatasetTest, TimesOutsideTheRecordingAreFaults) {
   label("0.25\n0.5\n2.5\n2.75,1,1,2,2,car,\n");
   const auto dataset = open();
-  const std::vector<LabelledFrame>& frames = dataset->labelled_frames();
-  ASSERT_EQ(frames.size(), 4u);
-  EXPECT_EQ(frames[0].fault,
-            "expected a time between 0.5 s and 2.5 s, which the recording lasts, got 0.25 s, in "
-            "drive.csv (0.250000 s) (drive/0000000000.250000)");
-  EXPECT_EQ(frames[1].fault, "");
-  EXPECT_EQ(frames[2].fault, "");
-  EXPECT_THAT(frames[3].fault, HasSubstr("got 2.75 s"));
+  EXPECT_THAT(faults_of(*dataset),
+              ElementsAre("expected a time between 0.5 s and 2.5 s, which the recording lasts, got "
+                          "0.25 s, in drive.csv (0.250000 s) (drive/0000000000.250000)",
+                          "", "", HasSubstr("got 2.75 s")));
   EXPECT_EQ(window(*dataset, 1), (std::array{0.0, 0.5}));  // as long as the first interval
   EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[0]));
 }
@@ -177,14 +143,10 @@ TEST_F(RecordingDatasetTest, TimesOutsideTheRecordingAreFaults) {
 TEST_F(RecordingDatasetTest, BoxesWithoutAnAreaAreTheFaultOfTheirSample) {
   label("1.25,1,1,2,2,car,\n1.5,0,0,1,1,car,\n1.5,1,0,1,2,car,dont_care\n1.75,2,3,1,4,car,\n");
   const auto dataset = open();
-  const auto fault = [&](std::size_t i) {
-    const auto read = dataset->annotation(dataset->labelled_frames().at(i).label_key);
-    return is_fault(read) ? read.fault().reason : "no fault";
-  };
-  EXPECT_EQ(fault(0), "no fault");
-  EXPECT_EQ(fault(1),
+  EXPECT_EQ(fault_of(*dataset, 0), "no fault");
+  EXPECT_EQ(fault_of(*dataset, 1),
             "expected boxes of a width and height above 0, got 0 x 2, in drive.csv (1.500000 s)");
-  EXPECT_THAT(fault(2), HasSubstr("got -1 x 1, in drive.csv (1.750000 s)"));
+  EXPECT_THAT(fault_of(*dataset, 2), HasSubstr("got -1 x 1, in drive.csv (1.750000 s)"));
 }
 
 /// The small recording with its frames so many seconds later.
@@ -202,7 +164,7 @@ TEST_F(RecordingDatasetTest, WarnsWhereWindowsLieElsewhereThanTheEvents) {
   EXPECT_THAT(open()->warnings(), IsEmpty());
   EXPECT_THAT(open()->notes(), IsEmpty());
   // Windows of the second and third frame: (1001, 1001.5] and (1001.5, 1002].
-  testing::write_hdf5(folder_ / "drive.h5", frames_later(1000));
+  testing::write_hdf5(at("drive.h5"), frames_later(1000));
   constexpr char kBoth[] =
       "expected windows within the times of the events, 0.5 s to 2.5 s, got 2 of 2 outside them, "
       "at 1001.5 s to 1002 s (are events, frames and labels on one clock?), in drive.h5";
@@ -211,20 +173,19 @@ TEST_F(RecordingDatasetTest, WarnsWhereWindowsLieElsewhereThanTheEvents) {
   spec_.window.events = 3;  // the last three events of all, whatever the label
   EXPECT_THAT(open()->warnings(), ElementsAre(HasSubstr("got 3 of 3 outside them, at 1001 s")));
   spec_.window.events.reset();
-  testing::write_hdf5(folder_ / "drive.h5", frames_later(-1000));
+  testing::write_hdf5(at("drive.h5"), frames_later(-1000));
   EXPECT_THAT(open()->warnings(), ElementsAre(HasSubstr("at -998.5 s to -998 s")));
-
   // (2.25, 2.75] has an event, (2.75, 3.25] is behind the last one: for a note, no more.
-  testing::write_hdf5(folder_ / "drive.h5", frames_later(1.25));
+  testing::write_hdf5(at("drive.h5"), frames_later(1.25));
   EXPECT_THAT(open()->warnings(), IsEmpty());
   EXPECT_THAT(open()->notes(), ElementsAre(AllOf(HasSubstr("got 1 of 2 outside them, at 3.25 s"),
-                                                 ::testing::Not(HasSubstr("clock")))));
+                                                 Not(HasSubstr("clock")))));
 }
 
 TEST_F(RecordingDatasetTest, WarnsOfARecordingWithoutEvents) {
   auto datasets = frames_later(0);
   datasets["davis/left/events"] = {{0, 4}, std::vector<double>{}};
-  testing::write_hdf5(folder_ / "drive.h5", datasets);
+  testing::write_hdf5(at("drive.h5"), datasets);
   EXPECT_THAT(open()->warnings(),
               ElementsAre("expected events, got none: 2 event volumes are empty, in drive.h5"));
 }
@@ -232,24 +193,23 @@ TEST_F(RecordingDatasetTest, WarnsOfARecordingWithoutEvents) {
 TEST_F(RecordingDatasetTest, CorruptEventsAreTheFaultOfTheirWindow) {
   auto datasets = testing::small_mvsec();
   std::get<std::vector<double>>(datasets["davis/left/events"].values)[4 * 4] = std::nan("");
-  testing::write_hdf5(folder_ / "bad.h5", datasets);
+  testing::write_hdf5(at("bad.h5"), datasets);
   spec_.root = "bad.h5";
   const auto dataset = open();
   EXPECT_THAT(events(*dataset, 0), ElementsAre(all_[2], all_[3]));
-  const auto outcome = dataset->events(dataset->labelled_frames()[1].label_key);
-  ASSERT_TRUE(is_fault(outcome));
-  EXPECT_THAT(outcome.fault().reason, AllOf(HasSubstr("got"), HasSubstr("event 4")));
+  EXPECT_THAT(fault_of(dataset->events(dataset->labelled_frames()[1].label_key)),
+              AllOf(HasSubstr("got"), HasSubstr("event 4")));
 }
 
 TEST_F(RecordingDatasetTest, AFolderHoldsRecordingsOfAnyLayout) {
-  testing::write_hdf5(folder_ / "all/b.hdf5", testing::small_mvsec());
-  testing::write_file(folder_ / "all/a/images.txt", "1.0 x.pgm\n2.0 x.pgm\n");
-  testing::write_file(folder_ / "all/a/x.pgm", "P5 2 1 255\nab");
-  testing::write_file(folder_ / "all/a/events.txt", "1.25 1 0 1\n1.5 0 0 0\n");
-  testing::write_file(folder_ / "all/b_gt.hdf5", "no recording");
+  drive("all/b.hdf5");
+  write("all/a/images.txt", "1.0 x.pgm\n2.0 x.pgm\n");
+  write("all/a/x.pgm", "P5 2 1 255\nab");
+  write("all/a/events.txt", "1.25 1 0 1\n1.5 0 0 0\n");
+  write("all/b_gt.hdf5", "no recording");
   spec_.root = "all";
   auto dataset = open();
-  EXPECT_THAT(ids(*dataset),
+  EXPECT_THAT(ids_of(*dataset),
               ElementsAre("a/0000000002.000000", "b/0000000001.500000", "b/0000000002.000000"));
   EXPECT_THAT(events(*dataset, 0), ElementsAre(Event{1, 0, 1.25, true}, Event{0, 0, 1.5, false}));
   EXPECT_EQ(dataset->sensor_size("a/2"), (ImageSize{1, 2}));
@@ -257,52 +217,46 @@ TEST_F(RecordingDatasetTest, AFolderHoldsRecordingsOfAnyLayout) {
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("all/a/images.txt"));
   EXPECT_THAT(dataset->notes(), ElementsAre("1 entry left out in all: b_gt.hdf5"));
   // With labels of one of them the others are left out.
-  testing::write_file(folder_ / "labels/b.csv", std::string(kLabelHeader) + "1.75,0,0,1,1,car,\n");
+  write("labels/b.csv", kLabelHeader + "1.75,0,0,1,1,car,\n"s);
   spec_.annotations = "labels";
   dataset = open();
-  EXPECT_THAT(ids(*dataset), ElementsAre("b/0000000001.750000"));
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("b/0000000001.750000"));
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("labels/b.csv"));
   EXPECT_THAT(dataset->notes(), Contains("1 recording without labels left out in all: a"));
 }
 
 TEST_F(RecordingDatasetTest, RefusesWhatDoesNotFit) {
   label("1.5\n");
-  testing::write_file(folder_ / "drive.json",
-                      R"({"format": "eventgan-labels", "version": 1, "samples": []})");
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("labels in one file, got two")));
+  write("drive.json", R"({"format": "eventgan-labels", "version": 1, "samples": []})");
+  refused("labels in one file, got two");
   spec_.annotations = "drive.json";
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("got none, in drive.h5")));
+  refused("got none, in drive.h5");
   spec_.annotations = "absent.csv";
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("absent.csv")));
+  refused("absent.csv");
   spec_.annotations.reset();
-  std::filesystem::remove(folder_ / "drive.json");
+  fs::remove(at("drive.json"));
   label("1.75\n1.750001\n");
-  EXPECT_THAT([&] { open(); },
-              ThrowsMessage<InputError>(HasSubstr("more than two microseconds apart")));
+  refused("more than two microseconds apart");
   label("1.75,a,2,3,4,car,\n");
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("drive.csv (line 2)")));
-  testing::write_file(folder_ / "drive.json", R"({"format": "eventgan-manifest"})");
+  refused("drive.csv (line 2)");
+  write("drive.json", R"({"format": "eventgan-manifest"})");
   label("1.75\n");
-  EXPECT_EQ(open()->labelled_frames().size(), 1u);  // a job beside it
-  spec_.recording.camera = "right";
-  EXPECT_THROW(open(), InputError);
-  spec_.root = "absent";
-  EXPECT_THROW(open(), InputError);
-  testing::write_hdf5(folder_ / "all/a.h5", testing::small_mvsec());
-  testing::write_hdf5(folder_ / "all/a.hdf5", testing::small_mvsec());
-  spec_.root = "all";
-  spec_.recording.camera = "left";
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("got a twice")));
-  const auto dataset = [&] {
-    spec_.root = "drive.h5";
-    label("1.75\n");
-    return open();
-  }();
-  EXPECT_THROW(dataset->sensor_size("drive/x"), InputError);
+  const auto dataset = open();  // a job beside it
+  EXPECT_EQ(dataset->labelled_frames().size(), 1u);
+  EXPECT_THROWS(dataset->sensor_size("drive/x"), InputError, "expected");
   EXPECT_TRUE(is_fault(dataset->events("other/1.75")));
   EXPECT_TRUE(is_fault(dataset->annotation("drive/1.5")));
   EXPECT_TRUE(is_fault(dataset->annotation("other/1.75")));
   EXPECT_EQ(dataset->label_place("other/1.75"), "other/1.75");
+  spec_.recording.camera = "right";
+  refused("expected a recording of an event camera, got HDF5 of another layout");
+  spec_.root = "absent";
+  refused("absent");
+  drive("all/a.h5");
+  drive("all/a.hdf5");
+  spec_.root = "all";
+  spec_.recording.camera = "left";
+  refused("got a twice");
 }
 
 /// The small recording's events alone, at 0.5, 1, 1.25, 1.25, 1.75, 2 and 2.5 s.
@@ -313,7 +267,7 @@ class WithoutFramesTest : public RecordingDatasetTest {
     for (const Event& event : all_) {
       table += fmt::format("{},{},{},{}\n", event.t_s, event.x, event.y, event.positive ? 1 : 0);
     }
-    testing::write_file(folder_ / "table.csv", table);
+    write("table.csv", table);
     spec_.root = "table.csv";
     spec_.recording.sensor = ImageSize{3, 4};
     spec_.recording.columns.tick_s = 1;
@@ -352,7 +306,7 @@ TEST_F(WithoutFramesTest, NoEventFallsBetweenTwoWindowsOfAClockOfTheDay) {
       table += fmt::format("{},1,1,1\n", kBegin_us + i * kLength_us + beside);
     }
   }
-  testing::write_file(folder_ / "table.csv", table);
+  write("table.csv", table);
   spec_.recording.columns.tick_s = 1e-6;
   for (const LabelPlace place : {LabelPlace::kEnd, LabelPlace::kMiddle}) {
     spec_.window = {.duration_s = 0.1, .events = std::nullopt, .label = place};
@@ -366,34 +320,28 @@ TEST_F(WithoutFramesTest, NoEventFallsBetweenTwoWindowsOfAClockOfTheDay) {
 }
 
 TEST_F(WithoutFramesTest, LabelsMakeWindowsOfTimeOrOfEvents) {
-  testing::write_file(folder_ / "labels.csv", std::string(kLabelHeader) + "1.25,0,0,2,1,car,\n3\n");
+  write("labels.csv", kLabelHeader + "1.25,0,0,2,1,car,\n3\n"s);
   spec_.annotations = "labels.csv";
   spec_.window.events = 2;
   EXPECT_THAT(events(*open(), 0), ElementsAre(all_[2], all_[3]));
-  EXPECT_THAT(open()->labelled_frames()[1].fault, HasSubstr("which the recording lasts, got 3 s"));
-  spec_.window.events.reset();
-  spec_.window.duration_s = 0.25;
+  EXPECT_THAT(faults_of(*open())[1], HasSubstr("which the recording lasts, got 3 s"));
+  spec_.window = {.duration_s = 0.25, .events = std::nullopt, .label = LabelPlace::kEnd};
   EXPECT_THAT(events(*open(), 0), ElementsAre(all_[2], all_[3]));
   spec_.window.duration_s.reset();
-  EXPECT_THAT([&] { open(); },
-              ThrowsMessage<InputError>(HasSubstr("expected window_s or window_events, since the "
-                                                  "recording has no frames, got neither")));
+  refused("expected window_s or window_events, since the recording has no frames, got neither");
 }
 
 TEST_F(WithoutFramesTest, NothingIsGuessed) {
-  EXPECT_THAT([&] { open(); },
-              ThrowsMessage<InputError>(
-                  HasSubstr("expected window_s, or labels, since the recording has no frames")));
+  refused("expected window_s, or labels, since the recording has no frames");
   spec_.window.events = 3;
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("got window_events alone")));
+  refused("got window_events alone");
   spec_.window.events.reset();
   spec_.window.duration_s = 1e-7;
-  EXPECT_THAT([&] { open(); },
-              ThrowsMessage<InputError>(HasSubstr("expected events of at most 10000000 windows")));
-  testing::write_file(folder_ / "table.csv", "t,x,y,p\n");
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("expected events or frames")));
+  refused("expected events of at most 10000000 windows");
+  write("table.csv", "t,x,y,p\n");
+  refused("expected events or frames");
   spec_.recording.sensor.reset();
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("\"sensor\": {")));
+  refused("\"sensor\": {");
 }
 
 TEST_F(WithoutFramesTest, AnEventAtAWindowsBeginIsNotInIt) {
@@ -406,8 +354,8 @@ TEST_F(WithoutFramesTest, AnEventAtAWindowsBeginIsNotInIt) {
     const std::int64_t label_us = kStart_us + 1000 * ms;
     labels += fmt::format("{}.{:06d},0,0,1,1,car,\n", label_us / 1'000'000, label_us % 1'000'000);
   }
-  testing::write_file(folder_ / "table.csv", table);
-  testing::write_file(folder_ / "labels.csv", labels);
+  write("table.csv", table);
+  write("labels.csv", labels);
   spec_.annotations = "labels.csv";
   spec_.recording.columns.tick_s = 1e-6;
   spec_.window.duration_s = 0.01;
@@ -434,7 +382,7 @@ TEST_F(RecordingDatasetTest, AnEventAtTheBeginOfAWindowBetweenFramesIsNotInIt) {
         "davis/left/events",
         testing::Hdf5Dataset{{3, 4},
                              std::vector<double>{0, 0, begin_s, 1, 0, 0, end_s, 1, 0, 0, 0.4, 1}});
-    testing::write_hdf5(folder_ / "drive.h5", mvsec);
+    testing::write_hdf5(at("drive.h5"), mvsec);
     label(std::string(label_s) + ",0,0,1,1,car,\n");
     spec_.window.label = place;
     const auto dataset = open();
@@ -444,29 +392,26 @@ TEST_F(RecordingDatasetTest, AnEventAtTheBeginOfAWindowBetweenFramesIsNotInIt) {
 }
 
 TEST_F(RecordingDatasetTest, ARecordingThatDoesNotOpenAnyMoreSaysWhy) {
-  testing::write_hdf5(folder_ / "all/a.h5", testing::small_mvsec());
-  testing::write_hdf5(folder_ / "all/b.h5", testing::small_mvsec());
+  drive("all/a.h5");
+  drive("all/b.h5");
   spec_.root = "all";
   const std::string key = open()->labelled_frames().at(2).label_key;
-  const std::string whole = read_text_file(folder_ / "all/b.h5");
-  testing::write_file(folder_ / "all/b.h5", whole.substr(0, whole.size() / 2));
-  const auto outcome = open()->events(key);
-  ASSERT_TRUE(is_fault(outcome));
-  EXPECT_THAT(outcome.fault().reason, AllOf(HasSubstr("b.h5"), HasSubstr("truncated")));
+  fs::resize_file(at("all/b.h5"), fs::file_size(at("all/b.h5")) / 2);
+  EXPECT_THAT(fault_of(open()->events(key)), AllOf(HasSubstr("b.h5"), HasSubstr("truncated")));
 }
 
 // HDF5 that is cut, RAW of a kind that is not read, AEDAT of another version.
 TEST_F(RecordingDatasetTest, TellsOfRecordingsThatCannotBeRead) {
-  testing::write_hdf5(folder_ / "all/a.h5", testing::small_mvsec());
-  const std::string whole = read_text_file(folder_ / "all/a.h5");
-  testing::write_file(folder_ / "all/b.h5", whole.substr(0, whole.size() / 2));
-  testing::write_file(folder_ / "all/c.raw", "% evt 4.0\n% end\n");
-  testing::write_file(folder_ / "all/d.aedat", "#!AER-DAT3.1\r\n");
-  testing::write_file(folder_ / "all/e.raw", "% evt 3.0\n% end\n");  // of no known size
-  testing::write_file(folder_ / "all/notes.txt", "no recording");
+  drive("all/a.h5");
+  drive("all/b.h5");
+  fs::resize_file(at("all/b.h5"), fs::file_size(at("all/b.h5")) / 2);
+  write("all/c.raw", "% evt 4.0\n% end\n");
+  write("all/d.aedat", "#!AER-DAT3.1\r\n");
+  write("all/e.raw", "% evt 3.0\n% end\n");  // of no known size
+  write("all/notes.txt", "no recording");
   spec_.root = "all";
   const auto dataset = open();
-  EXPECT_THAT(ids(*dataset), ElementsAre("a/0000000001.500000", "a/0000000002.000000"));
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("a/0000000001.500000", "a/0000000002.000000"));
   EXPECT_THAT(dataset->notes(), ElementsAre("1 entry left out in all: notes.txt"));
   const Dataset::Unreadable unreadable = dataset->unreadable();
   EXPECT_EQ(unreadable.of, 5);
@@ -480,20 +425,19 @@ TEST_F(RecordingDatasetTest, TellsOfRecordingsThatCannotBeRead) {
                                      {"all/e.raw", "the sensor's size"},
                                      {"all/notes.txt", "a file of another kind"}}) {
     spec_.root = root;
-    EXPECT_THAT([&] { open(); },
-                ThrowsMessage<InputError>(AllOf(HasSubstr(reason), HasSubstr(root))));
+    EXPECT_THROWS(open(), InputError, reason, root);
   }
 }
 
 TEST_F(RecordingDatasetTest, ATableBesideARecordingIsNoLabels) {
-  testing::write_file(folder_ / "drive.csv", "0,0,1,1250000\n");
+  write("drive.csv", "0,0,1,1250000\n");
   const auto dataset = open();
-  EXPECT_EQ(ids(*dataset).size(), 2u);
+  EXPECT_EQ(ids_of(*dataset).size(), 2u);
   EXPECT_THAT(dataset->notes(), ElementsAre(HasSubstr("drive.csv")));
-  testing::write_hdf5(folder_ / "all/drive.h5", testing::small_mvsec());
-  testing::write_file(folder_ / "all/drive.csv", "0,0,1,1250000\n");
+  drive("all/drive.h5");
+  write("all/drive.csv", "0,0,1,1250000\n");
   spec_.root = "all";
-  EXPECT_EQ(ids(*open()), ids(*dataset));
+  EXPECT_EQ(ids_of(*open()), ids_of(*dataset));
   EXPECT_THAT(open()->notes(), Contains(HasSubstr("left out, since the recording is there in "
                                                   "another file: all/drive.csv")));
 }
@@ -504,33 +448,33 @@ class WindowTextsTest : public RecordingDatasetTest {
   WindowTextsTest() {
     spec_.root = "windows";
     spec_.recording.sensor = ImageSize{100, 100};
-    for (const char* name : {"a", "b"}) {
-      testing::write_file(folder_ / "windows" / (name + std::string(".csv")),
-                          "t,x,y,p\n0.1,1,2,1\n0.2,3,4,0\n");
-    }
+    for (const char* name : {"a.csv", "b.csv"}) text(name, "t,x,y,p\n0.1,1,2,1\n0.2,3,4,0\n");
   }
 
-  void write(const std::string& name, const std::string& text) {
-    testing::write_file(folder_ / "windows" / name, text);
+  void text(const std::string& name, const std::string& content) const {
+    write("windows/" + name, content);
   }
-
+  /// Boxes of these classes.
+  void boxes(const std::string& name, const std::vector<int>& numbers) const {
+    std::string lines;
+    for (const int number : numbers) lines += std::to_string(number) + " 0.5 0.5 0.1 0.1\n";
+    text(name, lines);
+  }
   /// Of a window's boxes.
-  static std::vector<int> classes(const Dataset& dataset, std::size_t sample) {
-    const auto read = dataset.annotation(dataset.labelled_frames().at(sample).label_key);
-    EXPECT_FALSE(is_fault(read)) << read.fault().reason;
+  std::vector<int> classes(std::size_t sample) const {
     std::vector<int> numbers;
-    for (const Box& box : read->boxes) numbers.push_back(box.class_id);
+    for (const Box& box : annotation_of(*open(), sample).boxes) numbers.push_back(box.class_id);
     return numbers;
   }
+  Texts names() const { return open()->label_schema().class_names; }
 };
 
 TEST_F(WindowTextsTest, NumberTheirClassesAsYoloDoes) {
-  write("a.txt", "10 0.5 0.5 0.1 0.1\n2 0.5 0.5 0.1 0.1\n");
-  write("b.txt", "1 0.5 0.5 0.1 0.1\n");
-  EXPECT_THAT(classes(*open(), 0), ElementsAre(10, 2));
-  EXPECT_THAT(classes(*open(), 1), ElementsAre(1));
-  EXPECT_THAT(open()->label_schema().class_names,
-              ElementsAre("0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10"));
+  boxes("a.txt", {10, 2});
+  boxes("b.txt", {1});
+  EXPECT_THAT(classes(0), ElementsAre(10, 2));
+  EXPECT_THAT(classes(1), ElementsAre(1));
+  EXPECT_THAT(names(), ElementsAre("0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10"));
   EXPECT_THAT(open()->notes(),
               Contains("classes are named by their numbers, since no data.yaml or classes.txt "
                        "with names is in windows or the folder above it"));
@@ -539,53 +483,47 @@ TEST_F(WindowTextsTest, NumberTheirClassesAsYoloDoes) {
   EXPECT_THAT(open()->notes(), Contains(HasSubstr("with names is in windows")));
   spec_.root = "windows";
   spec_.annotations.reset();
-  write("a.txt", "0 0.5 0.5 0.1 0.1\n");
-  write("data.yaml", "names: [person, car]\n");
-  EXPECT_THAT(classes(*open(), 0), ElementsAre(0));
-  EXPECT_THAT(open()->label_schema().class_names, ElementsAre("person", "car"));
+  boxes("a.txt", {0});
+  text("data.yaml", "names: [person, car]\n");
+  EXPECT_THAT(classes(0), ElementsAre(0));
+  EXPECT_THAT(names(), ElementsAre("person", "car"));
   EXPECT_THAT(open()->notes(), Each(HasSubstr("times are taken to count seconds")));
 }
 
 TEST_F(WindowTextsTest, AreLabelsOnlyIfOneSaysSo) {
   spec_.window.duration_s = 1;
-  write("a.txt", "");  // a log that says nothing
+  text("a.txt", "");  // a log that says nothing
   EXPECT_EQ(open()->labelled_frames().size(), 2u);
-  EXPECT_THAT(open()->notes(),
-              Contains(AllOf(HasSubstr("no labels, since its first line is not YOLO's (class x y w "
-                                       "h): "),
-                             HasSubstr("a.txt"))));
-  std::filesystem::create_directory(folder_ / "windows/b.txt");
+  EXPECT_THAT(open()->notes(), Contains(AllOf(HasSubstr("no labels, since its first line is not "
+                                                        "YOLO's (class x y w h): "),
+                                              HasSubstr("a.txt"))));
+  fs::create_directory(at("windows/b.txt"));
   EXPECT_EQ(open()->labelled_frames().size(), 2u);
-  std::filesystem::remove(folder_ / "windows/b.txt");
-  write("b.txt", "0 0.5 0.5 0.1 0.1\n");
+  fs::remove(at("windows/b.txt"));
+  boxes("b.txt", {0});
   EXPECT_EQ(open()->labelled_frames().size(), 2u);
-  EXPECT_THAT(classes(*open(), 0), IsEmpty());
-  EXPECT_THAT(classes(*open(), 1), ElementsAre(0));
+  EXPECT_THAT(classes(0), IsEmpty());
+  EXPECT_THAT(classes(1), ElementsAre(0));
 }
 
 TEST_F(WindowTextsTest, AreOfTablesAlone) {
-  write("a.txt", "0 0.5 0.5 0.1 0.1\n");
+  boxes("a.txt", {0});
   spec_.root = "drive.h5";
   spec_.recording.sensor.reset();
   spec_.annotations = "windows/a.txt";
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<UsageError>(HasSubstr("only a table")));
+  EXPECT_THROWS(open(), UsageError, "only a table");
 }
 
 TEST_F(WindowTextsTest, AreNamedInTheFolderAboveThatOfAnyPath) {
-  write("a.txt", "1 0.5 0.5 0.1 0.1\n");
-  testing::write_file(folder_ / "data.yaml", "names: [person, car]\n");
+  boxes("a.txt", {1});
+  write("data.yaml", "names: [person, car]\n");
   for (const char* root : {"windows", "windows/.", "./windows/"}) {
     spec_.root = root;
-    EXPECT_THAT(open()->label_schema().class_names, ElementsAre("person", "car")) << root;
+    EXPECT_THAT(names(), ElementsAre("person", "car")) << root;
     EXPECT_THAT(open()->annotation_files(), Contains("data.yaml")) << root;
   }
-  const auto in_folder = open_recording_dataset(
-      [&] {
-        SourceSpec spec = spec_;
-        spec.root = ".";
-        return spec;
-      }(),
-      folder_ / "windows");
+  spec_.root = ".";
+  const auto in_folder = open_recording_dataset(spec_, at("windows"));
   EXPECT_THAT(in_folder->label_schema().class_names, ElementsAre("person", "car"));
   EXPECT_THAT(in_folder->annotation_files(), ElementsAre("../data.yaml", "a.txt"));
 }
@@ -601,8 +539,8 @@ TEST_F(RecordingDatasetTest, AFileOfEventsIsOpenedTwiceAndReadOnce) {
       dat.append(reinterpret_cast<const char*>(&word), sizeof(word));
     }
   }
-  testing::write_file(folder_ / "table.csv", table);
-  testing::write_file(folder_ / "camera.dat", dat);
+  write("table.csv", table);
+  write("camera.dat", dat);
   spec_.recording.sensor = ImageSize{3, 4};
   spec_.window.duration_s = 500e-6;
   for (const char* name : {"table.csv", "camera.dat"}) {
@@ -622,10 +560,9 @@ TEST_F(RecordingDatasetTest, AFileOfEventsIsOpenedTwiceAndReadOnce) {
     }
     for (std::thread& thread : threads) thread.join();
     EXPECT_EQ(found, kEvents);
-    const InputCounter::Count count = counter.of(folder_ / name);
+    const InputCounter::Count count = counter.of(at(name));
     EXPECT_EQ(count.opens, 2u) << name;  // to recognise it, and to read it
-    EXPECT_LE(static_cast<double>(count.bytes),
-              1.2 * static_cast<double>(std::filesystem::file_size(folder_ / name)))
+    EXPECT_LE(static_cast<double>(count.bytes), 1.2 * static_cast<double>(fs::file_size(at(name))))
         << name;
   }
 }

@@ -1,43 +1,23 @@
 #include "stages/frames/events/recording_labels.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <string>
-#include <utility>
-
 #include "manifests/files/input_file.h"
-#include "manifests/values/faults.h"
+#include "tests/stages/frames/frames_fixture.h"
 #include "tests/testing/npy_bytes.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::ThrowsMessage;
-
-class RecordingLabelsTest : public ::testing::Test {
+class RecordingLabelsTest : public FolderTest {
  protected:
-  RecordingLabels read(const std::string& name, const std::string& text) {
-    testing::write_file(folder_ / name, text);
-    return read_recording_labels(folder_ / name);
+  RecordingLabels read(const std::string& name, const std::string& text) const {
+    write(name, text);
+    return read_recording_labels(at(name));
   }
-
-  void refuses(const std::string& name, const std::string& text,
-               const std::vector<std::string>& parts) {
+  void refuses(const std::string& name, const std::string& text, const Texts& parts) const {
     for (const std::string& part : parts) {
-      EXPECT_THAT([&] { read(name, text); }, ThrowsMessage<InputError>(HasSubstr(part))) << text;
+      EXPECT_THROWS(read(name, text), InputError, part) << text;
     }
   }
-
-  testing::TemporaryFolder folder_;
 };
 
 constexpr char kHeader[] = "time_s,left,top,right,bottom,class,category\n";
@@ -49,16 +29,15 @@ TEST_F(RecordingLabelsTest, CsvHasALineABoxAndTimesWithout) {
                         "\n3\n4,,,,,,\n2.5,0,0,1,1,car,dont_care");
   EXPECT_THAT(labels.class_names, ElementsAre("car", "bus"));
   ASSERT_EQ(labels.annotations.size(), 4u);
-  const Annotation& first = labels.annotations.at(1.5);
-  ASSERT_EQ(first.boxes.size(), 2u);
-  EXPECT_EQ(first.boxes[0], (Box{.class_id = 0, .xyxy = {1, 2, 30.25, 40}, .difficulty = 0}));
-  EXPECT_EQ(first.boxes[1], (Box{.class_id = 0, .xyxy = {9, 9, 11, 12}}));
-  EXPECT_EQ(first.original, "1.5,1,2,30.25,40,car,easy\n 1.5 , 9,9,11,12,car,\n");
-  const Annotation& second = labels.annotations.at(2.5);
-  EXPECT_EQ(second.boxes[0], (Box{.class_id = 1, .xyxy = {5, 6, 7, 8}, .difficulty = 2}));
-  EXPECT_EQ(second.boxes[1], (Box{.class_id = 0, .xyxy = {0, 0, 1, 1}, .ignore = true}));
-  EXPECT_THAT(labels.annotations.at(3).boxes, IsEmpty());
-  EXPECT_EQ(labels.annotations.at(3).original, "3\n");
+  EXPECT_THAT(labels.annotations.at(1.5).boxes,
+              ElementsAre(Box{.class_id = 0, .xyxy = {1, 2, 30.25, 40}, .difficulty = 0},
+                          Box{.class_id = 0, .xyxy = {9, 9, 11, 12}}));
+  EXPECT_EQ(labels.annotations.at(1.5).original,
+            "1.5,1,2,30.25,40,car,easy\n 1.5 , 9,9,11,12,car,\n");
+  EXPECT_THAT(labels.annotations.at(2.5).boxes,
+              ElementsAre(Box{.class_id = 1, .xyxy = {5, 6, 7, 8}, .difficulty = 2},
+                          Box{.class_id = 0, .xyxy = {0, 0, 1, 1}, .ignore = true}));
+  EXPECT_EQ(labels.annotations.at(3), (Annotation{"3\n", {}, {}}));
   EXPECT_THAT(labels.annotations.at(4).boxes, IsEmpty());
 }
 
@@ -66,29 +45,25 @@ TEST_F(RecordingLabelsTest, OfATableItsFirstLineTellsWhetherItHasLabels) {
   for (const auto& [header, is] : {std::pair("time_s,left", true), {"t,x,y,p", false}}) {
     std::string text = std::string(header) + "\n";
     for (int i = 0; i < 100'000; ++i) text += "0,0,1,1250000\n";
-    testing::write_file(folder_ / "table.csv", text);
+    write("table.csv", text);
     const InputCounter counter;
-    EXPECT_EQ(is_label_table(folder_ / "table.csv"), is);
-    EXPECT_LE(counter.of(folder_ / "table.csv").bytes, 1u << 14);
+    EXPECT_EQ(is_label_table(at("table.csv")), is);
+    EXPECT_LE(counter.of(at("table.csv")).bytes, 1u << 14);
   }
 }
 
-TEST_F(RecordingLabelsTest, CsvMayHaveItsColumnsInAnyOrderAndNoCategory) {
-  const RecordingLabels labels = read("a.csv",
-                                      "\xEF\xBB\xBF"
-                                      "class, bottom,right,top,left,time_s\ncar,4,3,2,1,0.25\n");
+TEST_F(RecordingLabelsTest, CsvMayHaveItsColumnsInAnyOrderAndNoCategoryAndCommasInQuotes) {
+  RecordingLabels labels = read("a.csv",
+                                "\xEF\xBB\xBF"
+                                "class, bottom,right,top,left,time_s\ncar,4,3,2,1,0.25\n");
   EXPECT_EQ(labels.annotations.at(0.25).boxes.at(0), (Box{.class_id = 0, .xyxy = {1, 2, 3, 4}}));
-}
-
-TEST_F(RecordingLabelsTest, CsvMayHaveCommasInQuotes) {
-  const RecordingLabels labels =
-      read("a.csv", std::string(kHeader) + "1,1,2,3,4,\"a, \"\"b\"\"\",easy\r\n");
+  labels = read("a.csv", kHeader + "1,1,2,3,4,\"a, \"\"b\"\"\",easy\r\n"s);
   EXPECT_THAT(labels.class_names, ElementsAre("a, \"b\""));
   EXPECT_EQ(labels.annotations.at(1).original, "1,1,2,3,4,\"a, \"\"b\"\"\",easy\n");
 }
 
 TEST_F(RecordingLabelsTest, CsvNamesEveryLineThatIsWrong) {
-  const std::string place = (folder_ / "a.csv").string();
+  const std::string place = at("a.csv").string();
   refuses("a.csv",
           std::string(kHeader) +
               "x,1,2,3,4,car,\n1,1,2,nan,4,car,\n1,1,2,3,4,,\n"
@@ -124,14 +99,13 @@ TEST_F(RecordingLabelsTest, JsonHasBoxesAndPersons) {
   EXPECT_THAT(labels.annotations.at(1.5).boxes,
               ElementsAre(Box{.class_id = 0, .xyxy = {1, 2, 3, 4.5}, .difficulty = 2},
                           Box{.class_id = 1, .xyxy = {1, 2, 3, 4}, .track_id = 7}));
-  const std::vector<Person>& persons = labels.annotations.at(0.5).persons;
-  ASSERT_EQ(persons.size(), 2u);
-  EXPECT_THAT(persons[0].joints, ElementsAre(Joint{{10, 20}, 1}, Joint{kMissingPoint, 0}));
-  EXPECT_EQ(persons[0].center, (Point{5, 6}));
-  EXPECT_EQ(persons[0].scale, 0.5);
-  EXPECT_EQ(persons[0].head_box, (Rectangle{1, 2, 3, 4}));
-  EXPECT_THAT(persons[1].joints, ElementsAre(Joint{{10, 20}, -1}, Joint{{30.5, 40}, 0}));
-  EXPECT_EQ(persons[1].center, kMissingPoint);
+  Person first, second;
+  first.joints = {{{10, 20}, 1}, {kMissingPoint, 0}};
+  first.center = {5, 6};
+  first.scale = 0.5;
+  first.head_box = {1, 2, 3, 4};
+  second.joints = {{{10, 20}, -1}, {{30.5, 40}, 0}};
+  EXPECT_THAT(labels.annotations.at(0.5).persons, ElementsAre(first, second));
   EXPECT_EQ(labels.annotations.at(2).original, R"({"time_s":2})");
 }
 
@@ -155,8 +129,7 @@ TEST_F(RecordingLabelsTest, JsonTellsEveryFaultAndTheNearestKey) {
 
 // A shard keeps names as texts that end at a NUL: "ca\0r" and "ca\0t" would be one class there.
 TEST_F(RecordingLabelsTest, NamesHaveNoControlCharacters) {
-  using namespace std::string_literals;
-  const std::string place = (folder_ / "a.csv").string();
+  const std::string place = at("a.csv").string();
   refuses(
       "a.csv", kHeader + "1,1,2,3,4,ca\0r,\n1,1,2,3,4,car,\n1,1,2,3,4,\x1b[31mred,\n"s,
       {"expected a class without control characters, got \"ca\\u0000r\", in " + place + " (line 2)",
@@ -182,7 +155,7 @@ TEST_F(RecordingLabelsTest, AJointStandsOnce) {
 }
 
 TEST_F(RecordingLabelsTest, BothFormsTakePlacesWithinAMillionPixels) {
-  const std::string place = (folder_ / "a.csv").string();
+  const std::string place = at("a.csv").string();
   EXPECT_EQ(read("a.csv", kHeader + std::string("1,-1e6,0,1e6,9,car,\n")).annotations.size(), 1u);
   refuses("a.csv", kHeader + std::string("1,-1e300,0,1e300,9,car,\n1,0,0,1000001,9,car,\n"),
           {"expected left within 1e+06 pixels, got \"-1e300\", in " + place + " (line 2)",
@@ -231,20 +204,18 @@ TEST_F(RecordingLabelsTest, NpyHasPropheseesBoxes) {
   RecordingLabels labels = read("a_bbox.npy", text);
   EXPECT_THAT(labels.class_names, ElementsAre("class 1", "class 0"));
   ASSERT_EQ(labels.annotations.size(), 2u);
-  const Annotation& late = labels.annotations.at(2.5);
-  ASSERT_EQ(late.boxes.size(), 2u);
-  EXPECT_EQ(late.boxes[0], (Box{.class_id = 0, .xyxy = {1, 2, 4, 6}, .track_id = 9}));
-  EXPECT_EQ(late.boxes[1], (Box{.class_id = 1, .xyxy = {5, 6, 5, 7}, .track_id = 8}));
+  EXPECT_THAT(labels.annotations.at(2.5).boxes,
+              ElementsAre(Box{.class_id = 0, .xyxy = {1, 2, 4, 6}, .track_id = 9},
+                          Box{.class_id = 1, .xyxy = {5, 6, 5, 7}, .track_id = 8}));
   EXPECT_EQ(labels.annotations.at(1.5).original,
             R"({"t":1500000,"x":0.5,"y":0.0,"w":1.0,"h":1.0,"class_id":0,"track_id":8})"
             "\n");
-  testing::write_file(folder_ / "label_map_dictionary.json", R"({"0": "car", "1": "two wheeler"})");
-  labels = read("a_bbox.npy", text);
-  EXPECT_THAT(labels.class_names, ElementsAre("two wheeler", "car"));
+  write("label_map_dictionary.json", R"({"0": "car", "1": "two wheeler"})");
+  EXPECT_THAT(read("a_bbox.npy", text).class_names, ElementsAre("two wheeler", "car"));
   EXPECT_THAT(read("b_bbox.npy", boxes({})).annotations, IsEmpty());
-  EXPECT_THAT(recording_label_companions(folder_ / "a_bbox.npy"),
-              ElementsAre(folder_ / "label_map_dictionary.json"));
-  EXPECT_THAT(recording_label_companions(folder_ / "a.csv"), IsEmpty());
+  EXPECT_THAT(recording_label_companions(at("a_bbox.npy")),
+              ElementsAre(at("label_map_dictionary.json")));
+  EXPECT_THAT(recording_label_companions(at("a.csv")), IsEmpty());
 }
 
 TEST_F(RecordingLabelsTest, NpyIsStrict) {
@@ -261,65 +232,61 @@ TEST_F(RecordingLabelsTest, NpyIsStrict) {
                             "'shape': (0,), }",
                             ""),
           {"expected a field \"y\" of boxes, got none"});
-  testing::write_file(folder_ / "label_map_dictionary.json", R"({"0": "car"})");
+  write("label_map_dictionary.json", R"({"0": "car"})");
   refuses("f.npy", boxes({{1, 1, 2, 3, 4, 1, 9}}),
           {"expected a class of label_map_dictionary.json, got class_id 1"});
-  testing::write_file(folder_ / "label_map_dictionary.json", R"({"car": 0})");
+  write("label_map_dictionary.json", R"({"car": 0})");
   refuses("g.npy", boxes({}), {"expected {\"0\": \"car\", ...}, got \"car\""});
-  testing::write_file(folder_ / "label_map_dictionary.json", R"({"0": "car", "1": "car"})");
+  write("label_map_dictionary.json", R"({"0": "car", "1": "car"})");
   refuses("h.npy", boxes({}), {R"(got "1": "car" beside another)"});
-  testing::write_file(folder_ / "label_map_dictionary.json", R"({"0": "car", "00": "van"})");
+  write("label_map_dictionary.json", R"({"0": "car", "00": "van"})");
   refuses("i.npy", boxes({}), {R"(got "00": "van" beside another)"});
 }
 
-class WindowLabelsTest : public ::testing::Test {
+class WindowLabelsTest : public FolderTest {
  protected:
-  RecordingLabels read(const std::string& text) {
-    testing::write_file(file_, text);
+  RecordingLabels read(const std::string& text) const {
+    write_file(file_, text);
     return WindowLabels().read(file_, ImageSize{100, 200}, 1.5);
   }
 
-  testing::TemporaryFolder folder_;
-  std::filesystem::path file_ = folder_ / "yolo/train/a.txt";
+  fs::path file_ = at("yolo/train/a.txt");
 };
 
 TEST_F(WindowLabelsTest, AreSharesOfTheSensorAtTheWindowsTime) {
-  const RecordingLabels labels = read("1 0.5 0.5 0.1 0.2\n0 0.25 0.5 0.5 1\n");
+  const std::string text = "1 0.5 0.5 0.1 0.2\n0 0.25 0.5 0.5 1\n";
+  const RecordingLabels labels = read(text);
   EXPECT_THAT(labels.class_names, ElementsAre("0", "1"));
-  ASSERT_EQ(labels.annotations.size(), 1u);
-  const Annotation& window = labels.annotations.at(1.5);
-  ASSERT_EQ(window.boxes.size(), 2u);
-  EXPECT_EQ(window.boxes[0], (Box{.class_id = 1, .xyxy = {90, 40, 110, 60}}));
-  EXPECT_EQ(window.boxes[1], (Box{.class_id = 0, .xyxy = {0, 0, 100, 100}}));
-  EXPECT_EQ(window.original, "1 0.5 0.5 0.1 0.2\n0 0.25 0.5 0.5 1\n");
+  EXPECT_THAT(labels.annotations,
+              ElementsAre(Pair(1.5, Annotation{text,
+                                               {Box{.class_id = 1, .xyxy = {90, 40, 110, 60}},
+                                                Box{.class_id = 0, .xyxy = {0, 0, 100, 100}}},
+                                               {}})));
   EXPECT_THAT(read("").annotations.at(1.5).boxes, IsEmpty());
 }
 
 TEST_F(WindowLabelsTest, ClassesAreNamedBesideOrAboveThem) {
   EXPECT_THAT(WindowLabels().companions(file_), IsEmpty());
-  testing::write_file(folder_ / "yolo/classes.txt", "person\n");
+  write("yolo/classes.txt", "person\n");
   EXPECT_THAT(read("0 0.5 0.5 0.1 0.2").class_names, ElementsAre("person"));
-  testing::write_file(folder_ / "yolo/train/data.yaml", "names: [man, dog]\n");
+  write("yolo/train/data.yaml", "names: [man, dog]\n");
   EXPECT_THAT(read("0 0.5 0.5 0.1 0.2").class_names, ElementsAre("man", "dog"));
-  EXPECT_THAT(WindowLabels().companions(file_), ElementsAre(folder_ / "yolo/train/data.yaml"));
+  EXPECT_THAT(WindowLabels().companions(file_), ElementsAre(at("yolo/train/data.yaml")));
 }
 
 TEST_F(WindowLabelsTest, MistakesAreNamedByTheirLine) {
-  EXPECT_THAT([&] { read("0 0.5 0.5 0.1 0.2\n0 0.5 nan 0.1 0.2\n"); },
-              ThrowsMessage<InputError>(HasSubstr("a.txt:2")));
-  EXPECT_THAT([&] { read("0 0.5 0.5 0.1\n"); },
-              ThrowsMessage<InputError>(HasSubstr("expected 5 columns, got 4")));
+  EXPECT_THROWS(read("0 0.5 0.5 0.1 0.2\n0 0.5 nan 0.1 0.2\n"), InputError, "a.txt:2");
+  EXPECT_THROWS(read("0 0.5 0.5 0.1\n"), InputError, "expected 5 columns, got 4");
 }
 
 TEST_F(WindowLabelsTest, OtherTextsAreNone) {
-  const auto is_text = [&](const char* text) {
-    testing::write_file(file_, text);
-    return is_window_label_text(file_);
-  };
-  EXPECT_EQ(is_text(""), std::nullopt);
-  EXPECT_EQ(is_text("0 0.5 0.5 0.1 0.2\n"), true);
-  EXPECT_EQ(is_text("recorded on a Monday\n"), false);
-  EXPECT_EQ(is_text("0.003811 96 133 0\n"), false);
+  for (const auto& [text, is] : {std::pair("", std::optional<bool>()),
+                                 {"0 0.5 0.5 0.1 0.2\n", true},
+                                 {"recorded on a Monday\n", false},
+                                 {"0.003811 96 133 0\n", false}}) {
+    write_file(file_, text);
+    EXPECT_EQ(is_window_label_text(file_), is) << text;
+  }
 }
 
 }  // namespace

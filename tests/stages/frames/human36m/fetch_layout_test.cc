@@ -1,26 +1,14 @@
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-#include <array>
-#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "manifests/values/faults.h"
 #include "stages/frames/human36m/human36m_dataset.h"
+#include "tests/stages/frames/frames_fixture.h"
 #include "tests/stages/frames/human36m/human36m_fixture.h"
-#include "tests/testing/shared_data.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
-using State = PairedFrame::State;
 using Datasets = std::map<std::string, testing::Hdf5Dataset>;
 
 SourceSpec fetch_spec(const std::string& root) {
@@ -31,24 +19,28 @@ SourceSpec fetch_spec(const std::string& root) {
   return spec;
 }
 
-class FetchLayoutTest : public ::testing::Test {
+const std::string kWalking = "h36m/S1/Walking-1/", kSeventh = kWalking + "imageSequence/7/img_0000",
+                  kKey = "S1/Walking-1/annot.h5#";
+
+class FetchLayoutTest : public FolderTest {
  protected:
   void add_images(const std::string& camera, const std::vector<int>& numbers,
-                  const std::string& action = "S1/Walking-1") {
+                  const std::string& action = "S1/Walking-1") const {
     for (const int number : numbers) {
       char name[32];
       std::snprintf(name, sizeof(name), "img_%06d.jpg", number);
-      testing::write_file(folder_ / "h36m" / action / "imageSequence" / camera / name, "");
+      write("h36m/" + action + "/imageSequence/" + camera + "/" + name);
     }
   }
-  void add_annotations(const Datasets& datasets, const std::string& action = "S1/Walking-1") {
-    testing::write_hdf5(folder_ / "h36m" / action / "annot.h5", datasets);
+  void add_annotations(const Datasets& datasets, const std::string& action = "S1/Walking-1") const {
+    testing::write_hdf5(at("h36m/" + action + "/annot.h5"), datasets);
   }
-  std::unique_ptr<Dataset> open() {
+  std::unique_ptr<Dataset> open() const {
     return open_human36m_dataset(fetch_spec("h36m"), folder_.path());
   }
-
-  testing::TemporaryFolder folder_;
+  nlohmann::json original(int row = 0) const {
+    return nlohmann::json::parse(annotation_of(*open(), kKey + std::to_string(row)).original);
+  }
 };
 
 TEST_F(FetchLayoutTest, GivesEveryRowAsASample) {
@@ -57,19 +49,15 @@ TEST_F(FetchLayoutTest, GivesEveryRowAsASample) {
   add_annotations(fetch_annotations({{8, 6}, {7, 11}, {7, 1}}));
   const auto dataset = open();
   const auto& frames = dataset->labelled_frames();
-  ASSERT_EQ(frames.size(), 3u);
-  EXPECT_EQ(frames[0].sample_id, "S1/Walking-1/7/000001");
-  EXPECT_EQ(frames[0].sequence, "S1/Walking-1/7");
-  EXPECT_EQ(frames[0].label_key, "S1/Walking-1/annot.h5#2");
-  EXPECT_EQ(dataset->label_place(frames[0].label_key), "h36m/S1/Walking-1/annot.h5#2");
-  EXPECT_EQ(frames[0].frame.path, "h36m/S1/Walking-1/imageSequence/7/img_000001.jpg");
-  EXPECT_EQ(frames[0].frame.index, 1);
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("S1/Walking-1/7/000001", "S1/Walking-1/7/000011",
+                                            "S1/Walking-1/8/000006"));
+  EXPECT_EQ(text_of(frames[0]), "S1/Walking-1/7/000001 of S1/Walking-1/7: " + kSeventh +
+                                    "01.jpg 1 by S1/Walking-1/annot.h5#2");
+  EXPECT_EQ(dataset->label_place(frames[0].label_key), kWalking + "annot.h5#2");
   EXPECT_EQ(frames[0].frame.video_frame, -1);
   EXPECT_EQ(frames[0].frame.time_s, 0);
-  EXPECT_EQ(frames[1].sample_id, "S1/Walking-1/7/000011");
   EXPECT_EQ(frames[1].frame.time_s, 0.2);  // ten frames of a fiftieth of a second
-  EXPECT_EQ(frames[2].sample_id, "S1/Walking-1/8/000006");
-  EXPECT_THAT(dataset->annotation_files(), ElementsAre("h36m/S1/Walking-1/annot.h5"));
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre(kWalking + "annot.h5"));
   EXPECT_THAT(dataset->label_schema().joint_names, ElementsAre("joint_0", "joint_1"));
   EXPECT_TRUE(dataset->label_schema().class_names.empty());
 }
@@ -77,10 +65,7 @@ TEST_F(FetchLayoutTest, GivesEveryRowAsASample) {
 TEST_F(FetchLayoutTest, ReadsThePersonOfARow) {
   add_images("7", {1, 6});
   add_annotations(fetch_annotations({{7, 1}, {7, 6}}));
-  const auto dataset = open();
-  const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#1");
-  ASSERT_FALSE(is_fault(outcome)) << outcome.fault().reason;
-  const Annotation& annotation = *outcome;
+  const Annotation annotation = annotation_of(*open(), kKey + "1");
   EXPECT_TRUE(annotation.boxes.empty());
   ASSERT_EQ(annotation.persons.size(), 1u);
   const Person& person = annotation.persons[0];
@@ -108,42 +93,33 @@ Datasets present_annotations() {
   return datasets;
 }
 
-Person only_person(const Dataset& dataset) {
-  const auto outcome = dataset.annotation("S1/Walking-1/annot.h5#0");
-  EXPECT_FALSE(is_fault(outcome));
-  return outcome->persons.at(0);
-}
-
 TEST_F(FetchLayoutTest, TakesJointsInSpaceAndTheCameraThatWasFittedToThem) {
-  const auto z_and_focal = [&](const Datasets& datasets) {
+  const struct {
+    Texts without;
+    double z, focal;
+    const char* what;
+  } cases[] = {{{}, 5000, 1250, "pose/3d with intrinsics"},
+               {{"pose/3d"}, 5500, 1251, "3d-univ with intrinsics-univ"},
+               {{"intrinsics/7"}, 5500, 1251, "the other has no camera"},
+               // As h36m-fetch wrote it at first.
+               {{"pose/3d", "intrinsics-univ/7"}, 5500, 1250, "3d-univ with intrinsics"}};
+  for (const auto& [without, z, focal, what] : cases) {
+    SCOPED_TRACE(what);
+    Datasets datasets = present_annotations();
+    for (const std::string& name : without) datasets.erase(name);
     add_annotations(datasets);
     const auto dataset = open();
-    EXPECT_THAT(dataset->notes(), ::testing::IsEmpty());
-    const Person person = only_person(*dataset);
-    return std::pair(person.joints3d_mm.at(0)->at(2), person.camera.value().focal_x);
-  };
-  const Datasets present = present_annotations();
-  EXPECT_EQ(z_and_focal(present), std::pair(5000.0, 1250.0)) << "pose/3d with intrinsics";
-
-  Datasets universal = present;
-  universal.erase("pose/3d");
-  EXPECT_EQ(z_and_focal(universal), std::pair(5500.0, 1251.0)) << "3d-univ with intrinsics-univ";
-  universal["pose/3d"] = present.at("pose/3d");
-  universal.erase("intrinsics/7");
-  EXPECT_EQ(z_and_focal(universal), std::pair(5500.0, 1251.0)) << "the other has no camera";
-
-  Datasets old = present;  // as h36m-fetch wrote it at first
-  old.erase("pose/3d");
-  old.erase("intrinsics-univ/7");
-  EXPECT_EQ(z_and_focal(old), std::pair(5500.0, 1250.0)) << "3d-univ with intrinsics";
+    EXPECT_THAT(dataset->notes(), IsEmpty());
+    const Person person = annotation_of(*dataset).persons.at(0);
+    EXPECT_EQ(person.joints3d_mm.at(0)->at(2), z);
+    EXPECT_EQ(person.camera.value().focal_x, focal);
+  }
 }
 
 TEST_F(FetchLayoutTest, OriginalHoldsBothCameras) {
   add_annotations(present_annotations());
-  const auto outcome = open()->annotation("S1/Walking-1/annot.h5#0");
-  const auto original = nlohmann::json::parse(outcome->original);
-  EXPECT_EQ(original["intrinsics/7"][0], 1250);
-  EXPECT_EQ(original["intrinsics-univ/7"][0], 1251);
+  EXPECT_EQ(original()["intrinsics/7"][0], 1250);
+  EXPECT_EQ(original()["intrinsics-univ/7"][0], 1251);
 }
 
 TEST_F(FetchLayoutTest, ACameraThatDoesNotProjectTheJointsIsNotClaimed) {
@@ -160,16 +136,12 @@ TEST_F(FetchLayoutTest, ACameraThatDoesNotProjectTheJointsIsNotClaimed) {
       ElementsAre("no camera for 1 of 3 rows: by intrinsics/CAMERA and pose/3d-univ a joint "
                   "lies up to 25 px from where it is annotated (expected at most 20), in "
                   "h36m/S1/Walking-1/annot.h5"));
-  const auto person = [&](int row) {
-    const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#" + std::to_string(row));
-    return outcome->persons.at(0);
-  };
-  EXPECT_TRUE(person(0).camera);
-  EXPECT_FALSE(person(1).camera);
-  EXPECT_EQ(person(1).joints[1].at, (Point{110.25, 111.25}));
-  EXPECT_EQ(person(1).joints3d_mm.size(), 2u);
-  EXPECT_TRUE(person(2).camera);
-
+  const Person second = annotation_of(*dataset, 1).persons.at(0);
+  EXPECT_TRUE(annotation_of(*dataset, 0).persons.at(0).camera);
+  EXPECT_FALSE(second.camera);
+  EXPECT_EQ(second.joints[1].at, (Point{110.25, 111.25}));
+  EXPECT_EQ(second.joints3d_mm.size(), 2u);
+  EXPECT_TRUE(annotation_of(*dataset, 2).persons.at(0).camera);
   // Behind the camera, where the same pixel comes out.
   for (int i = 12; i < 15; ++i) joints3d[static_cast<std::size_t>(i)] *= -1;
   add_annotations(datasets);
@@ -182,53 +154,40 @@ TEST_F(FetchLayoutTest, OriginalHoldsEveryFieldOfTheRow) {
   datasets["pose/other"] = {{2, 1}, std::vector<double>{0.1, 1.0 / 3}};
   datasets["float"] = {{2}, std::vector<float>{0.5f, 0.1f}};
   datasets["odd"] = {{2}, std::vector<double>{1, std::numeric_limits<double>::quiet_NaN()}};
-  datasets["action"] = {{2}, std::vector<std::string>{"walk", "stand"}};
+  datasets["action"] = {{2}, Texts{"walk", "stand"}};
   datasets["intrinsics/8"] = {{4}, std::vector<double>(4)};
   datasets["whole_file"] = {{3}, std::vector<double>(3)};
   add_annotations(datasets);
-  const auto outcome = open()->annotation("S1/Walking-1/annot.h5#1");
-  const auto original = nlohmann::json::parse(outcome->original);
-  std::vector<std::string> names;
-  for (const auto& field : original.items()) names.push_back(field.key());
+  const auto row = original(1);
+  Texts names;
+  for (const auto& field : row.items()) names.push_back(field.key());
   EXPECT_THAT(names, ElementsAre("action", "camera", "float", "frame", "intrinsics/7", "odd",
                                  "pose/2d", "pose/3d-univ", "pose/other"));
-  EXPECT_EQ(original["action"], "stand");
-  EXPECT_EQ(original["frame"], 6);
-  EXPECT_EQ(original["pose/other"][0].get<double>(), 1.0 / 3) << "to the last bit";
-  EXPECT_EQ(original["float"].get<float>(), 0.1f);
-  EXPECT_TRUE(original["odd"].is_null());
-  EXPECT_EQ(original["pose/2d"], nlohmann::json::parse("[[100.25, 101.25], [110.25, 111.25]]"));
-  EXPECT_EQ(original["intrinsics/7"][1], 512.5);
+  EXPECT_EQ(row["action"], "stand");
+  EXPECT_EQ(row["frame"], 6);
+  EXPECT_EQ(row["pose/other"][0].get<double>(), 1.0 / 3) << "to the last bit";
+  EXPECT_EQ(row["float"].get<float>(), 0.1f);
+  EXPECT_TRUE(row["odd"].is_null());
+  EXPECT_EQ(row["pose/2d"], nlohmann::json::parse("[[100.25, 101.25], [110.25, 111.25]]"));
+  EXPECT_EQ(row["intrinsics/7"][1], 512.5);
 }
 
 TEST_F(FetchLayoutTest, RowsAsManyAsIntrinsicsAreNotMixedUp) {
   add_images("7", {1, 6, 11, 16});
   add_annotations(fetch_annotations({{7, 1}, {7, 6}, {7, 11}, {7, 16}}));
-  const auto outcome = open()->annotation("S1/Walking-1/annot.h5#0");
-  const auto original = nlohmann::json::parse(outcome->original);
-  EXPECT_EQ(original["intrinsics/7"].size(), 4u);
+  EXPECT_EQ(original()["intrinsics/7"].size(), 4u);
 }
 
 TEST_F(FetchLayoutTest, PairedFramesCountFramesThatAreStoredOrLabelled) {
   add_images("7", {1, 6, 16, 21});  // 11 and 26 are labelled, but lost
   add_annotations(fetch_annotations({{7, 6}, {7, 11}, {7, 26}}));
   const auto dataset = open();
-  const auto& frames = dataset->labelled_frames();
-  ASSERT_EQ(frames[0].frame.index, 6);
-  const PairedFrame before = dataset->paired_frame(frames[0], -1);
-  EXPECT_EQ(before.state, State::kPresent);
-  EXPECT_EQ(before.frame.index, 1);
-  EXPECT_EQ(before.frame.path, "h36m/S1/Walking-1/imageSequence/7/img_000001.jpg");
-  EXPECT_EQ(dataset->paired_frame(frames[0], 0).state, State::kPresent);
-  const PairedFrame missing = dataset->paired_frame(frames[0], 1);
-  EXPECT_EQ(missing.state, State::kMissing);
-  EXPECT_EQ(missing.frame.path, "h36m/S1/Walking-1/imageSequence/7/img_000011.jpg");
-  EXPECT_EQ(dataset->paired_frame(frames[0], 2).frame.index, 16);
-  EXPECT_NEAR(dataset->paired_frame(frames[0], 2).frame.time_s, 0.3, 1e-12);
-  EXPECT_EQ(dataset->paired_frame(frames[0], 4).state, State::kMissing);
-  EXPECT_EQ(dataset->paired_frame(frames[0], 4).frame.index, 26);
-  EXPECT_EQ(dataset->paired_frame(frames[0], 5).state, State::kBeyond);
-  EXPECT_EQ(dataset->paired_frame(frames[0], -2).state, State::kBeyond);
+  EXPECT_THAT(paired(*dataset, 0, {-2, -1, 0, 1, 2, 3, 4, 5}),
+              ElementsAre("beyond", "present " + kSeventh + "01.jpg 1",
+                          "present " + kSeventh + "06.jpg 6", "missing " + kSeventh + "11.jpg 11",
+                          "present " + kSeventh + "16.jpg 16", "present " + kSeventh + "21.jpg 21",
+                          "missing " + kSeventh + "26.jpg 26", "beyond"));
+  EXPECT_NEAR(dataset->paired_frame(dataset->labelled_frames()[0], 2).frame.time_s, 0.3, 1e-12);
 }
 
 TEST_F(FetchLayoutTest, FramesKeptAtIrregularTimesAreNotMissing) {
@@ -253,17 +212,13 @@ TEST_F(FetchLayoutTest, RowsWithoutImageStayLabelled) {
   add_annotations(fetch_annotations({{7, 1}, {7, 6}}));
   const auto dataset = open();
   ASSERT_EQ(dataset->labelled_frames().size(), 2u);
-  const PairedFrame itself = dataset->paired_frame(dataset->labelled_frames()[1], 0);
-  EXPECT_EQ(itself.state, State::kMissing);
-  EXPECT_EQ(itself.frame.path, "h36m/S1/Walking-1/imageSequence/7/img_000006.jpg");
-  EXPECT_EQ(dataset->paired_frame(dataset->labelled_frames()[1], -1).state, State::kMissing);
-  EXPECT_EQ(dataset->paired_frame(dataset->labelled_frames()[1], 1).state, State::kBeyond);
+  EXPECT_THAT(paired(*dataset, 1, {-1, 0, 1}),
+              ElementsAre("missing " + kSeventh + "01.jpg 1", "missing " + kSeventh + "06.jpg 6",
+                          "beyond"));
 }
 
 TEST_F(FetchLayoutTest, TellsOfImagesWithoutLabelsAndCamerasWithoutIntrinsics) {
-  add_images("7", {1});
-  add_images("8", {1});
-  add_images("9", {1});
+  for (const char* camera : {"7", "8", "9"}) add_images(camera, {1});
   add_images("7", {1}, "S5/Eating");
   add_annotations(fetch_annotations({{7, 1}, {8, 1}}));
   const auto dataset = open();
@@ -271,34 +226,30 @@ TEST_F(FetchLayoutTest, TellsOfImagesWithoutLabelsAndCamerasWithoutIntrinsics) {
               ElementsAre("no intrinsics for camera 8, in h36m/S1/Walking-1/annot.h5",
                           "2 folders of images without labels, the first "
                           "h36m/S1/Walking-1/imageSequence/9"));
-  const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#1");
-  EXPECT_FALSE(outcome->persons[0].camera);
+  EXPECT_FALSE(annotation_of(*dataset, kKey + "1").persons[0].camera);
 }
 
 TEST_F(FetchLayoutTest, FilesLeftOutAreCountedAndNamed) {
   add_images("7", {1, 6});
-  const auto camera = folder_ / "h36m/S1/Walking-1/imageSequence/7";
-  testing::write_file(camera / "img_000006.png", "");
-  testing::write_file(camera / "frame_000011.jpg", "");
+  touch(
+      {kWalking + "imageSequence/7/img_000006.png", kWalking + "imageSequence/7/frame_000011.jpg"});
   add_annotations(fetch_annotations({{7, 1}}));
   EXPECT_THAT(open()->notes(), ElementsAre("2 files left out in h36m/S1/Walking-1/imageSequence/7: "
                                            "frame_000011.jpg, img_000006.jpg"));
 }
 
 TEST_F(FetchLayoutTest, ValuesThatAreNotFiniteAreAFaultOfTheirRow) {
-  for (const char* name : {"pose/2d", "pose/3d-univ", "intrinsics/7"}) {
+  for (const std::string name : {"pose/2d", "pose/3d-univ", "intrinsics/7"}) {
     auto datasets = fetch_annotations({{7, 1}, {7, 6}});
     auto& values = std::get<std::vector<double>>(datasets.at(name).values);
     values.back() = std::numeric_limits<double>::quiet_NaN();
     add_annotations(datasets);
     const auto dataset = open();
-    const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#1");
-    ASSERT_TRUE(is_fault(outcome)) << name;
-    EXPECT_THAT(outcome.fault().reason,
+    EXPECT_THAT(fault_of(*dataset, 1),
                 AllOf(HasSubstr("expected finite"), HasSubstr("h36m/S1/Walking-1/annot.h5"),
                       HasSubstr(name)));
-    if (std::string(name) != "intrinsics/7") {
-      EXPECT_FALSE(is_fault(dataset->annotation("S1/Walking-1/annot.h5#0")));
+    if (name != "intrinsics/7") {
+      EXPECT_EQ(fault_of(*dataset, 0), "no fault");
     }
   }
 }
@@ -309,32 +260,26 @@ TEST_F(FetchLayoutTest, UnknownLabelKeysAreFaults) {
   for (const char* key :
        {"", "#", "S1/Walking-1/annot.h5", "S1/Walking-1/annot.h5#", "S1/Walking-1/annot.h5#1",
         "S1/Walking-1/annot.h5#-1", "S1/Walking-1/annot.h5#0x", "S2/Walking-1/annot.h5#0"}) {
-    const auto outcome = dataset->annotation(key);
-    ASSERT_TRUE(is_fault(outcome)) << key;
-    EXPECT_THAT(outcome.fault().reason, HasSubstr(", in h36m"));
+    EXPECT_THAT(fault_of(dataset->annotation(key)), HasSubstr(", in h36m"));
   }
 }
 
 TEST_F(FetchLayoutTest, RefusesMissingAndMisshapenDatasets) {
-  const auto valid = fetch_annotations({{7, 1}, {7, 6}});
-  const std::map<std::string, testing::Hdf5Dataset> misshapen = {
-      {"pose/2d", {{2, 4}, std::vector<double>(8)}},
-      {"pose/3d-univ", {{2, 2, 2}, std::vector<double>(8)}},
-      {"camera", {{3}, std::vector<std::int64_t>(3)}},
-      {"frame", {{2}, std::vector<std::string>{"1", "6"}}},
-      {"intrinsics/7", {{5}, std::vector<double>(5)}}};
+  const Datasets misshapen = {{"pose/2d", {{2, 4}, std::vector<double>(8)}},
+                              {"pose/3d-univ", {{2, 2, 2}, std::vector<double>(8)}},
+                              {"camera", {{3}, std::vector<std::int64_t>(3)}},
+                              {"frame", {{2}, Texts{"1", "6"}}},
+                              {"intrinsics/7", {{5}, std::vector<double>(5)}}};
   for (const auto& [name, dataset] : misshapen) {
-    auto datasets = valid;
+    auto datasets = fetch_annotations({{7, 1}, {7, 6}});
+    const std::string place = "(" + name + ")";
     datasets[name] = dataset;
     add_annotations(datasets);
-    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(AllOf(HasSubstr("expected numbers ["),
-                                                                 HasSubstr("annot.h5"),
-                                                                 HasSubstr("(" + name + ")"))));
+    EXPECT_THROWS(open(), InputError, "expected numbers [", "annot.h5", place);
     datasets.erase(name);
     add_annotations(datasets);
     if (name == "intrinsics/7") continue;  // may be absent
-    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(AllOf(HasSubstr("no such array"),
-                                                                 HasSubstr("(" + name + ")"))));
+    EXPECT_THROWS(open(), InputError, "no such array", place);
   }
 }
 
@@ -343,14 +288,13 @@ TEST_F(FetchLayoutTest, RefusesOddNumbersAndFilesAndDoubleRows) {
   for (const double frame : {-1.0, 1.5, 1e9, std::nan("")}) {
     datasets["frame"] = {{1}, std::vector<double>{frame}};
     add_annotations(datasets);
-    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("(frame, row 0)")));
+    EXPECT_THROWS(open(), InputError, "(frame, row 0)");
   }
   add_annotations(fetch_annotations({{7, 1}, {7, 6}, {7, 1}}));
-  EXPECT_THAT([&] { open(); },
-              ThrowsMessage<InputError>(AllOf(HasSubstr("annot.h5#0 and S1/Walking-1/annot.h5#2"),
-                                              HasSubstr("(S1/Walking-1/7/000001)"))));
-  testing::write_file(folder_ / "h36m/S1/Walking-1/annot.h5", "no HDF5");
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("S1/Walking-1/annot.h5")));
+  EXPECT_THROWS(open(), InputError, "annot.h5#0 and S1/Walking-1/annot.h5#2",
+                "(S1/Walking-1/7/000001)");
+  write_file(folder_ / "h36m/S1/Walking-1/annot.h5", "no HDF5");
+  EXPECT_THROWS(open(), InputError, "S1/Walking-1/annot.h5");
 }
 
 TEST_F(FetchLayoutTest, RefusesFilesOfDifferentJoints) {
@@ -360,18 +304,16 @@ TEST_F(FetchLayoutTest, RefusesFilesOfDifferentJoints) {
                    {"camera", {{1}, std::vector<std::int64_t>{7}}},
                    {"frame", {{1}, std::vector<std::int64_t>{1}}}},
                   "S2/Walking-1");
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(
-                                   HasSubstr("expected 2 joints as in the files before, got 3")));
+  EXPECT_THROWS(open(), InputError, "expected 2 joints as in the files before, got 3");
 }
 
 TEST_F(FetchLayoutTest, RefusesRootsWithNothingIn) {
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("h36m")));
-  std::filesystem::create_directories(folder_ / "h36m/S1/Walking-1");
-  EXPECT_THAT([&] { open(); },
-              ThrowsMessage<InputError>(HasSubstr("annot.h5 files, got none, in h36m")));
+  EXPECT_THROWS(open(), InputError, "h36m");
+  fs::create_directories(at("h36m/S1/Walking-1"));
+  EXPECT_THROWS(open(), InputError, "annot.h5 files, got none, in h36m");
   SourceSpec spec = fetch_spec("h36m");
   spec.layout.reset();
-  EXPECT_THROW(open_human36m_dataset(spec, folder_.path()), UsageError);
+  EXPECT_THROWS(open_human36m_dataset(spec, folder_.path()), UsageError, "layout");
 }
 
 TEST_F(FetchLayoutTest, ReadsSharedData) {
@@ -384,15 +326,13 @@ TEST_F(FetchLayoutTest, ReadsSharedData) {
   EXPECT_THAT(dataset->notes(), ElementsAre(AllOf(HasSubstr("no camera for 18 of 18 rows"),
                                                   HasSubstr("Directions-1/annot.h5"))));
   EXPECT_EQ(dataset->label_schema().joint_names.size(), 32u);
-  for (const LabelledFrame& frame : frames) {
-    EXPECT_EQ(dataset->paired_frame(frame, 0).state, State::kPresent);
-    EXPECT_TRUE(std::filesystem::exists(data / frame.frame.path));
-    EXPECT_FALSE(is_fault(dataset->annotation(frame.label_key)));
+  for (std::size_t i = 0; i < 18; ++i) {
+    EXPECT_THAT(paired(*dataset, i, {0}), ElementsAre("present " + text_of(frames[i].frame)));
+    EXPECT_TRUE(fs::exists(data / frames[i].frame.path));
+    EXPECT_EQ(fault_of(*dataset, i), "no fault");
   }
-  EXPECT_EQ(dataset->paired_frame(frames[0], 6).frame.index, 31);
-  EXPECT_EQ(dataset->paired_frame(frames[0], 9).state, State::kBeyond);
-  const auto outcome = dataset->annotation(frames[17].label_key);
-  EXPECT_FALSE(outcome->persons[0].camera);
+  EXPECT_THAT(paired(*dataset, 0, {6, 9}), ElementsAre(EndsWith(" 31"), "beyond"));
+  EXPECT_FALSE(annotation_of(*dataset, 17).persons[0].camera);
 }
 
 }  // namespace

@@ -1,29 +1,16 @@
 #include "stages/frames/human36m/detail/human36m_dataset.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <limits>
 #include <set>
-#include <vector>
 
-#include "manifests/values/faults.h"
 #include "stages/frames/human36m/derived_frame.h"
 #include "stages/frames/human36m/detail/camera_book.h"
 #include "stages/frames/human36m/detail/pose_table.h"
+#include "tests/stages/frames/frames_fixture.h"
 #include "tests/stages/frames/human36m/human36m_fixture.h"
-#include "tests/testing/shared_data.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
-
-using namespace std::string_literals;
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 TEST(Human36mJointsTest, NamesAreDistinctAndAsManyAsAsked) {
   for (const std::size_t count : {0u, 1u, 17u, 24u, 32u}) {
@@ -31,7 +18,7 @@ TEST(Human36mJointsTest, NamesAreDistinctAndAsManyAsAsked) {
     EXPECT_EQ(names.size(), count);
     EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), count);
   }
-  EXPECT_THAT(human36m_joint_names(2), ::testing::ElementsAre("joint_0", "joint_1"));
+  EXPECT_THAT(human36m_joint_names(2), ElementsAre("joint_0", "joint_1"));
 }
 
 TEST(Human36mJointsTest, ThirtyTwoJointsHoldTheUsualSeventeenWhereTrainersTakeThem) {
@@ -80,8 +67,6 @@ TEST(DeriveFrame, TakesAnnotatedJointsAlone) {
   EXPECT_DOUBLE_EQ(person.scale, 0.12);
 }
 
-using State = PairedFrame::State;
-
 NumberedSequence stored(const std::vector<std::int64_t>& numbers) {
   std::vector<NumberedSequence::Frame> frames;
   for (const std::int64_t number : numbers) {
@@ -90,36 +75,41 @@ NumberedSequence stored(const std::vector<std::int64_t>& numbers) {
   return NumberedSequence(std::move(frames));
 }
 
+/// What folder "root/7" has so many steps after each of the frames.
+void expect_frames(const FrameFolder& folder,
+                   const std::map<std::pair<int, int>, std::string>& at) {
+  for (const auto& [number_and_step, text] : at) {
+    const auto& [number, step] = number_and_step;
+    EXPECT_EQ(text_of(folder.paired_frame(number, step)), text) << number << " + " << step;
+  }
+}
+
 TEST(FrameFolderTest, CountsStoredFramesWhateverTheirNumbers) {
   // Labels lie farther apart than images.
-  const FrameFolder folder("root/7", "img_", stored({1000, 1005, 1006, 1040}), {1000, 1040});
-  const PairedFrame next = folder.paired_frame(1000, 1);
-  EXPECT_EQ(next.state, State::kPresent);
-  EXPECT_EQ(next.frame.path, "root/7/img_001005.png");
-  EXPECT_EQ(folder.paired_frame(1000, 2).frame.index, 1006);
-  EXPECT_EQ(folder.paired_frame(1000, 3).frame.index, 1040);
-  EXPECT_EQ(folder.paired_frame(1000, 4).state, State::kBeyond);
-  EXPECT_EQ(folder.paired_frame(1040, -3).frame.index, 1000);
-  EXPECT_EQ(folder.paired_frame(1040, -4).state, State::kBeyond);
+  expect_frames(FrameFolder("root/7", "img_", stored({1000, 1005, 1006, 1040}), {1000, 1040}),
+                {{{1000, 1}, "present root/7/img_001005.png 1005"},
+                 {{1000, 2}, "present root/7/img_001006.png 1006"},
+                 {{1000, 3}, "present root/7/img_001040.png 1040"},
+                 {{1000, 4}, "beyond"},
+                 {{1040, -3}, "present root/7/img_001000.png 1000"},
+                 {{1040, -4}, "beyond"}});
 }
 
 TEST(FrameFolderTest, ALabelledFrameWithoutImageCountsAsMissing) {
-  const FrameFolder folder("root/7", "img_", stored({1000, 1005}), {1010, 1000, 1003, 1003});
-  const PairedFrame missing = folder.paired_frame(1000, 1);
-  EXPECT_EQ(missing.state, State::kMissing);
-  EXPECT_EQ(missing.frame.path, "root/7/img_001003.png");
-  EXPECT_EQ(folder.paired_frame(1000, 2).frame.index, 1005);
-  EXPECT_EQ(folder.paired_frame(1003, 0).state, State::kMissing);
-  EXPECT_EQ(folder.paired_frame(1005, 1).state, State::kMissing);
-  EXPECT_EQ(folder.paired_frame(1005, 2).state, State::kBeyond);
+  expect_frames(FrameFolder("root/7", "img_", stored({1000, 1005}), {1010, 1000, 1003, 1003}),
+                {{{1000, 1}, "missing root/7/img_001003.png 1003"},
+                 {{1000, 2}, "present root/7/img_001005.png 1005"},
+                 {{1003, 0}, "missing root/7/img_001003.png 1003"},
+                 {{1005, 1}, "missing root/7/img_001010.png 1010"},
+                 {{1005, 2}, "beyond"}});
 }
 
 TEST(FrameFolderTest, AFrameThatIsNotThereHasThoseBesideIt) {
-  const FrameFolder folder("root/7", "img_", stored({1000, 1005}), {});
-  EXPECT_EQ(folder.paired_frame(1002, 0).state, State::kMissing);
-  EXPECT_EQ(folder.paired_frame(1002, 1).frame.index, 1005);
-  EXPECT_EQ(folder.paired_frame(1002, -1).frame.index, 1000);
-  EXPECT_EQ(folder.paired_frame(1002, 2).state, State::kBeyond);
+  expect_frames(FrameFolder("root/7", "img_", stored({1000, 1005}), {}),
+                {{{1002, 0}, "missing root/7/img_001002.png 1002"},
+                 {{1002, 1}, "present root/7/img_001005.png 1005"},
+                 {{1002, -1}, "present root/7/img_001000.png 1000"},
+                 {{1002, 2}, "beyond"}});
 }
 
 TEST(FrameFolderTest, NamesAbsentFramesLikeTheStoredOnes) {
@@ -129,9 +119,8 @@ TEST(FrameFolderTest, NamesAbsentFramesLikeTheStoredOnes) {
 }
 
 TEST(FrameFolderTest, EmptyFolderHasNoPairedFrames) {
-  const FrameFolder folder("r", "img_", {}, {});
-  EXPECT_EQ(folder.paired_frame(1, 1).state, State::kBeyond);
-  EXPECT_EQ(folder.paired_frame(1, 0).state, State::kMissing);
+  expect_frames(FrameFolder("r", "img_", {}, {}),
+                {{{1, 1}, "beyond"}, {{1, 0}, "missing r/img_000001.jpg 1"}});
 }
 
 TableColumns columns() {
@@ -148,26 +137,25 @@ TEST(TableColumnsTest, ComparesShapes) {
   const auto any = std::nullopt;
   EXPECT_EQ(table.need("points", {2, any, 1}).size(), 6u);
   EXPECT_EQ(table.need("name", {any}, /*text=*/true).size(), 2u);
-  EXPECT_THAT(
-      [&] {
-        table.need("points", {any, 4, 1});
-      },
-      ThrowsMessage<InputError>("expected numbers [at least 1, 4, 1], got numbers [2, 3, 1], "
-                                "in file.h5 (points)"));
-  EXPECT_THROW(table.need("points", {2, 3}), InputError);
-  EXPECT_THROW(table.need("points", {2, 3, 1, 1}), InputError);
-  EXPECT_THROW(table.need("name", {2}), InputError);
-  EXPECT_THROW(table.need("frame", {2}, /*text=*/true), InputError);
-  EXPECT_THAT(
-      [&] { table.need("absent", {2}); },
-      ThrowsMessage<InputError>("expected numbers [2], got no such array, in file.h5 (absent)"));
+  const std::string got = ", got numbers [2, 3, 1], in file.h5 (points)";
+  EXPECT_THROWS(table.need("points", {any, 4, 1}), InputError,
+                StrEq("expected numbers [at least 1, 4, 1]" + got));
+  EXPECT_THROWS(table.need("points", {2, 3}), InputError, "expected numbers [2, 3]" + got);
+  EXPECT_THROWS(table.need("points", {2, 3, 1, 1}), InputError,
+                "expected numbers [2, 3, 1, 1]" + got);
+  EXPECT_THROWS(table.need("name", {2}), InputError, "expected numbers [2], got text [2]");
+  EXPECT_THROWS(table.need("frame", {2}, /*text=*/true), InputError,
+                "expected text [2], got numbers [2]");
+  EXPECT_THROWS(table.need("absent", {2}), InputError,
+                StrEq("expected numbers [2], got no such array, in file.h5 (absent)"));
 }
 
 TEST(TableColumnsTest, GivesRows) {
   const TableColumns table = columns();
   EXPECT_THAT(table.row_of("points", 1), ElementsAre(4, 5, 6));
   EXPECT_EQ(table.whole_number("frame", 0), 7);
-  EXPECT_THROW(table.whole_number("frame", 1), InputError);
+  EXPECT_THROWS(table.whole_number("frame", 1), InputError,
+                "expected a whole number in [0, 10^9), got 7.5", "(frame, row 1)");
   EXPECT_EQ(table.fields(1, 2, "x/").dump(),
             R"({"frame":7.5,"name":"b","points":[[4.0],[5.0],[6.0]]})");
   EXPECT_EQ(table.fields(0, 2)["x/other"], 1);
@@ -182,19 +170,16 @@ TEST(TableColumnsTest, FindsValuesThatAreNotFinite) {
 }
 
 CameraBook read(const std::string& pickle) {
-  const testing::TemporaryFolder folder;
-  testing::write_file(folder / "cameras.pkl", pickle);
+  const TemporaryFolder folder;
+  write_file(folder / "cameras.pkl", pickle);
   return read_camera_book(folder / "cameras.pkl");
 }
 
+const std::string kFocal = pickled_field("f", "\x0b\x0c"), kCentre = pickled_field("c", "\x05\x06");
+
 TEST(CameraBookTest, ReadsIntrinsicsAndAllFields) {
   const CameraBook cameras =
-      read(camera_pickle("U\x01"
-                         "f" +
-                         pickled_bytes("\x0b\x0c") +
-                         "U\x01"
-                         "c" +
-                         pickled_bytes("\x05\x06") +
+      read(camera_pickle(kFocal + kCentre +
                          "U\x04nameX\x04\x00\x00\x00"
                          "cam1U\x01wM\xe8\x03U\x01oNU\x01xG\x3f\xf0\x00\x00\x00\x00\x00\x00"s));
   ASSERT_EQ(cameras.size(), 1u);
@@ -205,37 +190,20 @@ TEST(CameraBookTest, ReadsIntrinsicsAndAllFields) {
 }
 
 TEST(CameraBookTest, ReadsTheLensDistortion) {
-  const std::string intrinsics =
-      "U\x01"
-      "f" +
-      pickled_bytes("\x0b\x0c") +
-      "U\x01"
-      "c" +
-      pickled_bytes("\x05\x06");
-  const std::string k = "U\x01k" + pickled_bytes("\x01\x02\x03");
-  const std::string p = "U\x01p" + pickled_bytes("\x04\x05");
-  EXPECT_EQ(read(camera_pickle(intrinsics + k + p)).at({"S1", "7"}).distortion,
+  const std::string both = kFocal + kCentre;
+  const std::string k = pickled_field("k", "\x01\x02\x03"), p = pickled_field("p", "\x04\x05");
+  EXPECT_EQ(read(camera_pickle(both + k + p)).at({"S1", "7"}).distortion,
             (LensDistortion{.k1 = 1, .k2 = 2, .k3 = 3, .p1 = 4, .p2 = 5}));
-  EXPECT_FALSE(read(camera_pickle(intrinsics)).at({"S1", "7"}).distortion);
-  EXPECT_THAT([&] { read(camera_pickle(intrinsics + k)); },
-              ThrowsMessage<InputError>(HasSubstr("(p)")));
-  EXPECT_THAT([&] { read(camera_pickle(intrinsics + p + "U\x01k" + pickled_bytes("\x01\x02"))); },
-              ThrowsMessage<InputError>(HasSubstr("expected 3 numbers, got [2]")));
+  EXPECT_FALSE(read(camera_pickle(both)).at({"S1", "7"}).distortion);
+  EXPECT_THROWS(read(camera_pickle(both + k)), InputError, "(p)");
+  EXPECT_THROWS(read(camera_pickle(both + p + pickled_field("k", "\x01\x02"))), InputError,
+                "expected 3 numbers, got [2]");
 }
 
 TEST(CameraBookTest, RefusesCamerasThatSeeNothing) {
-  using namespace std::string_literals;
-  const std::string f =
-      "U\x01"
-      "f";
-  const std::string c =
-      "U\x01"
-      "c" +
-      pickled_bytes("\x05\x06");
   for (const std::string& focal : {"\0\0"s, "\0\x0c"s, "\x0b\0"s}) {
-    EXPECT_THAT([&] { read(camera_pickle(f + pickled_bytes(focal) + c)); },
-                ThrowsMessage<InputError>(
-                    AllOf(HasSubstr("expected focal lengths above 0"), HasSubstr("(S1 7)"))));
+    EXPECT_THROWS(read(camera_pickle(pickled_field("f", focal) + kCentre)), InputError,
+                  "expected focal lengths above 0", "(S1 7)");
   }
 }
 
@@ -274,30 +242,13 @@ TEST(ProjectionErrorTest, OnlyACameraThatFitsIsKept) {
 }
 
 TEST(CameraBookTest, RefusesOtherPickles) {
-  const std::string focal =
-      "U\x01"
-      "f" +
-      pickled_bytes("\x0b\x0c");
-  const std::string centre =
-      "U\x01"
-      "c" +
-      pickled_bytes("\x05\x06");
   for (const std::string& pickle :
-       {"N."s, "no pickle"s, ""s, "}NNs."s,
-        "}U\x01"
-        "aU\x01"
-        "b\x86Ns."s,
-        camera_pickle(focal), camera_pickle(centre),
-        camera_pickle(focal + "U\x01"
-                              "cN"),
-        camera_pickle(focal +
-                      "U\x01"
-                      "c" +
-                      pickled_bytes("\x05")),
-        camera_pickle(focal + centre + "U\x01x]"), "}]]\x86}(" + focal + centre + "us.",
+       {"N."s, "no pickle"s, ""s, "}NNs."s, "}U\1aU\1b\x86Ns."s, camera_pickle(kFocal),
+        camera_pickle(kCentre), camera_pickle(kFocal + "U\1cN"),
+        camera_pickle(kFocal + pickled_field("c", "\x05")),
+        camera_pickle(kFocal + kCentre + "U\x01x]"), "}]]\x86}(" + kFocal + kCentre + "us.",
         "cos\nsystem\n(S'true'\ntR."s}) {
-    EXPECT_THAT([&] { read(pickle); },
-                ThrowsMessage<InputError>(AllOf(HasSubstr("expected "), HasSubstr("cameras.pkl"))))
+    EXPECT_THROWS(read(pickle), InputError, "expected ", "cameras.pkl")
         << ::testing::PrintToString(pickle);
   }
 }
@@ -307,18 +258,14 @@ TEST(CameraBookTest, ReadsSharedData) {
   const CameraBook cameras = read_camera_book(data / "human36m_lists" / "cameras.pkl");
   EXPECT_EQ(cameras.size(), 44u);  // 11 subjects with 4 cameras
   const Human36mCamera& camera = cameras.at({"S1", "54138969"});
-  // As Python prints them: f = 1145.04940459, 1143.78109572; c = 512.54150496, 515.45148698.
-  EXPECT_NEAR(camera.intrinsics.focal_x, 1145.04940459, 1e-8);
-  EXPECT_NEAR(camera.intrinsics.focal_y, 1143.78109572, 1e-8);
-  EXPECT_NEAR(camera.intrinsics.centre_x, 512.54150496, 1e-8);
-  EXPECT_NEAR(camera.intrinsics.centre_y, 515.45148698, 1e-8);
-  // k = -0.20709891, 0.24777518, -0.00307515; p = -0.00142447, -0.0009757.
   ASSERT_TRUE(camera.distortion);
-  EXPECT_NEAR(camera.distortion->k1, -0.20709891, 1e-8);
-  EXPECT_NEAR(camera.distortion->k2, 0.24777518, 1e-8);
-  EXPECT_NEAR(camera.distortion->k3, -0.00307515, 1e-8);
-  EXPECT_NEAR(camera.distortion->p1, -0.00142447, 1e-8);
-  EXPECT_NEAR(camera.distortion->p2, -0.0009757, 1e-8);
+  const auto& [focal_x, focal_y, centre_x, centre_y] = camera.intrinsics;
+  const auto& [k1, k2, k3, p1, p2] = *camera.distortion;
+  // As Python prints them.
+  const double expected[] = {1145.04940459, 1143.78109572, 512.54150496, 515.45148698, -0.20709891,
+                             0.24777518,    -0.00307515,   -0.00142447,  -0.0009757};
+  EXPECT_THAT((std::array{focal_x, focal_y, centre_x, centre_y, k1, k2, k3, p1, p2}),
+              ::testing::Pointwise(::testing::DoubleNear(1e-8), expected));
 }
 
 }  // namespace

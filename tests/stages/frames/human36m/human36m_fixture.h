@@ -46,6 +46,11 @@ inline std::string pickled_bytes(const std::string& bytes) {
          "cnumpy\ndtype\nU\x02u1K\x00K\x01\x87R(K\x03U\x01|tb\x89U"s + count + bytes + "tb";
 }
 
+/// A field of a camera: a name of one letter, and bytes.
+inline std::string pickled_field(const std::string& name, const std::string& bytes) {
+  return "U\x01" + name + pickled_bytes(bytes);
+}
+
 /// A cameras.pkl: {("S1", CAMERA): {CONTENT}}.
 inline std::string camera_pickle(const std::string& content, const std::string& camera = "7") {
   return "}U\x02S1U" + std::string(1, static_cast<char>(camera.size())) + camera + "\x86}(" +

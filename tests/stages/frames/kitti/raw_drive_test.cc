@@ -1,24 +1,9 @@
 #include "stages/frames/kitti/raw_drive.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <string>
-#include <vector>
-
-#include "manifests/values/faults.h"
-#include "tests/testing/shared_data.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using testing::TemporaryFolder;
-using testing::write_file;
 
 std::vector<double> parse(const std::string& text) {
   const auto outcome = parse_timestamps(text, "t.txt");
@@ -27,35 +12,24 @@ std::vector<double> parse(const std::string& text) {
 }
 
 std::string drive_fault(const std::string& text) {
-  const auto outcome = parse_timestamps(text, "t.txt");
-  return is_fault(outcome) ? outcome.fault().reason : "";
+  return fault_of(parse_timestamps(text, "t.txt"));
 }
 
 TEST(Timestamps, CountsFromTheFirstLine) {
-  const auto seconds = parse(
-      "2011-09-26 13:02:25.594360375\n"
-      "2011-09-26 13:02:25.694360380\r\n"
-      "2011-09-26 13:03:26.500000000");
-  ASSERT_EQ(seconds.size(), 3u);
-  EXPECT_EQ(seconds[0], 0);
-  EXPECT_DOUBLE_EQ(seconds[1], 0.100000005);
-  EXPECT_DOUBLE_EQ(seconds[2], 60.905639625);  // 61 s on, 0.594360375 - 0.5 back
+  EXPECT_THAT(parse("2011-09-26 13:02:25.594360375\n"
+                    "2011-09-26 13:02:25.694360380\r\n"
+                    "2011-09-26 13:03:26.500000000"),
+              ElementsAre(0, ::testing::DoubleEq(0.100000005),
+                          ::testing::DoubleEq(60.905639625)));  // 61 s on, 0.594360375 - 0.5 back
 }
 
 TEST(Timestamps, RunsOnOverMidnightAndNewYear) {
-  const auto seconds = parse(
-      "2011-12-31 23:59:59.9\n"
-      "2012-01-01 00:00:00\n");
-  EXPECT_DOUBLE_EQ(seconds.at(1), 0.1);
+  EXPECT_DOUBLE_EQ(parse("2011-12-31 23:59:59.9\n2012-01-01 00:00:00\n").at(1), 0.1);
 }
 
 TEST(Timestamps, ABlankLineIsAnUnknownTime) {
-  const auto seconds = parse("\n2011-09-26 13:02:25\n\n2011-09-26 13:02:26\n");
-  ASSERT_EQ(seconds.size(), 4u);
-  EXPECT_TRUE(std::isnan(seconds[0]));
-  EXPECT_EQ(seconds[1], 0);
-  EXPECT_TRUE(std::isnan(seconds[2]));
-  EXPECT_EQ(seconds[3], 1);
+  EXPECT_THAT(parse("\n2011-09-26 13:02:25\n\n2011-09-26 13:02:26\n"),
+              ElementsAre(::testing::IsNan(), 0, ::testing::IsNan(), 1));
 }
 
 TEST(Timestamps, AnEmptyFileHasNone) { EXPECT_TRUE(parse("").empty()); }
@@ -84,58 +58,42 @@ TEST(Timestamps, ATimeThatIsNotAfterTheOneBeforeIsAFault) {
 }
 
 TEST(Timestamps, ALastLineThatIsCutShortIsAFault) {
-  const std::string whole =
-      "2011-09-26 13:02:25.594360375\n"
-      "2011-09-26 13:02:26.694360380";
+  const std::string whole = "2011-09-26 13:02:25.594360375\n2011-09-26 13:02:26.694360380";
   EXPECT_EQ(parse(whole).size(), 2u);  // only the line end is missing
   for (std::size_t length = whole.size() - 1; length > whole.size() - 29; --length) {
     EXPECT_THAT(drive_fault(whole.substr(0, length)), HasSubstr("in t.txt:2")) << length;
   }
 }
 
-using State = PairedFrame::State;
-
-constexpr const char* kFolder = "2011_09_26/2011_09_26_drive_0052_sync";
+const std::string kFolder = "2011_09_26/2011_09_26_drive_0052_sync";
+const std::string kDriveData = "raw/" + kFolder + "/image_02/data/000000000";
 
 /// Frames 0, 2 and 4.
-class RawDriveTest : public ::testing::Test {
+class RawDriveTest : public FolderTest {
  protected:
-  RawDriveTest() {
-    for (const char* name : {"0000000000.png", "0000000002.png", "0000000004.png"}) {
-      write_file(folder_ / ("raw/" + std::string(kFolder) + "/image_02/data/" + name), "");
-    }
-  }
+  RawDriveTest() { touch({kDriveData + "0.png", kDriveData + "2.png", kDriveData + "4.png"}); }
 
-  void write_timestamps(const std::string& text) {
-    write_file(folder_ / ("raw/" + std::string(kFolder) + "/image_02/timestamps.txt"), text);
+  void write_timestamps(const std::string& text) const {
+    write("raw/" + kFolder + "/image_02/timestamps.txt", text);
   }
 
   RawDrive open() const { return {SourceRoot("raw", folder_.path()), kFolder}; }
-
-  const TemporaryFolder folder_;
 };
 
 TEST_F(RawDriveTest, FindsAFrameByItsNumber) {
-  const PairedFrame frame = open().frame(2);
-  EXPECT_EQ(frame.state, State::kPresent);
-  EXPECT_EQ(frame.frame.path,
-            "raw/2011_09_26/2011_09_26_drive_0052_sync/image_02/data/0000000002.png");
-  EXPECT_EQ(frame.frame.index, 2);
-  EXPECT_EQ(frame.frame.video_frame, -1);
+  EXPECT_EQ(text_of(open().frame(2)), "present " + kDriveData + "2.png 2");
+  EXPECT_EQ(open().frame(2).frame.video_frame, -1);
 }
 
 TEST_F(RawDriveTest, AStepIsOneFrameWhateverIsStored) {
   const RawDrive drive = open();
-  EXPECT_EQ(drive.frame(3).state, State::kMissing);
-  EXPECT_EQ(drive.frame(3).frame.path,
-            "raw/2011_09_26/2011_09_26_drive_0052_sync/image_02/data/0000000003.png");
-  EXPECT_EQ(drive.frame(5).state, State::kBeyond);
-  EXPECT_EQ(drive.frame(-1).state, State::kBeyond);
-  EXPECT_EQ(drive.paired_frame(2, 1).state, State::kMissing);
-  EXPECT_EQ(drive.paired_frame(2, 1).frame.index, 3);
-  EXPECT_EQ(drive.paired_frame(2, -2).frame.index, 0);
-  EXPECT_EQ(drive.paired_frame(2, 2).state, State::kPresent);
-  EXPECT_EQ(drive.paired_frame(2, 3).state, State::kBeyond);
+  EXPECT_EQ(text_of(drive.frame(3)), "missing " + kDriveData + "3.png 3");
+  EXPECT_EQ(text_of(drive.frame(5)), "beyond");
+  EXPECT_EQ(text_of(drive.frame(-1)), "beyond");
+  EXPECT_EQ(text_of(drive.paired_frame(2, 1)), "missing " + kDriveData + "3.png 3");
+  EXPECT_EQ(text_of(drive.paired_frame(2, -2)), "present " + kDriveData + "0.png 0");
+  EXPECT_EQ(text_of(drive.paired_frame(2, 2)), "present " + kDriveData + "4.png 4");
+  EXPECT_EQ(text_of(drive.paired_frame(2, 3)), "beyond");
 }
 
 TEST_F(RawDriveTest, TimesAreTenAStepWithoutTimestamps) {
@@ -149,18 +107,15 @@ TEST_F(RawDriveTest, TimesComeFromTheTimestamps) {
       "2011-09-26 13:02:25\n2011-09-26 13:02:26\n2011-09-26 13:02:28\n2011-09-26 13:02:29\n"
       "2011-09-26 13:02:31\n");
   const RawDrive drive = open();
-  EXPECT_EQ(drive.timestamps_path(),
-            "raw/2011_09_26/2011_09_26_drive_0052_sync/image_02/timestamps.txt");
+  EXPECT_EQ(drive.timestamps_path(), "raw/" + kFolder + "/image_02/timestamps.txt");
   EXPECT_EQ(drive.fault(), "");
   EXPECT_EQ(drive.frame(2).frame.time_s, 3);
   EXPECT_EQ(drive.frame(4).frame.time_s, 6);
-  EXPECT_TRUE(std::isnan(drive.time_s(5)));  // past the last line
-  EXPECT_TRUE(std::isnan(drive.time_s(-1)));
+  for (const int beyond : {5, -1}) EXPECT_TRUE(std::isnan(drive.time_s(beyond))) << beyond;
 }
 
 TEST_F(RawDriveTest, DamagedTimestampsAreAFaultOfTheDriveAndItsTimesUnknown) {
-  const std::string place =
-      ", in raw/2011_09_26/2011_09_26_drive_0052_sync/image_02/timestamps.txt";
+  const std::string place = ", in raw/" + kFolder + "/image_02/timestamps.txt";
   const std::string four =
       "2011-09-26 13:02:25\n2011-09-26 13:02:26\n2011-09-26 13:02:28\n2011-09-26 13:02:29\n";
   const std::pair<std::string, std::string> damaged[] = {
@@ -208,30 +163,26 @@ TEST(RawMapping, KnowsNoOtherImages) {
   EXPECT_EQ(parse("", "").find(0), std::nullopt);
 }
 
-void expect_error(std::string_view rand, std::string_view mapping, const std::string& got,
-                  const std::string& where) {
-  try {
-    parse(rand, mapping);
-    FAIL() << "took " << got;
-  } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), AllOf(HasSubstr(got), HasSubstr(where)));
-  }
-}
-
 TEST(RawMapping, AnythingElseIsAnErrorThatNamesTheFile) {
-  expect_error("0", kMapping, "expected line numbers from 1 to 3, got '0'", "in rand.txt");
-  expect_error("1,4", kMapping, "got '4'", "in rand.txt");
-  expect_error("1,x", kMapping, "got 'x'", "in rand.txt");
-  expect_error("1", "2011_09_26 drive\n", "expected DATE DRIVE FRAME", "mapping.txt:1");
-  expect_error("1", "a b 1\n\na b 2\n", "got '?'", "mapping.txt:2");
-  expect_error("1", "a b -1\n", "got 'a b -1?'", "mapping.txt:1");
+  const struct {
+    std::string_view rand, mapping;
+    const char *got, *where;
+  } cases[] = {{"0", kMapping, "expected line numbers from 1 to 3, got '0'", "in rand.txt"},
+               {"1,4", kMapping, "got '4'", "in rand.txt"},
+               {"1,x", kMapping, "got 'x'", "in rand.txt"},
+               {"1", "2011_09_26 drive\n", "expected DATE DRIVE FRAME", "mapping.txt:1"},
+               {"1", "a b 1\n\na b 2\n", "got '?'", "mapping.txt:2"},
+               {"1", "a b -1\n", "got 'a b -1?'", "mapping.txt:1"}};
+  for (const auto& [rand, mapping, got, where] : cases) {
+    EXPECT_THROWS(parse(rand, mapping), InputError, got, where);
+  }
 }
 
 TEST(RawMapping, LeadsToTheFramesTheDevkitNames) {
   EVENTGAN_SHARED_DATA_OR_SKIP(data);
   const auto folder = data / "kitti_object/devkit/mapping";
-  const RawMapping mapping = parse(testing::read_file(folder / "train_rand.txt"),
-                                   testing::read_file(folder / "train_mapping.txt"));
+  const RawMapping mapping =
+      parse(read_file(folder / "train_rand.txt"), read_file(folder / "train_mapping.txt"));
   const std::string drive = "2011_09_26_drive_0052_sync";
   EXPECT_EQ(mapping.find(1497), (RawFrame{"2011_09_26", drive, 7}));
   EXPECT_EQ(mapping.find(4587), (RawFrame{"2011_09_26", drive, 14}));

@@ -1,85 +1,61 @@
 #include "stages/frames/mpii/mpii_dataset.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "stages/frames/mpii/detail/mpii_annotations.h"
+#include "tests/stages/frames/frames_fixture.h"
 #include "tests/stages/frames/mpii/mpii_fixture.h"
-#include "tests/testing/image_file.h"
-#include "tests/testing/shared_data.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
 namespace mat = testing::mat;
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
-using State = PairedFrame::State;
-
-std::vector<std::string> mpii_ids(const Dataset& dataset) {
-  std::vector<std::string> found;
-  for (const auto& frame : dataset.labelled_frames()) found.push_back(frame.sample_id);
-  return found;
-}
-
-class MpiiDatasetTest : public ::testing::Test {
+class MpiiDatasetTest : public FolderTest {
  protected:
   MpiiDatasetTest() {
     spec_.dataset = DatasetKind::kMpii;
     spec_.root = "m";
-    testing::write_flat_image(folder_ / "m/images/b.jpg", {48, 64}, 100);
-    testing::write_flat_image(folder_ / "m/sequences/b/00000007.jpg", {48, 64}, 100);
-    testing::write_file(folder_ / "m/sequences/b/00000008.jpg", "b8");
+    images({"m/images/b.jpg", "m/sequences/b/00000007.jpg"}, {48, 64}, 100);
+    write("m/sequences/b/00000008.jpg", "b8");
   }
-  void write_four() {
-    mat::write_mpii(folder_ / "m", {{"c.jpg", mat::centre_only(), false, "c/00000001.jpg"},
-                                    {"b.jpg", mat::two_persons(), true, "b/00000007.jpg"},
-                                    {"d.jpg", mat::empty(), true, "d/00000001.jpg"},
-                                    {"a.jpg", mat::two_persons(), true, "a/00000001.jpg"}});
+  void write_four() const {
+    mat::write_mpii(at("m"), {{"c.jpg", mat::centre_only(), false, "c/00000001.jpg"},
+                              {"b.jpg", mat::two_persons(), true, "b/00000007.jpg"},
+                              {"d.jpg", mat::empty(), true, "d/00000001.jpg"},
+                              {"a.jpg", mat::two_persons(), true, "a/00000001.jpg"}});
   }
   std::unique_ptr<Dataset> open() const { return open_mpii_dataset(spec_, folder_.path()); }
 
-  testing::TemporaryFolder folder_;
   SourceSpec spec_;
 };
 
 TEST_F(MpiiDatasetTest, TheSplitChoosesByImgTrain) {
   write_four();
   spec_.split = "train";
-  EXPECT_THAT(mpii_ids(*open()), ElementsAre("a", "b"));
+  EXPECT_THAT(ids_of(*open()), ElementsAre("a", "b"));
   EXPECT_THAT(open()->notes(),
               ElementsAre("1 image without annotation in m/mpii_human_pose_v1_u12_1.mat",
                           "1 annotated image left out, not of split train",
                           "1 annotated image without a sequence folder, so without neighbours"));
   spec_.split = "test";
-  EXPECT_THAT(mpii_ids(*open()), ElementsAre("c"));
+  EXPECT_THAT(ids_of(*open()), ElementsAre("c"));
   spec_.split = "everything";
-  EXPECT_THAT(mpii_ids(*open()), ElementsAre("a", "b", "c"));
+  EXPECT_THAT(ids_of(*open()), ElementsAre("a", "b", "c"));
 }
 
 TEST_F(MpiiDatasetTest, StillsNeedNoKeyframes) {
   write_four();
   const auto with_keyframes = open();
-  std::filesystem::remove(folder_ / "m/mpii_human_pose_v1_sequences_keyframes.mat");
-  EXPECT_THROW(open(), InputError);
+  fs::remove(at("m/mpii_human_pose_v1_sequences_keyframes.mat"));
+  EXPECT_THROWS(open(), InputError, "expected mpii_human_pose_v1_sequences_keyframes.mat");
   spec_.pairs.stills.emplace();
   const auto dataset = open();
-  EXPECT_EQ(mpii_ids(*dataset), mpii_ids(*with_keyframes));
+  EXPECT_EQ(ids_of(*dataset), ids_of(*with_keyframes));
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("m/mpii_human_pose_v1_u12_1.mat"));
-  const LabelledFrame& b = dataset->labelled_frames().at(1);
-  EXPECT_EQ(b.frame.path, "m/images/b.jpg");
-  EXPECT_EQ(dataset->paired_frame(b, 0).state, State::kPresent);
-  EXPECT_EQ(dataset->annotation(b.label_key)->persons.size(), 2u);
-  EXPECT_THAT(dataset->annotation(b.label_key)->original,
-              ::testing::Not(HasSubstr("annolist_keyframes")));
+  EXPECT_THAT(paired(*dataset, 1, {0}), ElementsAre("present m/images/b.jpg -1"));
+  EXPECT_EQ(annotation_of(*dataset, 1).persons.size(), 2u);
+  EXPECT_THAT(annotation_of(*dataset, 1).original, Not(HasSubstr("annolist_keyframes")));
 }
 
 TEST_F(MpiiDatasetTest, LabelsStayWithTheirImage) {
@@ -89,16 +65,12 @@ TEST_F(MpiiDatasetTest, LabelsStayWithTheirImage) {
   EXPECT_THAT(dataset->annotation_files(),
               ElementsAre("m/mpii_human_pose_v1_sequences_keyframes.mat",
                           "m/mpii_human_pose_v1_u12_1.mat"));
-  const LabelledFrame& frame = dataset->labelled_frames()[1];
-  EXPECT_EQ(frame.label_key, "annolist[1]");
-  EXPECT_EQ(dataset->label_place(frame.label_key), "m/mpii_human_pose_v1_u12_1.mat:annolist[1]");
-  EXPECT_EQ(frame.frame, (FrameRef{"m/sequences/b/00000007.jpg", 7}));
-  EXPECT_EQ(dataset->paired_frame(frame, 1).frame, (FrameRef{"m/sequences/b/00000008.jpg", 8}));
-  EXPECT_EQ(dataset->paired_frame(frame, 2).state, State::kBeyond);
-
-  const auto outcome = dataset->annotation(frame.label_key);
-  ASSERT_FALSE(is_fault(outcome));
-  const auto& annotation = *outcome;
+  EXPECT_EQ(text_of(dataset->labelled_frames()[1]),
+            "b of b: m/sequences/b/00000007.jpg 7 by annolist[1]");
+  EXPECT_EQ(dataset->label_place("annolist[1]"), "m/mpii_human_pose_v1_u12_1.mat:annolist[1]");
+  EXPECT_THAT(paired(*dataset, 1, {1, 2}),
+              ElementsAre("present m/sequences/b/00000008.jpg 8", "beyond"));
+  const Annotation annotation = annotation_of(*dataset, 1);
   EXPECT_EQ(nlohmann::json::parse(annotation.original)["image"]["name"], "b.jpg");
   EXPECT_TRUE(annotation.boxes.empty());
   ASSERT_EQ(annotation.persons.size(), 2u);
@@ -118,9 +90,7 @@ TEST_F(MpiiDatasetTest, AMalformedEntryIsAFaultOfItsSampleOnly) {
         true, "a/1.jpg"},
        {"b.jpg", mat::two_persons(), true, "b/00000007.jpg"}});
   const auto dataset = open();
-  const auto bad = dataset->annotation("annolist[0]");
-  ASSERT_TRUE(is_fault(bad));
-  EXPECT_EQ(bad.fault().reason,
+  EXPECT_EQ(fault_of(dataset->annotation("annolist[0]")),
             "expected x, y and id, got 3 at annorect[0].annopoints.point[0], in "
             "m/mpii_human_pose_v1_u12_1.mat:annolist[0] (sample a)");
   EXPECT_FALSE(is_fault(dataset->annotation("annolist[1]")));
@@ -130,12 +100,12 @@ TEST_F(MpiiDatasetTest, AMalformedEntryIsAFaultOfItsSampleOnly) {
 TEST_F(MpiiDatasetTest, RefusesTwoImagesOfOneName) {
   mat::write_mpii(folder_ / "m", {{"a.jpg", mat::two_persons(), true, ""},
                                   {"a.png", mat::two_persons(), true, ""}});
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("got a twice")));
+  EXPECT_THROWS(open(), InputError, "got a twice");
 }
 
 TEST_F(MpiiDatasetTest, NotesKeyframesInASequenceOfAnotherName) {
   mat::write_mpii(folder_ / "m", {{"a.jpg", mat::two_persons(), true, "b/00000008.jpg"}});
-  testing::write_flat_image(folder_ / "m/images/a.jpg", {48, 64}, 100);
+  write_flat_image(folder_ / "m/images/a.jpg", {48, 64}, 100);
   EXPECT_THAT(open()->notes(),
               ElementsAre("1 keyframe in a sequence not named as its image (first: a.jpg in "
                           "b/00000008.jpg)"));
@@ -146,7 +116,7 @@ class MpiiFrameOfAnotherSize : public MpiiDatasetTest {
  protected:
   MpiiFrameOfAnotherSize() { write_four(); }
   Outcome<Annotation> annotation_at(ImageSize frame) {
-    testing::write_flat_image(folder_ / "m/sequences/b/00000007.jpg", frame, 100);
+    write_flat_image(folder_ / "m/sequences/b/00000007.jpg", frame, 100);
     return open()->annotation("annolist[1]");
   }
 };
@@ -176,30 +146,25 @@ TEST_F(MpiiFrameOfAnotherSize, APixelOfRoundingIsNoOtherShape) {
 
 TEST_F(MpiiFrameOfAnotherSize, AnotherShapeIsAFaultThatNamesBoth) {
   for (const ImageSize size : {ImageSize{48, 80}, ImageSize{64, 48}, ImageSize{32, 46}}) {
-    const auto annotation = annotation_at(size);
-    ASSERT_TRUE(is_fault(annotation));
-    EXPECT_EQ(
-        annotation.fault().reason,
-        "expected a frame of the shape of m/images/b.jpg, 64x48, where it was annotated, got " +
-            std::to_string(size.width) + "x" + std::to_string(size.height) +
-            ", in m/sequences/b/00000007.jpg (sample b)");
+    EXPECT_EQ(fault_of(annotation_at(size)),
+              "expected a frame of the shape of m/images/b.jpg, 64x48, where it was annotated, "
+              "got " +
+                  to_string(size) + ", in m/sequences/b/00000007.jpg (sample b)");
   }
 }
 
 TEST_F(MpiiFrameOfAnotherSize, WithoutTheImageNothingTells) {
-  std::filesystem::remove(folder_ / "m/images/b.jpg");
+  fs::remove(folder_ / "m/images/b.jpg");
   const auto annotation = *annotation_at({96, 128});
   EXPECT_EQ(annotation.persons.at(0).joints[0].at, (Point{710, 620}));
   spec_.split = "train";
-  EXPECT_THAT(open()->notes(), ::testing::Contains(::testing::StartsWith(
-                                   "1 labelled frame of a sequence whose image is not in images")));
+  EXPECT_THAT(open()->notes(),
+              Contains(StartsWith("1 labelled frame of a sequence whose image is not in images")));
 }
 
 TEST_F(MpiiFrameOfAnotherSize, AnImageThatCannotBeReadIsAFault) {
-  testing::write_file(folder_ / "m/images/b.jpg", "no image");
-  const auto annotation = annotation_at({48, 64});
-  ASSERT_TRUE(is_fault(annotation));
-  EXPECT_THAT(annotation.fault().reason, HasSubstr("in m/images/b.jpg (sample b)"));
+  write("m/images/b.jpg", "no image");
+  EXPECT_THAT(fault_of(annotation_at({48, 64})), HasSubstr("in m/images/b.jpg (sample b)"));
 }
 
 TEST(MpiiDatasetOnSharedData, ReadsTheJuggler) {
@@ -208,20 +173,20 @@ TEST(MpiiDatasetOnSharedData, ReadsTheJuggler) {
   spec.root = (data / "mpii").string();
   spec.split = "all";
   const auto dataset = open_mpii_dataset(spec, "/");
-  EXPECT_THAT(mpii_ids(*dataset), ElementsAre("000000001", "052475643"));
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("000000001", "052475643"));
   const LabelledFrame& juggler = dataset->labelled_frames()[0];
   EXPECT_EQ(juggler.frame.path, spec.root + "/sequences/000000001/00000007.jpg");
   // Frames 1..13 are there, 7 is labelled: six on either side.
   for (int step = -6; step <= 6; ++step) {
-    const PairedFrame paired_frame = dataset->paired_frame(juggler, step);
-    EXPECT_EQ(paired_frame.state, State::kPresent) << step;
-    EXPECT_EQ(paired_frame.frame.index, 7 + step);
-    EXPECT_TRUE(std::filesystem::exists(paired_frame.frame.path));
+    const PairedFrame found = dataset->paired_frame(juggler, step);
+    EXPECT_EQ(found.state, State::kPresent) << step;
+    EXPECT_EQ(found.frame.index, 7 + step);
+    EXPECT_TRUE(fs::exists(found.frame.path));
   }
-  EXPECT_EQ(dataset->paired_frame(juggler, 7).state, State::kBeyond);
-  EXPECT_EQ(dataset->paired_frame(juggler, -7).state, State::kBeyond);
+  EXPECT_THAT(paired(*dataset, 0, {7, -7}), Each("beyond"));
+  EXPECT_THAT(paired(*dataset, 1, {0, 1}), ElementsAre(StartsWith("present"), "beyond"));
 
-  const auto annotation = *dataset->annotation(juggler.label_key);
+  const Annotation annotation = annotation_of(*dataset);
   ASSERT_EQ(annotation.persons.size(), 2u);
   const Person& person = annotation.persons[0];
   EXPECT_EQ(person.joints[0], (Joint{{710, 620}, 1}));         // x 711, y 621, is_visible 1
@@ -231,15 +196,12 @@ TEST(MpiiDatasetOnSharedData, ReadsTheJuggler) {
   EXPECT_EQ(person.center, (Point{741, 349}));                 // 742, 350
   EXPECT_EQ(person.head_box, (Rectangle{705, 51, 775, 163}));  // 706, 52, 776, 164
   EXPECT_EQ(annotation.persons[1].joints, std::vector<Joint>(16, Joint{kMissingPoint, 0}));
-
   const auto original = nlohmann::json::parse(annotation.original);
-  EXPECT_EQ(original["annorect"][0]["annopoints"]["point"][1]["is_visible"], "1");
-  EXPECT_EQ(original["annorect"][0]["annopoints"]["point"].size(), 16u);
+  const auto& points = original["annorect"][0]["annopoints"]["point"];
+  EXPECT_EQ(points[1]["is_visible"], "1");
+  EXPECT_EQ(points.size(), 16u);
   EXPECT_EQ(original["act"]["act_name"], "soccer, juggling");
   EXPECT_EQ(original["annolist_keyframes"]["image"]["name"], "000000001/00000007.jpg");
-
-  EXPECT_EQ(dataset->paired_frame(dataset->labelled_frames()[1], 0).state, State::kPresent);
-  EXPECT_EQ(dataset->paired_frame(dataset->labelled_frames()[1], 1).state, State::kBeyond);
 }
 
 }  // namespace

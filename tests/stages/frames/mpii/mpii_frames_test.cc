@@ -1,39 +1,26 @@
 #include "stages/frames/mpii/mpii_frames.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <cmath>
-
-#include "manifests/values/faults.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
-
-class MpiiPlacesTest : public ::testing::Test {
+class MpiiPlacesTest : public FolderTest {
  protected:
   MpiiPlacesTest() { spec_.root = "m"; }
   MpiiPlaces find() const { return find_mpii_places(spec_, folder_.path()); }
 
-  testing::TemporaryFolder folder_;
+  const std::string keyframes_ = "mpii_human_pose_v1_sequences_keyframes.mat";
   SourceSpec spec_;
 };
 
 TEST_F(MpiiPlacesTest, FindsTheFilesInTheRoot) {
-  testing::write_file(folder_ / "m/mpii_human_pose_v1_u12_1.mat", "");
-  testing::write_file(folder_ / "m/mpii_human_pose_v1_sequences_keyframes.mat", "");
-  testing::write_file(folder_ / "m/mpii_human_pose_v1_sequences_batch2/x/1.jpg", "");
-  testing::write_file(folder_ / "m/mpii_human_pose_v1_sequences_batch1/y/1.jpg", "");
+  touch({"m/mpii_human_pose_v1_u12_1.mat", "m/" + keyframes_,
+         "m/mpii_human_pose_v1_sequences_batch2/x/1.jpg",
+         "m/mpii_human_pose_v1_sequences_batch1/y/1.jpg"});
   const MpiiPlaces places = find();
   EXPECT_EQ(places.annotations, "m/mpii_human_pose_v1_u12_1.mat");
-  EXPECT_EQ(places.keyframes, "m/mpii_human_pose_v1_sequences_keyframes.mat");
+  EXPECT_EQ(places.keyframes, "m/" + keyframes_);
   EXPECT_THAT(places.image_folders, ElementsAre("m/images"));
   EXPECT_THAT(places.sequence_folders,
               ElementsAre("m/sequences", "m/mpii_human_pose_v1_sequences_batch1",
@@ -41,150 +28,125 @@ TEST_F(MpiiPlacesTest, FindsTheFilesInTheRoot) {
 }
 
 TEST_F(MpiiPlacesTest, FindsTheFilesInTheDownloadsFolder) {
-  testing::write_file(folder_ / "m/mpii_human_pose_v1_u12_2/mpii_human_pose_v1_u12_1.mat", "");
-  testing::write_file(folder_ / "m/mpii_human_pose_v1_sequences_keyframes.mat", "");
+  touch({"m/mpii_human_pose_v1_u12_2/mpii_human_pose_v1_u12_1.mat", "m/" + keyframes_});
   EXPECT_EQ(find().annotations, "m/mpii_human_pose_v1_u12_2/mpii_human_pose_v1_u12_1.mat");
-  EXPECT_EQ(find().keyframes, "m/mpii_human_pose_v1_sequences_keyframes.mat");
+  EXPECT_EQ(find().keyframes, "m/" + keyframes_);
 }
 
 TEST_F(MpiiPlacesTest, TakesTheManifestsWord) {
-  testing::write_file(folder_ / "m/x", "");
-  testing::write_file(folder_ / "labels/mine.mat", "");
-  testing::write_file(folder_ / "labels/mpii_human_pose_v1_sequences_keyframes.mat", "");
-  testing::write_file(folder_ / "videos/x/1.jpg", "");
+  touch({"m/x", "labels/mine.mat", "labels/" + keyframes_, "videos/x/1.jpg"});
   spec_.annotations = "labels/mine.mat";
   spec_.sequences = "videos";
   EXPECT_EQ(find().annotations, "labels/mine.mat");
-  EXPECT_EQ(find().keyframes, "labels/mpii_human_pose_v1_sequences_keyframes.mat");
+  EXPECT_EQ(find().keyframes, "labels/" + keyframes_);
   EXPECT_THAT(find().sequence_folders, ElementsAre("videos"));
 }
 
 TEST_F(MpiiPlacesTest, SaysWhatIsMissing) {
-  EXPECT_THAT([&] { find(); }, ThrowsMessage<InputError>(HasSubstr(
-                                   "expected a folder, got nothing that can be read, in m")));
-  testing::write_file(folder_ / "m/x", "");
-  EXPECT_THAT([&] { find(); }, ThrowsMessage<InputError>(AllOf(
-                                   HasSubstr("expected mpii_human_pose_v1_u12_1.mat, got none"),
-                                   HasSubstr("m or "), HasSubstr("mpii_human_pose_v1_u12_2"))));
-  testing::write_file(folder_ / "m/mpii_human_pose_v1_u12_1.mat", "");
+  EXPECT_THROWS(find(), InputError, "expected a folder, got nothing that can be read, in m");
+  write("m/x");
+  EXPECT_THROWS(find(), InputError, "expected mpii_human_pose_v1_u12_1.mat, got none", "m or ",
+                "mpii_human_pose_v1_u12_2");
+  write("m/mpii_human_pose_v1_u12_1.mat");
   EXPECT_EQ(find().keyframes, "") << "there are no sequences";
-  testing::write_file(folder_ / "m/sequences/x/1.jpg", "");
-  EXPECT_THAT(
-      [&] { find(); },
-      ThrowsMessage<InputError>(HasSubstr("expected mpii_human_pose_v1_sequences_keyframes.mat")));
+  write("m/sequences/x/1.jpg");
+  EXPECT_THROWS(find(), InputError, "expected " + keyframes_);
   spec_.pairs.stills.emplace();
   EXPECT_EQ(find().keyframes, "") << "stills need none";
   spec_.pairs.stills.reset();
-  testing::write_file(folder_ / "m/mpii_human_pose_v1_sequences_keyframes.mat", "");
+  write("m/" + keyframes_);
   spec_.sequences = "videos";
-  EXPECT_THAT([&] { find(); }, ThrowsMessage<InputError>(HasSubstr("videos")));
+  EXPECT_THROWS(find(), InputError, "videos");
 }
 
 TEST(SameBytes, ComparesSizeAndContent) {
-  const testing::TemporaryFolder folder;
-  testing::write_file(folder / "a", std::string_view("x\0y", 3));
-  testing::write_file(folder / "same", std::string_view("x\0y", 3));
-  testing::write_file(folder / "other", std::string_view("x\0z", 3));
-  testing::write_file(folder / "longer", std::string_view("x\0yy", 4));
-  testing::write_file(folder / "empty", "");
-  EXPECT_TRUE(same_bytes(folder / "a", folder / "same"));
-  EXPECT_TRUE(same_bytes(folder / "empty", folder / "empty"));
-  EXPECT_FALSE(same_bytes(folder / "a", folder / "other"));
-  EXPECT_FALSE(same_bytes(folder / "a", folder / "longer"));
-  EXPECT_FALSE(same_bytes(folder / "a", folder / "absent"));
-  EXPECT_FALSE(same_bytes(folder / "absent", folder / "absent"));
+  const TemporaryFolder folder;
+  for (const auto& [name, bytes] : {std::pair("a", "x\0y"s),
+                                    {"same", "x\0y"s},
+                                    {"other", "x\0z"s},
+                                    {"longer", "x\0yy"s},
+                                    {"empty", ""s}}) {
+    write_file(folder / name, bytes);
+  }
+  for (const auto& [first, second, same] : {std::tuple("a", "same", true),
+                                            {"empty", "empty", true},
+                                            {"a", "other", false},
+                                            {"a", "longer", false},
+                                            {"a", "absent", false},
+                                            {"absent", "absent", false}}) {
+    EXPECT_EQ(same_bytes(folder / first, folder / second), same) << first << " " << second;
+  }
 }
 
-using State = PairedFrame::State;
-
 /// Images a, b; sequence a with frames 5, 6, 7, 9 and keyframe 7; sequence c in a batch folder.
-class MpiiFramesTest : public ::testing::Test {
+class MpiiFramesTest : public FolderTest {
  protected:
   MpiiFramesTest() {
     for (const char* name :
          {"m/images/a.jpg", "m/images/b.jpg", "m/sequences/a/00000005.jpg",
           "m/sequences/a/00000006.jpg", "m/sequences/a/00000007.jpg", "m/sequences/a/00000009.jpg",
           "m/sequences/mpii_human_pose_v1_sequences_batch3/c/00000001.jpg"}) {
-      testing::write_file(folder_ / name, name);
+      write(name, name);
     }
   }
   MpiiFrames open() const { return {folder_.path(), {"m/images"}, {"m/sequences", "m/absent"}}; }
-
-  testing::TemporaryFolder folder_;
+  /// The frames so many steps after an image's keyframe.
+  Texts steps(const std::string& image, const std::string& keyframe,
+              std::initializer_list<int> steps) const {
+    const MpiiFrames frames = open();
+    Texts found;
+    for (const int step : steps) {
+      found.push_back(text_of(frames.paired_frame(frames.labelled(image, keyframe), step)));
+    }
+    return found;
+  }
 };
 
 TEST_F(MpiiFramesTest, AKeyframeWithAFolderIsTheLabelledFrame) {
-  const MpiiFrames frames = open();
-  const LabelledFrame labelled = frames.labelled("a.jpg", "a/00000007.jpg");
+  const LabelledFrame labelled = open().labelled("a.jpg", "a/00000007.jpg");
   EXPECT_EQ(labelled.sample_id, "a");
   EXPECT_EQ(labelled.sequence, "a");
-  EXPECT_EQ(labelled.frame, (FrameRef{"m/sequences/a/00000007.jpg", 7}));
   EXPECT_TRUE(std::isnan(labelled.frame.time_s));
-
-  const PairedFrame itself = frames.paired_frame(labelled, 0);
-  EXPECT_EQ(itself.state, State::kPresent);
-  EXPECT_EQ(itself.frame, labelled.frame);
-  const PairedFrame before = frames.paired_frame(labelled, -2);
-  EXPECT_EQ(before.state, State::kPresent);
-  EXPECT_EQ(before.frame, (FrameRef{"m/sequences/a/00000005.jpg", 5}));
-  const PairedFrame missing = frames.paired_frame(labelled, 1);
-  EXPECT_EQ(missing.state, State::kMissing);
-  EXPECT_EQ(missing.frame.path, "m/sequences/a/00000008.jpg");
-  EXPECT_EQ(frames.paired_frame(labelled, 2).state, State::kPresent);
-  EXPECT_EQ(frames.paired_frame(labelled, 3).state, State::kBeyond);
-  EXPECT_EQ(frames.paired_frame(labelled, -3).state, State::kBeyond);
+  EXPECT_THAT(
+      steps("a.jpg", "a/00000007.jpg", {-3, -2, 0, 1, 2, 3}),
+      ElementsAre("beyond", "present m/sequences/a/00000005.jpg 5",
+                  "present m/sequences/a/00000007.jpg 7", "missing m/sequences/a/00000008.jpg 8",
+                  "present m/sequences/a/00000009.jpg 9", "beyond"));
 }
 
 TEST_F(MpiiFramesTest, LostFramesAreMissingHoweverManyAreLost) {
-  testing::write_file(folder_ / "m/sequences/a/00000040.jpg", "");
-  for (const char* name : {"00000005.jpg", "00000006.jpg", "00000009.jpg"}) {
-    std::filesystem::remove(folder_ / "m/sequences/a" / name);
+  write("m/sequences/a/00000040.jpg");
+  for (const int number : {5, 6, 9}) {
+    fs::remove(at("m/sequences/a/0000000" + std::to_string(number) + ".jpg"));
   }
-  const MpiiFrames frames = open();
-  const PairedFrame next = frames.paired_frame(frames.labelled("a.jpg", "a/00000007.jpg"), 1);
-  EXPECT_EQ(next.state, State::kMissing);
-  EXPECT_EQ(next.frame.path, "m/sequences/a/00000008.jpg");
+  EXPECT_THAT(steps("a.jpg", "a/00000007.jpg", {1}),
+              ElementsAre("missing m/sequences/a/00000008.jpg 8"));
 }
 
-TEST_F(MpiiFramesTest, AnAbsentKeyframeIsAMissingFrame) {
-  const MpiiFrames frames = open();
-  const LabelledFrame labelled = frames.labelled("a.jpg", "a/00000008.jpg");
-  const PairedFrame itself = frames.paired_frame(labelled, 0);
-  EXPECT_EQ(itself.state, State::kMissing);
-  EXPECT_EQ(itself.frame, labelled.frame);
-  EXPECT_EQ(frames.paired_frame(labelled, -1).state, State::kPresent);
+TEST_F(MpiiFramesTest, AnAbsentKeyframeOrImageIsAMissingFrame) {
+  EXPECT_THAT(
+      steps("a.jpg", "a/00000008.jpg", {-1, 0}),
+      ElementsAre("present m/sequences/a/00000007.jpg 7", "missing m/sequences/a/00000008.jpg 8"));
+  EXPECT_THAT(steps("z.jpg", "", {0}), ElementsAre("missing m/images/z.jpg -1"));
 }
 
 TEST_F(MpiiFramesTest, FindsSequencesInBatchFolders) {
-  const MpiiFrames frames = open();
-  EXPECT_EQ(frames.labelled("c.jpg", "c/00000001.jpg").frame.path,
+  EXPECT_EQ(open().labelled("c.jpg", "c/00000001.jpg").frame.path,
             "m/sequences/mpii_human_pose_v1_sequences_batch3/c/00000001.jpg");
 }
 
 TEST_F(MpiiFramesTest, AnImageWithoutSequenceHasNoPairedFrames) {
-  const MpiiFrames frames = open();
-  for (const char* keyframe :
+  for (const std::string keyframe :
        {"b/00000020.jpg", "", "00000020.jpg", "/1.jpg", "a/x.jpg", "a/-1.jpg"}) {
-    const LabelledFrame labelled = frames.labelled("b.jpg", keyframe);
-    EXPECT_EQ(labelled.sequence, "");
-    EXPECT_EQ(labelled.frame.path, "m/images/b.jpg");
-    EXPECT_EQ(labelled.frame.index, keyframe[0] == 'b' ? 20 : -1) << keyframe;
-    EXPECT_EQ(frames.paired_frame(labelled, 0).state, State::kPresent);
-    EXPECT_EQ(frames.paired_frame(labelled, 1).state, State::kBeyond);
-    EXPECT_EQ(frames.paired_frame(labelled, -1).state, State::kBeyond);
+    EXPECT_EQ(open().labelled("b.jpg", keyframe).sequence, "");
+    const std::string number = keyframe == "b/00000020.jpg" ? "20" : "-1";
+    EXPECT_THAT(steps("b.jpg", keyframe, {-1, 0, 1}),
+                ElementsAre("beyond", "present m/images/b.jpg " + number, "beyond"));
   }
 }
 
-TEST_F(MpiiFramesTest, AnAbsentImageIsAMissingFrame) {
-  const MpiiFrames frames = open();
-  const PairedFrame itself = frames.paired_frame(frames.labelled("z.jpg", ""), 0);
-  EXPECT_EQ(itself.state, State::kMissing);
-  EXPECT_EQ(itself.frame.path, "m/images/z.jpg");
-}
-
 TEST_F(MpiiFramesTest, LooksForImagesInEachFolderInTurn) {
-  testing::write_file(folder_ / "m/root_only.jpg", "x");
-  testing::write_file(folder_ / "m/a.jpg", "x");
+  touch({"m/root_only.jpg", "m/a.jpg"});
   const MpiiFrames frames(folder_.path(), {"m/images", "m"}, {});
   EXPECT_EQ(frames.labelled("root_only.jpg", "").frame.path, "m/root_only.jpg");
   EXPECT_EQ(frames.labelled("a.jpg", "").frame.path, "m/images/a.jpg");
@@ -192,10 +154,9 @@ TEST_F(MpiiFramesTest, LooksForImagesInEachFolderInTurn) {
 
 TEST_F(MpiiFramesTest, FindsTheKeyframeByItsBytes) {
   EXPECT_EQ(open().find_keyframe("a.jpg"), "");
-  testing::write_file(folder_ / "m/images/a.jpg", "m/sequences/a/00000006.jpg");
+  write("m/images/a.jpg", "m/sequences/a/00000006.jpg");
   EXPECT_EQ(open().find_keyframe("a.jpg"), "a/00000006.jpg");
-  EXPECT_EQ(open().find_keyframe("b.jpg"), "");
-  EXPECT_EQ(open().find_keyframe("z.jpg"), "");
+  for (const char* other : {"b.jpg", "z.jpg"}) EXPECT_EQ(open().find_keyframe(other), "");
 }
 
 TEST(WithoutExtension, CutsTheLastOneOnly) {
@@ -207,14 +168,11 @@ TEST(WithoutExtension, CutsTheLastOneOnly) {
 
 TEST(SortSamples, SortsAndRefusesTwoOfOneName) {
   std::vector<LabelledFrame> frames(3);
-  frames[0].sample_id = "b";
-  frames[1].sample_id = "c";
-  frames[2].sample_id = "a";
+  for (const std::size_t i : {0, 1, 2}) frames[i].sample_id = "bca"[i];
   sort_samples(frames, "x.mat");
-  EXPECT_EQ(frames[0].sample_id + frames[1].sample_id + frames[2].sample_id, "abc");
+  EXPECT_THAT(ids_of(frames), ElementsAre("a", "b", "c"));
   frames[2].sample_id = "a";
-  EXPECT_THAT([&] { sort_samples(frames, "x.mat"); },
-              ThrowsMessage<InputError>(HasSubstr("got a twice, in x.mat")));
+  EXPECT_THROWS(sort_samples(frames, "x.mat"), InputError, "got a twice, in x.mat");
 }
 
 }  // namespace

@@ -1,54 +1,42 @@
 #include "stages/frames/mpii/mpii_list_dataset.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "tests/stages/frames/frames_fixture.h"
 #include "tests/stages/frames/mpii/mpii_fixture.h"
-#include "tests/testing/image_file.h"
-#include "tests/testing/shared_data.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
 namespace mat = testing::mat;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::ThrowsMessage;
 
-using State = PairedFrame::State;
-
-class MpiiListDatasetTest : public ::testing::Test {
+class MpiiListDatasetTest : public FolderTest {
  protected:
   MpiiListDatasetTest() {
     spec_.dataset = DatasetKind::kMpiiList;
     spec_.root = "m";
     spec_.annotations = "labels/list.json";
-    testing::write_file(folder_ / "m/images/b.jpg", "image");
-    testing::write_file(folder_ / "labels/list.json",
-                        R"([{"image": "b.jpg", "scale": 1}, {"image": "a.jpg", "scale": 2},
-                            {"image": "b.jpg", "scale": 3, "center": [11, 21]}])");
+    write("m/images/b.jpg", "image");
+    write("labels/list.json", R"([{"image": "b.jpg", "scale": 1}, {"image": "a.jpg", "scale": 2},
+                                  {"image": "b.jpg", "scale": 3, "center": [11, 21]}])");
     for (const char* frame : {"v/b/00000003.jpg", "v/b/00000004.jpg", "v/b/00000005.jpg"}) {
-      testing::write_file(folder_ / frame, frame);
+      write(frame, frame);
     }
+  }
+  void write_keyframes() {
+    spec_.sequences = "v";
+    mat::write_mat(at("mpii_human_pose_v1_sequences_keyframes.mat"), "annolist_keyframes",
+                   mat::structs({{{"image", mat::image("b/00000004.jpg")}}}));
   }
   std::unique_ptr<Dataset> open() const { return open_mpii_list_dataset(spec_, folder_.path()); }
 
-  testing::TemporaryFolder folder_;
   SourceSpec spec_;
 };
 
 TEST_F(MpiiListDatasetTest, RowsOfOneImageAreOneSample) {
   const auto dataset = open();
-  ASSERT_EQ(dataset->labelled_frames().size(), 2u);
-  const LabelledFrame& frame = dataset->labelled_frames()[1];
-  EXPECT_EQ(frame.sample_id, "b");
-  const auto annotation = *dataset->annotation(frame.label_key);
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("a", "b"));
+  const Annotation annotation = annotation_of(*dataset, 1);
   EXPECT_EQ(annotation.original,
             R"([{"image":"b.jpg","scale":1},{"image":"b.jpg","scale":3,"center":[11,21]}])");
   ASSERT_EQ(annotation.persons.size(), 2u);
@@ -59,22 +47,16 @@ TEST_F(MpiiListDatasetTest, RowsOfOneImageAreOneSample) {
 
 TEST_F(MpiiListDatasetTest, WithoutSequencesThereAreNoPairedFrames) {
   const auto dataset = open();
-  const auto& frames = dataset->labelled_frames();
-  EXPECT_EQ(dataset->paired_frame(frames[0], 0).state, State::kMissing);  // a.jpg is absent
-  EXPECT_EQ(dataset->paired_frame(frames[1], 0).state, State::kPresent);
-  EXPECT_EQ(dataset->paired_frame(frames[1], 0).frame.path, "m/images/b.jpg");
-  EXPECT_EQ(dataset->paired_frame(frames[1], -1).state, State::kBeyond);
+  EXPECT_THAT(paired(*dataset, 0, {0}), ElementsAre("missing m/images/a.jpg -1"));
+  EXPECT_THAT(paired(*dataset, 1, {-1, 0}), ElementsAre("beyond", "present m/images/b.jpg -1"));
   EXPECT_THAT(dataset->notes(), IsEmpty());
 }
 
 TEST_F(MpiiListDatasetTest, TheKeyframesFileTellsTheFrame) {
-  spec_.sequences = "v";
-  mat::write_mat(folder_ / "mpii_human_pose_v1_sequences_keyframes.mat", "annolist_keyframes",
-                 mat::structs({{{"image", mat::image("b/00000004.jpg")}}}));
+  write_keyframes();
   const auto dataset = open();
-  const LabelledFrame& frame = dataset->labelled_frames()[1];
-  EXPECT_EQ(frame.frame, (FrameRef{"v/b/00000004.jpg", 4}));
-  EXPECT_EQ(dataset->paired_frame(frame, -1).frame, (FrameRef{"v/b/00000003.jpg", 3}));
+  EXPECT_THAT(paired(*dataset, 1, {0, -1}),
+              ElementsAre("present v/b/00000004.jpg 4", "present v/b/00000003.jpg 3"));
   EXPECT_THAT(dataset->annotation_files(),
               ElementsAre("labels/list.json", "mpii_human_pose_v1_sequences_keyframes.mat"));
   EXPECT_THAT(dataset->notes(),
@@ -83,36 +65,28 @@ TEST_F(MpiiListDatasetTest, TheKeyframesFileTellsTheFrame) {
 
 TEST_F(MpiiListDatasetTest, WithoutTheKeyframesFileTheBytesTell) {
   spec_.sequences = "v";
-  testing::write_file(folder_ / "m/images/b.jpg", "v/b/00000005.jpg");
+  write("m/images/b.jpg", "v/b/00000005.jpg");
   EXPECT_EQ(open()->labelled_frames()[1].frame, (FrameRef{"v/b/00000005.jpg", 5}));
 }
 
 TEST_F(MpiiListDatasetTest, LabelsAreInPixelsOfTheFrame) {
-  spec_.sequences = "v";
-  mat::write_mat(folder_ / "mpii_human_pose_v1_sequences_keyframes.mat", "annolist_keyframes",
-                 mat::structs({{{"image", mat::image("b/00000004.jpg")}}}));
-  testing::write_flat_image(folder_ / "m/images/b.jpg", {48, 64}, 100);
-  testing::write_flat_image(folder_ / "v/b/00000004.jpg", {24, 32}, 100);
-  const auto half = *open()->annotation("b.jpg");
+  write_keyframes();
+  images({"m/images/b.jpg"}, {48, 64}, 100);
+  images({"v/b/00000004.jpg"}, {24, 32}, 100);
+  const Annotation half = annotation_of(*open(), "b.jpg");
   // 11, 21 counted from 1 are 10, 20; half as large: (10 + 0.5) / 2 - 0.5.
   EXPECT_EQ(half.persons.at(1).center, (Point{4.75, 9.75}));
   EXPECT_DOUBLE_EQ(half.persons.at(1).scale, 1.5);
   EXPECT_THAT(half.original, HasSubstr(R"("scale":3,"center":[11,21])"));
-
-  testing::write_flat_image(folder_ / "v/b/00000004.jpg", {32, 32}, 100);
-  const auto square = open()->annotation("b.jpg");
-  ASSERT_TRUE(is_fault(square));
-  EXPECT_THAT(square.fault().reason, HasSubstr("got 32x32, in v/b/00000004.jpg"));
+  images({"v/b/00000004.jpg"}, {32, 32}, 100);
+  EXPECT_THAT(fault_of(open()->annotation("b.jpg")), HasSubstr("got 32x32, in v/b/00000004.jpg"));
 }
 
 TEST_F(MpiiListDatasetTest, AMalformedRowIsAFaultOfItsSampleOnly) {
-  testing::write_file(
-      folder_ / "labels/list.json",
-      R"([{"image": "b.jpg"}, {"image": "b.jpg", "scale": "x"}, {"image": "a.jpg"}])");
+  write("labels/list.json",
+        R"([{"image": "b.jpg"}, {"image": "b.jpg", "scale": "x"}, {"image": "a.jpg"}])");
   const auto dataset = open();
-  const auto bad = dataset->annotation("b.jpg");
-  ASSERT_TRUE(is_fault(bad));
-  EXPECT_EQ(bad.fault().reason,
+  EXPECT_EQ(fault_of(dataset->annotation("b.jpg")),
             "expected a finite number, got \"x\" at scale of its person 1, in "
             "labels/list.json:b.jpg (sample b)");
   EXPECT_EQ(dataset->label_place("b.jpg"), "labels/list.json:b.jpg");
@@ -121,12 +95,12 @@ TEST_F(MpiiListDatasetTest, AMalformedRowIsAFaultOfItsSampleOnly) {
 }
 
 TEST_F(MpiiListDatasetTest, RefusesWhatItCannotOpen) {
-  testing::write_file(folder_ / "labels/list.json", R"([{"image": "b.jpg"}, {"image": "b.png"}])");
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("got b twice")));
+  write("labels/list.json", R"([{"image": "b.jpg"}, {"image": "b.png"}])");
+  EXPECT_THROWS(open(), InputError, "got b twice");
   spec_.sequences = "absent";
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("absent")));
+  EXPECT_THROWS(open(), InputError, "absent");
   spec_.annotations.reset();
-  EXPECT_THROW(open(), UsageError);
+  EXPECT_THROWS(open(), UsageError, "annotations");
 }
 
 /// The same five images in both forms. The table cuts the fractions off (only head joints have

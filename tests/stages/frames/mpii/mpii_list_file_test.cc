@@ -1,35 +1,23 @@
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <cmath>
 #include <stdexcept>
 
-#include "manifests/values/faults.h"
 #include "stages/frames/mpii/detail/mpii_list_dataset.h"
+#include "tests/stages/frames/frames_fixture.h"
 #include "tests/testing/hdf5_file.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::ThrowsMessage;
 using testing::write_hdf5;
 
 using Numbers = std::vector<double>;
-using Texts = std::vector<std::string>;
 
-class MpiiTableTest : public ::testing::Test {
+class MpiiTableTest : public FolderTest {
  protected:
   MpiiList read() const { return read_mpii_table(file_); }
 
-  testing::TemporaryFolder folder_;
-  std::filesystem::path file_ = folder_ / "t.h5";
+  fs::path file_ = at("t.h5");
 };
 
 TEST_F(MpiiTableTest, ReadsColumnsOfAnyRankAsFieldsOfTheRows) {
@@ -45,12 +33,12 @@ TEST_F(MpiiTableTest, ReadsColumnsOfAnyRankAsFieldsOfTheRows) {
 }
 
 TEST_F(MpiiTableTest, NamesMayBeVariableTextOrCodes) {
-  write_hdf5(file_, {{"imgname", {{2}, Texts{"a.jpg", ""}}}});
-  EXPECT_EQ(read().rows[0]["imgname"], "a.jpg");
-  EXPECT_EQ(read().rows[1]["imgname"], "");
-  write_hdf5(file_, {{"imgname", {{2, 3}, Numbers{'a', 'b', 0, 'x', 'y', 'z'}}}});
-  EXPECT_EQ(read().rows[0]["imgname"], "ab");
-  EXPECT_EQ(read().rows[1]["imgname"], "xyz");
+  const auto names = [&](const testing::Hdf5Dataset& column) {
+    write_hdf5(file_, {{"imgname", column}});
+    return Texts{read().rows.at(0)["imgname"], read().rows.at(1)["imgname"]};
+  };
+  EXPECT_THAT(names({{2}, Texts{"a.jpg", ""}}), ElementsAre("a.jpg", ""));
+  EXPECT_THAT(names({{2, 3}, Numbers{'a', 'b', 0, 'x', 'y', 'z'}}), ElementsAre("ab", "xyz"));
 }
 
 TEST_F(MpiiTableTest, NotesColumnsOfAnotherLength) {
@@ -66,34 +54,29 @@ TEST_F(MpiiTableTest, NotesColumnsOfAnotherLength) {
 
 TEST_F(MpiiTableTest, RefusesDamagedFilesAndTablesWithoutNames) {
   write_hdf5(file_, {{"scale", {{1}, Numbers{1}}}});
-  EXPECT_THAT([&] { read(); },
-              ThrowsMessage<InputError>(
-                  AllOf(HasSubstr("expected a column imgname, got none"), HasSubstr("t.h5"))));
-  const std::string bytes = testing::read_file(file_);
-  testing::write_file(file_, bytes.substr(0, bytes.size() / 2));
-  EXPECT_THAT([&] { read(); }, ThrowsMessage<InputError>(HasSubstr("expected a whole HDF5 file")));
+  EXPECT_THROWS(read(), InputError, "expected a column imgname, got none", "t.h5");
+  const std::string bytes = read_file(file_);
+  write_file(file_, bytes.substr(0, bytes.size() / 2));
+  EXPECT_THROWS(read(), InputError, "expected a whole HDF5 file");
 }
 
-class MpiiListFileTest : public ::testing::Test {
+class MpiiListFileTest : public FolderTest {
  protected:
   void expect_refused(const std::string& bytes, const std::string& message) const {
-    testing::write_file(file_, bytes);
-    EXPECT_THAT([&] { read_mpii_list(file_); },
-                ThrowsMessage<InputError>(AllOf(HasSubstr(message), HasSubstr("list.json"))))
-        << bytes;
+    write_file(file_, bytes);
+    EXPECT_THROWS(read_mpii_list(file_), InputError, message, "list.json") << bytes.substr(0, 99);
   }
 
-  testing::TemporaryFolder folder_;
-  std::filesystem::path file_ = folder_ / "list.json";
+  fs::path file_ = at("list.json");
 };
 
 TEST_F(MpiiListFileTest, ReadsAJsonListWithEveryField) {
-  testing::write_file(file_, R"([{"z": 1.25, "image": "a.jpg", "extra": {"k": []}}])");
+  write_file(file_, R"([{"z": 1.25, "image": "a.jpg", "extra": {"k": []}}])");
   const MpiiList list = read_mpii_list(file_);
   EXPECT_EQ(list.form, MpiiListForm::kJsonList);
   ASSERT_EQ(list.rows.size(), 1u);
   EXPECT_EQ(list.rows[0].dump(), R"({"z":1.25,"image":"a.jpg","extra":{"k":[]}})");
-  testing::write_file(file_, "[]");
+  write_file(file_, "[]");
   EXPECT_TRUE(read_mpii_list(file_).rows.empty());
 }
 
@@ -102,7 +85,7 @@ TEST_F(MpiiListFileTest, KnowsATableByItsBytesNotItsName) {
   EXPECT_EQ(read_mpii_list(file_).form, MpiiListForm::kTable);
 }
 
-TEST_F(MpiiListFileTest, RefusesWhatIsNeither) {
+TEST_F(MpiiListFileTest, RefusesWhatIsNeitherAndDoubleKeysAndNestingWithoutEnd) {
   expect_refused("", "got nothing readable");
   expect_refused("{", "expected a JSON list of people or an HDF5 table");
   expect_refused(R"([{"image": "a.jpg"}] x)", "expected a JSON list of people or an HDF5 table");
@@ -110,9 +93,6 @@ TEST_F(MpiiListFileTest, RefusesWhatIsNeither) {
   expect_refused(R"([{"image": "a.jpg"}, {"image": ""}])", "(row 1)");
   expect_refused(R"([{"imgname": "a.jpg"}])", "expected an image's name under \"image\"");
   expect_refused("[3]", "(row 0)");
-}
-
-TEST_F(MpiiListFileTest, RefusesDoubleKeysAndNestingWithoutEnd) {
   expect_refused(R"([{"image": "a.jpg", "scale": 1, "scale": 2}])",
                  "$[0].scale: expected the key once, got it twice");
   expect_refused("[{\"image\": \"a.jpg\", \"center\": " + std::string(100'000, '[') +
@@ -122,8 +102,7 @@ TEST_F(MpiiListFileTest, RefusesDoubleKeysAndNestingWithoutEnd) {
 
 TEST_F(MpiiListFileTest, TakesRegularFilesOnlyAndNeverWaits) {
   ASSERT_EQ(::mkfifo(file_.c_str(), 0600), 0);
-  EXPECT_THAT([&] { read_mpii_list(file_); },
-              ThrowsMessage<InputError>(HasSubstr("nothing readable (Not a regular file)")));
+  EXPECT_THROWS(read_mpii_list(file_), InputError, "nothing readable (Not a regular file)");
 }
 
 using Json = nlohmann::ordered_json;
@@ -157,20 +136,15 @@ TEST(MpiiListRow, EveryCoordinateLosesOne) {
 
 TEST(MpiiListRow, EachFormMarksMissingJointsItsOwnWay) {
   const Joint missing{kMissingPoint, 0};
-  const auto joint3 = [](MpiiListForm form, const Json& at) {
-    return parse_mpii_list_row(row_with(form, at, 0), form).joints[3];
+  const auto joint3 = [](MpiiListForm form, const Json& at, int visible = 0) {
+    return parse_mpii_list_row(row_with(form, at, visible), form).joints[3];
   };
   EXPECT_EQ(joint3(MpiiListForm::kJsonList, {-1.0, -1.0}), missing);
   EXPECT_EQ(joint3(MpiiListForm::kTable, {0.0, 0.0}), missing);
+  EXPECT_EQ(joint3(MpiiListForm::kTable, {0, 0}, 1), missing) << "it is never visible";
   // What marks a missing joint in one form is a place in the other; so is a zero in one coordinate.
   EXPECT_EQ(joint3(MpiiListForm::kTable, {-1.0, -1.0}).at, (Point{-2, -2}));
   EXPECT_EQ(joint3(MpiiListForm::kTable, {325.0, 0.0}).at, (Point{324, -1}));
-}
-
-TEST(MpiiListRow, AMissingJointIsNeverVisible) {
-  const auto form = MpiiListForm::kTable;
-  EXPECT_EQ(parse_mpii_list_row(row_with(form, {0, 0}, 1), form).joints[3],
-            (Joint{kMissingPoint, 0}));
 }
 
 TEST(MpiiListRow, TestImagesHaveNoJoints) {
@@ -191,26 +165,24 @@ TEST(MpiiListRow, JointsWithoutVisibilityAreOfUnknownVisibility) {
 
 TEST(MpiiListRow, RefusesMalformedRows) {
   const auto form = MpiiListForm::kJsonList;
-  const auto expect_refused = [&](const Json& row, const char* message) {
-    EXPECT_THAT([&] { parse_mpii_list_row(row, form); },
-                ThrowsMessage<std::invalid_argument>(HasSubstr(message)));
+  const auto with = [&](const char* key, const Json& value) {
+    Json row = row_with(form, {1, 2}, 1);
+    row[key] = value;
+    return row;
   };
-  expect_refused(row_with(form, {1, nullptr}, 1),
-                 "expected two finite numbers, got [1,null] at joints[3]");
-  expect_refused(row_with(form, {1, 2, 3}, 1), "expected two finite numbers");
-  expect_refused(row_with(form, {1, 2}, 0.5), "expected 0 or 1, got 0.5 at joints_vis[3]");
-  Json row = row_with(form, {1, 2}, 1);
-  row["joints"].erase(0);
-  expect_refused(row, "expected 16 elements");
-  row = row_with(form, {1, 2}, 1);
-  row["joints_vis"] = 1;
-  expect_refused(row, "expected 16 elements, got 1 at joints_vis");
-  row = row_with(form, {1, 2}, 1);
-  row["scale"] = "4";
-  expect_refused(row, "expected a finite number, got \"4\" at scale");
-  row["scale"] = 4;
-  row["center"] = 7;
-  expect_refused(row, "expected two finite numbers, got 7 at center");
+  Json fifteen = row_with(form, {1, 2}, 1);
+  fifteen["joints"].erase(0);
+  const std::pair<Json, const char*> cases[] = {
+      {row_with(form, {1, nullptr}, 1), "expected two finite numbers, got [1,null] at joints[3]"},
+      {row_with(form, {1, 2, 3}, 1), "expected two finite numbers"},
+      {row_with(form, {1, 2}, 0.5), "expected 0 or 1, got 0.5 at joints_vis[3]"},
+      {fifteen, "expected 16 elements"},
+      {with("joints_vis", 1), "expected 16 elements, got 1 at joints_vis"},
+      {with("scale", "4"), "expected a finite number, got \"4\" at scale"},
+      {with("center", 7), "expected two finite numbers, got 7 at center"}};
+  for (const auto& [row, message] : cases) {
+    EXPECT_THROWS(parse_mpii_list_row(row, form), std::invalid_argument, message);
+  }
 }
 
 }  // namespace

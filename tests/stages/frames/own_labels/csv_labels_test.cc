@@ -1,15 +1,9 @@
 #include "stages/frames/own_labels/detail/csv_labels.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::SizeIs;
-using ::testing::ThrowsMessage;
 
 constexpr char kTableHeader[] = "image,class,left,top,right,bottom,track\n";
 
@@ -19,9 +13,8 @@ auto read_csv(const std::string& rows) {
 
 std::string csv_fault(const std::string& rows) {
   const auto images = read_csv(rows + "other.png,car,0,0,1,1,\n");
-  EXPECT_FALSE(is_fault(images.at("other.png")));  // of its image alone
-  const auto& image = images.at("a.png");
-  return is_fault(image) ? image.fault().reason : "no fault";
+  EXPECT_EQ(fault_of(images.at("other.png")), "no fault");  // of its image alone
+  return fault_of(images.at("a.png"));
 }
 
 TEST(CsvLabels, HaveARowABox) {
@@ -55,14 +48,14 @@ TEST(CsvLabels, ARowThatIsThereAlreadyIsLeftOut) {
   const auto images = read_csv(
       "a.png,car,1,2,3,4,5\na.png,bus,1,2,3,4,\r\na.png,car,1,2,3,4,5\nb.png,bus,1,2,3,4,\n"
       "a.png,bus,1,2,3,4,\n");
-  ASSERT_FALSE(is_fault(images.at("a.png"))) << images.at("a.png").fault().reason;
+  ASSERT_FALSE(is_fault(images.at("a.png"))) << fault_of(images.at("a.png"));
   const auto read = numbered(*images.at("a.png"), {"bus", "car"}, {30, 40}, "labels.csv#a.png");
   ASSERT_THAT(read->boxes, SizeIs(2));
   EXPECT_EQ(read->boxes[0].track_id, 5);
   EXPECT_THAT(read->left_out,
-              ::testing::ElementsAre("expected each line once, got it again, in labels.csv:4",
-                                     "expected each line once, got it again, in labels.csv:6"));
-  EXPECT_THAT(read->left_out_at, ::testing::ElementsAre(2u, 3u));
+              ElementsAre("expected each line once, got it again, in labels.csv:4",
+                          "expected each line once, got it again, in labels.csv:6"));
+  EXPECT_THAT(read->left_out_at, ElementsAre(2u, 3u));
   EXPECT_THAT(images.at("b.png")->boxes, SizeIs(1));
 }
 
@@ -89,7 +82,7 @@ TEST(CsvLabels, ColumnsAreCalledAsToolsCallThem) {
         "frame,image,label,x1,y1,x2,y2\n12,a.png,car,1,2,4,6\n"}) {
     const auto images = parse_csv_labels(table, "labels.csv");
     ASSERT_THAT(images, SizeIs(1)) << table;
-    ASSERT_FALSE(is_fault(images.at("a.png"))) << images.at("a.png").fault().reason;
+    ASSERT_FALSE(is_fault(images.at("a.png"))) << fault_of(images.at("a.png"));
     EXPECT_EQ(images.at("a.png")->boxes.at(0).box.xyxy, expected) << table;
     EXPECT_EQ(images.at("a.png")->boxes.at(0).class_name, "car") << table;
   }
@@ -103,36 +96,31 @@ TEST(CsvLabels, ColumnsAreCalledAsToolsCallThem) {
 }
 
 TEST(CsvLabels, ABadRowSpoilsItsImageAlone) {
-  const std::string place = ", in labels.csv:2";
-  EXPECT_EQ(csv_fault("a.png,,1,2,3,4,\n"),
-            "expected a class without control characters, got ''" + place);
-  EXPECT_EQ(csv_fault("a.png,a\x01,1,2,3,4,\n"),
-            "expected a class without control characters, got 'a?'" + place);
-  EXPECT_EQ(csv_fault("a.png,car,1,2,nan,4,\n"),
-            "expected right within 1e+06 pixels, got 'nan'" + place);
-  EXPECT_EQ(csv_fault("a.png,car,,2,3,4,\n"), "expected left within 1e+06 pixels, got ''" + place);
-  EXPECT_EQ(csv_fault("a.png,car,1,2,1e999,4,\n"),
-            "expected right within 1e+06 pixels, got '1e999'" + place);
-  EXPECT_EQ(csv_fault("a.png,car,1,-1000001,3,4,\n"),
-            "expected top within 1e+06 pixels, got '-1000001'" + place);
-  EXPECT_EQ(csv_fault("a.png,car,\"1,024\",10,\"1,100\",50,\n"),
-            "expected left within 1e+06 pixels, got '1,024'" + place);
-  EXPECT_EQ(csv_fault("a.png,car,3,2,3,4,\n"), "no fault") << "it is left out";
-  EXPECT_EQ(csv_fault("a.png,car,3.5,2,3,4,\n"),
-            "expected left < right and top < bottom, got 3.5, 2, 3, 4" + place);
-  EXPECT_EQ(csv_fault("a.png,car,1,5,3,4,\n"),
-            "expected left < right and top < bottom, got 1, 5, 3, 4" + place);
-  using std::string_literals::operator""s;  // in a column that is not read, but kept with the rows
-  EXPECT_EQ(parse_csv_labels("image,class,left,top,right,bottom,note\na.png,car,1,2,3,4,a\0b\n"s,
-                             "labels.csv")
-                .at("a.png")
-                .fault()
-                .reason,
-            "expected text, got a NUL in it" + place);
-  for (const char* track : {"-1", "1.5", "x", "9223372036854775808"}) {
-    EXPECT_EQ(csv_fault("a.png,car,1,2,3,4," + std::string(track) + "\n"),
-              "expected a whole number from 0 as track, got '" + std::string(track) + "'" + place);
+  const std::pair<std::string, std::string> cases[] = {
+      {",1,2,3,4,", "expected a class without control characters, got ''"},
+      {"a\x01,1,2,3,4,", "expected a class without control characters, got 'a?'"},
+      {"car,1,2,nan,4,", "expected right within 1e+06 pixels, got 'nan'"},
+      {"car,,2,3,4,", "expected left within 1e+06 pixels, got ''"},
+      {"car,1,2,1e999,4,", "expected right within 1e+06 pixels, got '1e999'"},
+      {"car,1,-1000001,3,4,", "expected top within 1e+06 pixels, got '-1000001'"},
+      {"car,\"1,024\",10,\"1,100\",50,", "expected left within 1e+06 pixels, got '1,024'"},
+      {"car,3.5,2,3,4,", "expected left < right and top < bottom, got 3.5, 2, 3, 4"},
+      {"car,1,5,3,4,", "expected left < right and top < bottom, got 1, 5, 3, 4"},
+      {"car,1,2,3,4,-1", "expected a whole number from 0 as track, got '-1'"},
+      {"car,1,2,3,4,1.5", "expected a whole number from 0 as track, got '1.5'"},
+      {"car,1,2,3,4,x", "expected a whole number from 0 as track, got 'x'"},
+      {"car,1,2,3,4,9223372036854775808",
+       "expected a whole number from 0 as track, got '9223372036854775808'"}};
+  for (const auto& [row, fault] : cases) {
+    EXPECT_EQ(csv_fault("a.png," + row + "\n"), fault + ", in labels.csv:2");
   }
+  EXPECT_EQ(csv_fault("a.png,car,3,2,3,4,\n"), "no fault") << "it is left out";
+  // In a column that is not read, but kept with the rows.
+  EXPECT_EQ(
+      fault_of(parse_csv_labels("image,class,left,top,right,bottom,note\na.png,car,1,2,3,4,a\0b\n"s,
+                                "labels.csv")
+                   .at("a.png")),
+      "expected text, got a NUL in it, in labels.csv:2");
   EXPECT_EQ(csv_fault("a.png,car,1,2,3,4,5\na.png,bus,1,2,3,4,5\n"),
             "expected each track once in an image, got 5 twice, in labels.csv:3");
   for (const char* rows : {"a.png,car,1,2,3,4,\na.png,,,,,,\n", "a.png,,,,,,\na.png,car,1,2,3,4,\n",
@@ -147,33 +135,30 @@ TEST(CsvLabels, ABadRowSpoilsItsImageAlone) {
 }
 
 TEST(CsvLabels, ARowThatDoesNotTellItsImageIsRefused) {
-  const auto refuses = [](const std::string& text, const char* message) {
-    EXPECT_THAT([&] { parse_csv_labels(text, "labels.csv"); },
-                ThrowsMessage<InputError>(HasSubstr(message)))
-        << text;
-  };
   const std::string header = kTableHeader;
-  refuses("", "expected a header line image,class,left,top,right,bottom, got none, in labels.csv");
-  refuses("image,class,left,top,right\n", "expected a column bottom, got none, in labels.csv:1");
-  refuses("image,class,left,top,right,bottom,score\n", "got \"score\", in labels.csv:1");
-  refuses("image,class,x,y,w,width,height\n", "got \"w\", in labels.csv:1");
-  refuses("a.png,car,1,2,3,4\n", "got \"a.png\", in labels.csv:1");
-  refuses("image,class,left,left,top,right,bottom\n", "got \"left\", in labels.csv:1");
-  refuses(header + "a.png,car,0.1,0.2,0.3,0.4,\nb.png,car,0,0,1,1,\nc.png,car,0,0,0.5,0.5,\n",
-          "expected edges in pixels, got shares of the image, 0..1, in labels.csv");
-  for (const char* rows : {"a.png,car,0,0.25,1,1,\n", "a.png,car,-0.004,0,1.0004,1,\n",
-                           "a.png,car,0,0,1,1,\nb.png,car,0,0,0.5,1,\n"}) {
-    refuses(header + rows,
-            "expected edges in pixels, got shares of the image, 0..1, in labels.csv");
+  const char* shares = "expected edges in pixels, got shares of the image, 0..1, in labels.csv";
+  const std::pair<std::string, const char*> cases[] = {
+      {"", "expected a header line image,class,left,top,right,bottom, got none, in labels.csv"},
+      {"image,class,left,top,right\n", "expected a column bottom, got none, in labels.csv:1"},
+      {"image,class,left,top,right,bottom,score\n", "got \"score\", in labels.csv:1"},
+      {"image,class,x,y,w,width,height\n", "got \"w\", in labels.csv:1"},
+      {"a.png,car,1,2,3,4\n", "got \"a.png\", in labels.csv:1"},
+      {"image,class,left,left,top,right,bottom\n", "got \"left\", in labels.csv:1"},
+      {header + "a.png,car,0.1,0.2,0.3,0.4,\nb.png,car,0,0,1,1,\nc.png,car,0,0,0.5,0.5,\n", shares},
+      {header + "a.png,car,0,0.25,1,1,\n", shares},
+      {header + "a.png,car,-0.004,0,1.0004,1,\n", shares},
+      {header + "a.png,car,0,0,1,1,\nb.png,car,0,0,0.5,1,\n", shares},
+      {"image,class,x,y,w,h\na.png,car,0.5,0.25,0.5,0.75\n", "got shares of the image"},
+      {header + "a.png,car,1,2,3,4\n", "expected 7 fields, got 6, in labels.csv:2"},
+      {header + "a.png,car,1,2,3,4,,\n", "expected 7 fields, got 8, in labels.csv:2"},
+      {header + ",car,1,2,3,4,\n", "expected an image without control characters, got ''"},
+      {header + "a\0.png,car,1,2,3,4,\n"s, "got 'a?.png'"},
+      {header + "a.png,\"car,1,2,3,4,\n", "got other quotes, in labels.csv:2"},
+      {header + "\xff.png,car,1,2,3,4,\n", "expected UTF-8, got other bytes, in labels.csv:2"}};
+  for (const auto& [text, message] : cases) {
+    EXPECT_THROWS(parse_csv_labels(text, "labels.csv"), InputError, message) << text;
   }
-  refuses("image,class,x,y,w,h\na.png,car,0.5,0.25,0.5,0.75\n", "got shares of the image");
   EXPECT_THAT(read_csv("a.png,car,0,0,1,1,\nb.png,car,0,0,1.5,1,\n"), SizeIs(2)) << "pixels";
-  refuses(header + "a.png,car,1,2,3,4\n", "expected 7 fields, got 6, in labels.csv:2");
-  refuses(header + "a.png,car,1,2,3,4,,\n", "expected 7 fields, got 8, in labels.csv:2");
-  refuses(header + ",car,1,2,3,4,\n", "expected an image without control characters, got ''");
-  refuses(header + std::string("a\0.png,car,1,2,3,4,\n", 20), "got 'a?.png'");
-  refuses(header + "a.png,\"car,1,2,3,4,\n", "got other quotes, in labels.csv:2");
-  refuses(header + "\xff.png,car,1,2,3,4,\n", "expected UTF-8, got other bytes, in labels.csv:2");
 }
 
 TEST(CsvLabels, OfManyImagesEachIsThere) {

@@ -1,24 +1,12 @@
 // Outlines that labels have of themselves: COCO's segmentation, YOLO's segment lines.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <string>
-
 #include "manifests/values/outlines.h"
 #include "stages/frames/own_labels/yolo_text.h"
 #include "stages/frames/sequences/frames_dataset.h"
-#include "tests/testing/image_file.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
-
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::SizeIs;
 
 /// A mask's rows, '#' where it is covered.
 std::vector<std::string> drawn(const Outline& outline, ImageSize size) {
@@ -34,39 +22,42 @@ std::vector<std::string> drawn(const Outline& outline, ImageSize size) {
 }
 
 /// One image of 5 x 4 with one box.
-class CocoOutlines : public ::testing::Test {
+class CocoOutlines : public FolderTest {
  protected:
   static constexpr ImageSize kSize{4, 5};
 
-  CocoOutlines() { testing::write_flat_image(folder_ / "images/1.png", kSize, 7); }
+  CocoOutlines() { images({"images/1.png"}, kSize); }
 
-  /// `keys` of the only annotation.
-  Outcome<Annotation> read(const std::string& keys) const {
-    testing::write_file(folder_ / "instances.json",
-                        R"({"images": [{"id": 7, "file_name": "1.png", "height": 4, "width": 5}],
-            "categories": [{"id": 3, "name": "person"}],
-            "annotations": [{"id": 17, "image_id": 7, "category_id": 3, )" +
-                            keys + "}]}");
+  /// Of annotations of one image.
+  std::unique_ptr<Dataset> open(const std::string& annotations, ImageSize size = kSize) const {
+    write("instances.json", R"({"images": [{"id": 7, "file_name": "1.png", "height": )" +
+                                std::to_string(size.height) +
+                                ", \"width\": " + std::to_string(size.width) +
+                                R"(}], "categories": [{"id": 3, "name": "person"}],
+                                "annotations": [)" +
+                                annotations + "]}");
     SourceSpec spec;
     spec.root = "images";
     spec.labels = LabelSpec{LabelFormat::kCoco, "instances.json"};
-    return open_frames_dataset(spec, folder_.path())->annotation("7");
+    return open_frames_dataset(spec, folder_.path());
+  }
+  /// `keys` of the only annotation.
+  Outcome<Annotation> read(const std::string& keys, ImageSize size = kSize) const {
+    return open(R"({"id": 17, "image_id": 7, "category_id": 3, )" + keys + "}", size)
+        ->annotation("7");
   }
   Box box(const std::string& keys) const {
     const auto annotation = read(keys);
     if (!is_fault(annotation) && annotation->boxes.size() == 1) return annotation->boxes[0];
-    ADD_FAILURE() << (is_fault(annotation) ? annotation.fault().reason : "no box");
+    ADD_FAILURE() << fault_of(annotation);
     return {};
   }
   std::string fault(const std::string& segmentation) const {
-    const auto annotation = read(R"("bbox": [1, 1, 2, 2], "segmentation": )" + segmentation);
-    return is_fault(annotation) ? annotation.fault().reason : "no fault";
+    return fault_of(read(R"("bbox": [1, 1, 2, 2], "segmentation": )" + segmentation));
   }
   Outline outline(const std::string& segmentation) const {
     return box(R"("bbox": [0, 0, 5, 4], "segmentation": )" + segmentation).outline;
   }
-
-  testing::TemporaryFolder folder_;
 };
 
 TEST_F(CocoOutlines, PolygonsAreParts) {
@@ -92,21 +83,14 @@ TEST_F(CocoOutlines, RunLengthsGoDownTheColumns) {
 
 TEST_F(CocoOutlines, RunLengthsOfTooManyCornersAreAFault) {
   // A checkerboard, since the height is odd: 350,850 squares.
-  testing::write_flat_image(folder_ / "images/1.png", {701, 1001}, 7);
+  images({"images/1.png"}, {701, 1001});
   std::string counts = "1";
   for (int i = 1; i < 701 * 1001; ++i) counts += ",1";
-  testing::write_file(folder_ / "instances.json",
-                      R"({"images": [{"id": 7, "file_name": "1.png", "height": 701, "width": 1001}],
-          "categories": [{"id": 3, "name": "person"}],
-          "annotations": [{"id": 17, "image_id": 7, "category_id": 3, "bbox": [0, 0, 9, 9],
-          "segmentation": {"size": [701, 1001], "counts": [)" +
-                          counts + "]}}]}");
-  SourceSpec spec;
-  spec.root = "images";
-  spec.labels = LabelSpec{LabelFormat::kCoco, "instances.json"};
-  const auto read = open_frames_dataset(spec, folder_.path())->annotation("7");
-  ASSERT_TRUE(is_fault(read));
-  EXPECT_THAT(read.fault().reason, HasSubstr("a mask of at most 1000000 corners, got 1403400"));
+  EXPECT_THAT(fault_of(read(R"("bbox": [0, 0, 9, 9],
+                               "segmentation": {"size": [701, 1001], "counts": [)" +
+                                counts + "]}",
+                            {701, 1001})),
+              HasSubstr("a mask of at most 1000000 corners, got 1403400"));
 }
 
 TEST_F(CocoOutlines, ABoxWithoutSidesIsAroundItsOutline) {
@@ -118,31 +102,23 @@ TEST_F(CocoOutlines, ABoxWithoutSidesIsAroundItsOutline) {
   }
   EXPECT_EQ(box(R"("bbox": [1, 1, 2, 2], "segmentation": [[0, 0, 5, 0, 5, 4]])").xyxy,
             (Rectangle{1, 1, 3, 3}));
-  const auto neither = read(R"("segmentation": [])");
-  ASSERT_TRUE(is_fault(neither));
-  EXPECT_THAT(neither.fault().reason, HasSubstr("(annotation 17): $.bbox: expected"));
+  EXPECT_THAT(fault_of(read(R"("segmentation": [])")),
+              HasSubstr("(annotation 17): $.bbox: expected"));
 }
 
 TEST_F(CocoOutlines, MostlyCrowdsAreAWarning) {
-  const auto warnings = [&](const char* last) {
-    std::string annotations;
-    for (int id = 1; id <= 4; ++id) {
-      const char* const crowd = id == 1 ? "0" : id == 2 ? "true" : id == 3 ? "1" : last;
-      annotations += (id > 1 ? ", " : "") + std::string("{\"id\": ") + std::to_string(id) +
-                     R"(, "image_id": 7, "category_id": 3, "bbox": [1, 1, 2, 2], "iscrowd": )" +
-                     crowd + "}";
+  const auto warnings = [&](const Texts& crowds) {
+    std::string all;
+    for (std::size_t i = 0; i < crowds.size(); ++i) {
+      all += (i > 0 ? ", {\"id\": " : "{\"id\": ") + std::to_string(i) +
+             R"(, "image_id": 7, "category_id": 3, "bbox": [1, 1, 2, 2], "iscrowd": )" + crowds[i] +
+             "}";
     }
-    testing::write_file(folder_ / "instances.json",
-                        R"({"images": [{"id": 7, "file_name": "1.png", "height": 4, "width": 5}],
-                            "categories": [{"id": 3, "name": "person"}], "annotations": [)" +
-                            annotations + "]}");
-    SourceSpec spec;
-    spec.root = "images";
-    spec.labels = LabelSpec{LabelFormat::kCoco, "instances.json"};
-    return open_frames_dataset(spec, folder_.path())->warnings();
+    return open(all)->warnings();
   };
-  EXPECT_THAT(warnings("0"), IsEmpty());
-  EXPECT_THAT(warnings("1"), ElementsAre(HasSubstr("3 of 4 annotations have \"iscrowd\" 1")));
+  EXPECT_THAT(warnings({"0", "true", "1", "0"}), IsEmpty());
+  EXPECT_THAT(warnings({"0", "true", "1", "1"}),
+              ElementsAre(HasSubstr("3 of 4 annotations have \"iscrowd\" 1")));
 }
 
 TEST_F(CocoOutlines, WithoutAreaThereIsNone) {
@@ -173,27 +149,28 @@ TEST_F(CocoOutlines, PartsThatAreLeftOutAreTold) {
 }
 
 TEST_F(CocoOutlines, ABadOneIsAFaultOfTheImage) {
-  EXPECT_EQ(fault("[[1, 2, 3]]"),
-            "instances.json (annotation 17): $.segmentation[0]: expected x and y of each corner, "
-            "got 3 numbers");
-  EXPECT_THAT(fault("[1, 2, 3, 4, 5, 6]"), HasSubstr("$.segmentation[0]: expected a"));
-  EXPECT_THAT(fault(R"([["a", 2, 3, 4, 5, 6]])"),
-              HasSubstr("$.segmentation[0][0]: expected a number"));
-  EXPECT_THAT(fault("[[1e300, 2, 3, 4, 5, 6]]"),
-              HasSubstr("$.segmentation[0][0]: expected a number"));
-  EXPECT_THAT(fault("\"52341\""), HasSubstr("$.segmentation: expected an object"));
-  EXPECT_THAT(fault(R"({"size": [5, 4], "counts": [20]})"),
-              HasSubstr("$.segmentation.size: expected 5x4, the image's size, got 4x5"));
-  EXPECT_THAT(fault(R"({"counts": [20]})"), HasSubstr("$.segmentation.size: expected"));
+  const std::pair<const char*, const char*> cases[] = {
+      {"[[1, 2, 3]]",
+       "instances.json (annotation 17): $.segmentation[0]: expected x and y of each "
+       "corner, got 3 numbers"},
+      {"[1, 2, 3, 4, 5, 6]", "$.segmentation[0]: expected a"},
+      {R"([["a", 2, 3, 4, 5, 6]])", "$.segmentation[0][0]: expected a number"},
+      {"[[1e300, 2, 3, 4, 5, 6]]", "$.segmentation[0][0]: expected a number"},
+      {"\"52341\"", "$.segmentation: expected an object"},
+      {R"({"size": [5, 4], "counts": [20]})",
+       "$.segmentation.size: expected 5x4, the image's size, got 4x5"},
+      {R"({"counts": [20]})", "$.segmentation.size: expected"},
+      {R"({"size": [4, 5], "counts": [-1, 21]})", "$.segmentation.counts[0]: expected an integer"},
+      {R"({"size": [4, 5]})", "$.segmentation.counts: expected"}};
+  for (const auto& [segmentation, why] : cases) {
+    EXPECT_THAT(fault(segmentation), HasSubstr(why)) << segmentation;
+  }
   for (const char* counts :
        {"[19]", "[21]", "[]", "[20, 4294967295]", R"("")", R"("4")", R"("e")", R"("\u0001")"}) {
-    EXPECT_THAT(fault(std::string(R"({"size": [4, 5], "counts": )") + counts + "}"),
+    EXPECT_THAT(fault(R"({"size": [4, 5], "counts": )"s + counts + "}"),
                 HasSubstr("$.segmentation.counts: expected run lengths of 20 pixels, got others"))
         << counts;
   }
-  EXPECT_THAT(fault(R"({"size": [4, 5], "counts": [-1, 21]})"),
-              HasSubstr("$.segmentation.counts[0]: expected an integer"));
-  EXPECT_THAT(fault(R"({"size": [4, 5]})"), HasSubstr("$.segmentation.counts: expected"));
 }
 
 // Of 40 x 30 pixels.

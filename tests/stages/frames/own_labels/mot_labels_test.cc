@@ -1,24 +1,12 @@
 #include "stages/frames/own_labels/detail/mot_labels.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <algorithm>
-#include <array>
 #include <sstream>
-#include <vector>
 
-#include "tests/testing/shared_data.h"
-#include "tests/testing/text_file.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
-
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::SizeIs;
-using ::testing::ThrowsMessage;
 
 auto read_mot(const std::string& text, const MotForm& form = {}) {
   return parse_mot_labels(text, form, "gt.txt");
@@ -27,9 +15,8 @@ auto read_mot(const std::string& text, const MotForm& form = {}) {
 /// Of frame 1.
 std::string mot_fault(const std::string& lines) {
   const auto frames = read_mot(lines + "2,1,1,1,1,1,1\n");
-  EXPECT_FALSE(is_fault(frames.at(2)));  // of its frame alone
-  const auto& frame = frames.at(1);
-  return is_fault(frame) ? frame.fault().reason : "no fault";
+  EXPECT_EQ(fault_of(frames.at(2)), "no fault");  // of its frame alone
+  return fault_of(frames.at(1));
 }
 
 TEST(MotLabels, CountFrom1) {
@@ -86,29 +73,31 @@ TEST(MotLabels, Of2015AndShorterOnesAreOfPedestrians) {
 }
 
 TEST(MotLabels, ABadLineSpoilsItsFrameAlone) {
-  EXPECT_EQ(mot_fault("1,1,1,1,1,1\n"), "expected 7 to 10 columns, got 6, in gt.txt:1");
-  EXPECT_EQ(mot_fault("1,1,1,1,1,1,1,1,1,1,1\n"), "expected 7 to 10 columns, got 11, in gt.txt:1");
-  for (const char* id : {"-2", "1.5", "", "9007199254740993"}) {
-    EXPECT_EQ(mot_fault("1," + std::string(id) + ",1,1,1,1,1\n"),
-              "expected an id from 0, or -1, got '" + std::string(id) + "', in gt.txt:1");
+  const std::pair<std::string, std::string> cases[] = {
+      {"1,1,1,1,1,1\n", "expected 7 to 10 columns, got 6, in gt.txt:1"},
+      {"1,1,1,1,1,1,1,1,1,1,1\n", "expected 7 to 10 columns, got 11, in gt.txt:1"},
+      {"1,1,nan,1,1,1,1\n", "for bb_left, got 'nan'"},
+      {"1,1,1,1e7,1,1,1\n", "for bb_top, got '1e7'"},
+      {"1,1,1,1,inf,1,1\n", "for bb_width, got 'inf'"},
+      {"1,1,1,1,1,,1\n", "for bb_height, got ''"},
+      // In a column that is not read.
+      {"1,7,1,1,1,1,1,1,\0\n"s, "expected text, got a NUL in it, in gt.txt:1"},
+      {"1,7,1,1,1,1,1\n1,8,1,1,1,1,1\n1,7,2,2,2,2,1\n",
+       "expected each id once in a frame, got 7 twice, in gt.txt:3"},
+      {"1,7,1,1,1,1,1\n1,8,1,1,1,x,1\n1,9,y,2,2,2,1\n", ":2"}};
+  for (const auto& [lines, fault] : cases) EXPECT_THAT(mot_fault(lines), HasSubstr(fault));
+  for (const std::string id : {"-2", "1.5", "", "9007199254740993"}) {
+    EXPECT_EQ(mot_fault("1," + id + ",1,1,1,1,1\n"),
+              "expected an id from 0, or -1, got '" + id + "', in gt.txt:1");
   }
-  EXPECT_THAT(mot_fault("1,1,nan,1,1,1,1\n"), HasSubstr("for bb_left, got 'nan'"));
-  EXPECT_THAT(mot_fault("1,1,1,1e7,1,1,1\n"), HasSubstr("for bb_top, got '1e7'"));
-  EXPECT_THAT(mot_fault("1,1,1,1,inf,1,1\n"), HasSubstr("for bb_width, got 'inf'"));
-  EXPECT_THAT(mot_fault("1,1,1,1,1,,1\n"), HasSubstr("for bb_height, got ''"));
-  for (const char* conf : {"-0.5", "-2", "1.5", "nan", "x"}) {
-    EXPECT_THAT(mot_fault("1,1,1,1,1,1," + std::string(conf) + ",1,1\n"),
-                HasSubstr("expected a conf from 0 to 1, got '" + std::string(conf) + "'"));
+  for (const std::string conf : {"-0.5", "-2", "1.5", "nan", "x"}) {
+    EXPECT_THAT(mot_fault("1,1,1,1,1,1," + conf + ",1,1\n"),
+                HasSubstr("expected a conf from 0 to 1, got '" + conf + "'"));
   }
-  for (const char* kind : {"0", "14", "-1", "1.5"}) {
-    EXPECT_THAT(mot_fault("1,1,1,1,1,1,1," + std::string(kind) + ",1\n"),
-                HasSubstr("expected a class from 1 to 13, got '" + std::string(kind) + "'"));
+  for (const std::string kind : {"0", "14", "-1", "1.5"}) {
+    EXPECT_THAT(mot_fault("1,1,1,1,1,1,1," + kind + ",1\n"),
+                HasSubstr("expected a class from 1 to 13, got '" + kind + "'"));
   }
-  using std::string_literals::operator""s;  // in a column that is not read
-  EXPECT_EQ(mot_fault("1,7,1,1,1,1,1,1,\0\n"s), "expected text, got a NUL in it, in gt.txt:1");
-  EXPECT_EQ(mot_fault("1,7,1,1,1,1,1\n1,8,1,1,1,1,1\n1,7,2,2,2,2,1\n"),
-            "expected each id once in a frame, got 7 twice, in gt.txt:3");
-  EXPECT_THAT(mot_fault("1,7,1,1,1,1,1\n1,8,1,1,1,x,1\n1,9,y,2,2,2,1\n"), HasSubstr(":2"));
 }
 
 TEST(MotLabels, WhatIsNotUsedOrOnlyUnusualIsTaken) {
@@ -148,7 +137,7 @@ TEST(MotLabels, MayHaveClassesOfTheirOwn) {
   EXPECT_EQ(boxes[0].box, (Box{.xyxy = {10, 20, 40, 60}, .track_id = 1}));
   EXPECT_EQ(boxes[1].class_name, "dog");
   EXPECT_EQ(boxes[1].box, (Box{.xyxy = {60, 20, 90, 60}, .track_id = 2, .ignore = true}));
-  EXPECT_EQ(frames.at(2).fault().reason, "expected a class from 1 to 3, got '4', in gt.txt:3");
+  EXPECT_EQ(fault_of(frames.at(2)), "expected a class from 1 to 3, got '4', in gt.txt:3");
 }
 
 TEST(MotLabels, VisDronesTablesShowByTheirLastColumns) {
@@ -178,12 +167,11 @@ TEST(MotLabels, VisDronesTablesShowByTheirLastColumns) {
 TEST(MotLabels, ALineThatDoesNotTellItsFrameIsRefused) {
   for (const std::string line : {"0,1,1,1,1,1,1", "-1,1,1,1,1,1,1", "1.5,1,1,1,1,1,1", "x", ",,",
                                  "1000000000,1,1,1,1,1,1", "1 2 3", "99999999999999999999,1"}) {
-    EXPECT_THAT([&] { read_mot("1,1,1,1,1,1,1\n" + line + "\n"); },
-                ThrowsMessage<InputError>(HasSubstr("expected a frame number from 1, got '")))
-        << line;
-    EXPECT_THAT([&] { read_mot("1,1,1,1,1,1,1\n" + line); },
-                ThrowsMessage<InputError>(HasSubstr("', in gt.txt:2")))
-        << line;
+    for (const char* end : {"", "\n"}) {
+      EXPECT_THROWS(read_mot("1,1,1,1,1,1,1\n" + line + end), InputError,
+                    "expected a frame number from 1, got '", "', in gt.txt:2")
+          << line;
+    }
   }
 }
 
@@ -221,25 +209,28 @@ TEST(MotSequences, SayNothingOfWhatTheirFilesLack) {
 }
 
 TEST(MotSequences, AreRefusedWhereAnythingIsInDoubt) {
-  const auto refuses = [](const std::string& from, const std::string& to, const char* message) {
+  const std::array<std::string, 3> cases[] = {
+      {"[Sequence]", "[sequence]", "expected [Sequence], got none, in seqinfo.ini"},
+      {"imExt=", "name=", "expected each key once, got 'name=.jpg', in seqinfo.ini:8"},
+      {"imExt=.jpg", "[Sequence]", "expected [Sequence] once, got '[Sequence]'"},
+      {"imExt=.jpg", "imExt", "expected a line key=value, got 'imExt', in seqinfo.ini:8"},
+      {"=30", "=0", "for frameRate, in seqinfo.ini:4"},
+      {"=30", "=-30", "for frameRate, in seqinfo.ini:4"},
+      {"=30", "=nan", "for frameRate, in seqinfo.ini:4"},
+      {"=30", "=inf", "for frameRate, in seqinfo.ini:4"},
+      {"=30", "=1e7", "for frameRate, in seqinfo.ini:4"},
+      {"=30", "=30 fps", "for frameRate, in seqinfo.ini:4"},
+      {"=600", "=0", "for seqLength, in seqinfo.ini:5"},
+      {"=600", "=0.5", "for seqLength, in seqinfo.ini:5"},
+      {"=600", "=1.5", "for seqLength, in seqinfo.ini:5"},
+      {"=600", "=10000000000", "for seqLength, in seqinfo.ini:5"},
+      {"=1920", "=0", "expected a number above 0, got '0' for imWidth, in seqinfo.ini:6"},
+      {"=1080", "=99999999", "for imHeight, in seqinfo.ini:7"}};
+  for (const auto& [from, to, message] : cases) {
     std::string text = kSeqinfo;
     text.replace(text.find(from), from.size(), to);
-    EXPECT_THAT([&] { parse_mot_sequence(text, "seqinfo.ini"); },
-                ThrowsMessage<InputError>(HasSubstr(message)))
-        << text;
-  };
-  refuses("[Sequence]", "[sequence]", "expected [Sequence], got none, in seqinfo.ini");
-  refuses("imExt=", "name=", "expected each key once, got 'name=.jpg', in seqinfo.ini:8");
-  refuses("imExt=.jpg", "[Sequence]", "expected [Sequence] once, got '[Sequence]'");
-  refuses("imExt=.jpg", "imExt", "expected a line key=value, got 'imExt', in seqinfo.ini:8");
-  for (const char* rate : {"0", "-30", "nan", "inf", "1e7", "30 fps"}) {
-    refuses("=30", "=" + std::string(rate), "for frameRate, in seqinfo.ini:4");
+    EXPECT_THROWS(parse_mot_sequence(text, "seqinfo.ini"), InputError, message) << text;
   }
-  for (const char* length : {"0", "0.5", "1.5", "10000000000"}) {
-    refuses("=600", "=" + std::string(length), "for seqLength, in seqinfo.ini:5");
-  }
-  refuses("=1920", "=0", "expected a number above 0, got '0' for imWidth, in seqinfo.ini:6");
-  refuses("=1080", "=99999999", "for imHeight, in seqinfo.ini:7");
 }
 
 // Another program's reading of the same files (boxes.csv), which took the corners as they are and
@@ -248,7 +239,7 @@ TEST(MotLabels, OfMot17AreThoseThatAnotherProgramRead) {
   EVENTGAN_SHARED_DATA_OR_SKIP(data);
   const auto folder = data / "labelled_frames" / "mot17_mini";
   if (!exists(folder)) GTEST_SKIP() << "skipped: no " << folder;
-  std::istringstream table(testing::read_file(folder / "boxes.csv"));
+  std::istringstream table(read_file(folder / "boxes.csv"));
   std::map<std::string, std::vector<std::vector<std::string>>> expected;  // by image
   for (std::string line; std::getline(table, line);) {
     std::istringstream fields(line);
@@ -259,7 +250,7 @@ TEST(MotLabels, OfMot17AreThoseThatAnotherProgramRead) {
   ASSERT_EQ(expected.size(), 12u);
   std::size_t compared = 0;
   for (const char* name : {"MOT17-02-FRCNN", "MOT17-04-FRCNN"}) {
-    const std::string text = testing::read_file(folder / name / "gt.txt");
+    const std::string text = read_file(folder / name / "gt.txt");
     std::size_t bytes = 0;
     for (const auto& [number, outcome] : parse_mot_labels(text, {}, "gt.txt")) {
       ASSERT_FALSE(is_fault(outcome)) << outcome.fault().reason;

@@ -1,21 +1,12 @@
 #include "stages/frames/own_labels/detail/voc_labels.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <fstream>
 #include <sstream>
 
-#include "tests/testing/shared_data.h"
-#include "tests/testing/text_file.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
-
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::SizeIs;
 
 constexpr char kBox[] =
     "<bndbox><xmin>1</xmin><ymin>1</ymin><xmax>30</xmax><ymax>20</ymax></bndbox>";
@@ -29,13 +20,12 @@ std::string object(const std::string& content) { return "<object>" + content + "
 
 ImageLabels read_voc(const std::string& xml, int edges_from = 1) {
   const auto outcome = parse_voc_labels(xml, edges_from, "a.xml");
-  EXPECT_FALSE(is_fault(outcome)) << outcome.fault().reason;
+  EXPECT_EQ(fault_of(outcome), "no fault");
   return *outcome;
 }
 
-std::string voc_fault(const std::string& xml, int edges_from = 1) {
-  const auto outcome = parse_voc_labels(xml, edges_from, "a.xml");
-  return is_fault(outcome) ? outcome.fault().reason : "no fault";
+std::string voc_fault(const std::string& xml) {
+  return fault_of(parse_voc_labels(xml, 1, "a.xml"));
 }
 
 // As the development kit's own example, 2007_000027.xml, but for the size.
@@ -132,35 +122,30 @@ TEST(VocLabels, MayLeaveTheSizeToTheImage) {
 }
 
 TEST(VocLabels, ObjectsAreNamedByTheirNumber) {
-  const std::string sound = object("<name>a</name>" + std::string(kBox));
-  const auto second = [&](const std::string& content) {
-    const std::string fault = voc_fault(annotation(sound + object(content)));
-    const std::string place = ", in a.xml (object 2)";
-    EXPECT_TRUE(fault.ends_with(place)) << fault;
-    return fault.substr(0, fault.size() - place.size());
-  };
-  EXPECT_EQ(second(kBox), "expected <name>, got none");
-  EXPECT_EQ(second("<name>a</name>"), "expected <bndbox>, got none");
-  EXPECT_EQ(second("<name>a</name><name>b</name>" + std::string(kBox)),
-            "expected <name> once, got it twice");
-  EXPECT_EQ(second("<name>a</name>" + std::string(kBox) + kBox),
-            "expected <bndbox> once, got it twice");
+  const std::string sound = "<name>a</name>"s + kBox;
+  std::vector<std::pair<std::string, std::string>> cases = {
+      {kBox, "expected <name>, got none"},
+      {"<name>a</name>", "expected <bndbox>, got none"},
+      {"<name>b</name>" + sound, "expected <name> once, got it twice"},
+      {sound + kBox, "expected <bndbox> once, got it twice"},
+      {"<name>a<b/></name>"s + kBox, "expected text alone in <name>, got more"}};
   for (const char* name : {"", " ", "&b;", "a&#1;", "\xff"}) {
-    EXPECT_THAT(second("<name>" + std::string(name) + "</name>" + kBox),
-                HasSubstr("expected a name without control characters and unknown entities"))
-        << name;
+    cases.emplace_back("<name>"s + name + "</name>" + kBox,
+                       "expected a name without control characters and unknown entities");
   }
-  EXPECT_EQ(second("<name>a<b/></name>" + std::string(kBox)),
-            "expected text alone in <name>, got more");
-  for (const char* flag : {"difficult", "truncated", "occluded"}) {
-    EXPECT_EQ(second("<name>a</name>" + std::string(kBox) + "<" + flag + ">1</" + flag + "><" +
-                     flag + ">0</" + flag + ">"),
-              std::string("expected <") + flag + "> once, got it twice");
+  for (const std::string flag : {"difficult", "truncated", "occluded"}) {
+    cases.emplace_back(sound + "<" + flag + ">1</" + flag + "><" + flag + ">0</" + flag + ">",
+                       "expected <" + flag + "> once, got it twice");
   }
-  for (const char* number : {"nan", "inf", "-1e7", "1e999", "", "1 2", "0x5", "5,5"}) {
-    EXPECT_EQ(second("<name>a</name><bndbox><xmin>1</xmin><ymin>" + std::string(number) +
-                     "</ymin><xmax>9</xmax><ymax>9</ymax></bndbox>"),
-              "expected a number of pixels for <ymin>, got '" + std::string(number) + "'");
+  for (const std::string number : {"nan", "inf", "-1e7", "1e999", "", "1 2", "0x5", "5,5"}) {
+    cases.emplace_back("<name>a</name><bndbox><xmin>1</xmin><ymin>" + number +
+                           "</ymin><xmax>9</xmax><ymax>9</ymax></bndbox>",
+                       "expected a number of pixels for <ymin>, got '" + number + "'");
+  }
+  for (const auto& [content, fault] : cases) {
+    EXPECT_THAT(voc_fault(annotation(object(sound) + object(content))),
+                AllOf(StartsWith(fault), EndsWith(", in a.xml (object 2)")))
+        << content;
   }
 }
 
@@ -200,9 +185,9 @@ TEST(VocLabels, OfPedroAreThoseThatAnotherProgramRead) {
   const auto folder = data / "real_labels" / "pedro";
   if (!exists(folder)) GTEST_SKIP() << "skipped: no " << folder;
   std::size_t compared = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+  for (const auto& entry : fs::directory_iterator(folder)) {
     if (entry.path().extension() != ".xml") continue;
-    const ImageLabels labels = read_voc(testing::read_file(entry.path()));
+    const ImageLabels labels = read_voc(read_file(entry.path()));
     EXPECT_EQ(labels.size, (ImageSize{260, 346}));
     auto yolo = entry.path();
     std::ifstream lines(yolo.replace_extension(".txt"));

@@ -1,68 +1,49 @@
 #include "stages/frames/sources/class_numbers.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include "manifests/values/faults.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/sources/open_dataset.h"
-#include "tests/testing/image_file.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
 
-using ::testing::ElementsAre;
-using ::testing::IsEmpty;
-using ::testing::Pair;
-
 /// Sources of one image each, with a table or texts of labels.
-class ClassNumbers : public ::testing::Test {
+class ClassNumbers : public FolderTest {
  protected:
-  SourceSpec source(const std::string& name) {
-    testing::write_flat_image(folder_ / name / "images/1.png", {30, 40}, 9);
-    SourceSpec spec;
-    spec.root = name + "/images";
-    return spec;
+  void add(const std::string& name, LabelFormat format, const std::string& path) {
+    images({name + "/images/1.png"});
+    SourceSpec& source = sources_.emplace_back();
+    source.root = name + "/images";
+    source.labels = {format, path};
+    datasets_.push_back(open_dataset(source, folder_.path()));
   }
   /// A box of each class.
   void add_table(const std::string& name, const ClassNames& classes) {
     std::string text = "image,class,left,top,right,bottom\n";
     for (const std::string& one : classes) text += "1.png," + one + ",1,1,9,9\n";
     if (classes.empty()) text += "1.png,,,,,\n";
-    testing::write_file(folder_ / name / "boxes.csv", text);
-    sources_.push_back(source(name));
-    sources_.back().labels = {LabelFormat::kCsv, name + "/boxes.csv"};
-    open();
+    write(name + "/boxes.csv", text);
+    add(name, LabelFormat::kCsv, name + "/boxes.csv");
   }
   /// A box of the last class.
   void add_texts(const std::string& name, const ClassNames& classes) {
-    std::string names;
-    for (const std::string& one : classes) names += one + "\n";
-    testing::write_file(folder_ / name / "classes.txt", names);
-    testing::write_file(folder_ / name / "labels/1.txt",
-                        std::to_string(classes.size() - 1) + " 0.5 0.5 0.5 0.5\n");
-    sources_.push_back(source(name));
-    sources_.back().labels = {LabelFormat::kYolo, name};
-    open();
+    std::string all;
+    for (const std::string& one : classes) all += one + "\n";
+    write(name + "/classes.txt", all);
+    write(name + "/labels/1.txt", std::to_string(classes.size() - 1) + " 0.5 0.5 0.5 0.5\n");
+    add(name, LabelFormat::kYolo, name);
   }
-  void open() { datasets_.push_back(open_dataset(sources_.back(), folder_.path())); }
 
   const ClassNames& names(std::size_t i) const { return datasets_[i]->label_schema().class_names; }
   /// What each box of the source is called.
   ClassNames boxes(std::size_t i) const {
     ClassNames found;
-    for (const LabelledFrame& frame : datasets_[i]->labelled_frames()) {
-      const Annotation annotation = *datasets_[i]->annotation(frame.label_key);
-      for (const Box& box : annotation.boxes) {
-        found.push_back(names(i).at(static_cast<std::size_t>(box.class_id)));
-      }
+    for (const Box& box : annotation_of(*datasets_[i]).boxes) {
+      found.push_back(names(i).at(static_cast<std::size_t>(box.class_id)));
     }
     return found;
   }
 
-  testing::TemporaryFolder folder_;
   std::vector<SourceSpec> sources_;
   std::vector<std::unique_ptr<Dataset>> datasets_;
 };
@@ -165,9 +146,8 @@ TEST_F(ClassNumbers, OthersThanTheSourceTakesAreLeftOutAndCounted) {
   number_classes(sources_, datasets_);
   EXPECT_THAT(boxes(0), ElementsAre("person", "bike", "car", "DontCare"));
   sources_[1].classes = {"bike"};
-  EXPECT_THAT([&] { number_classes(sources_, datasets_); },
-              ::testing::ThrowsMessage<InputError>(
-                  "expected classes of the source (car, person), got bike, in val/images"));
+  EXPECT_THROWS(number_classes(sources_, datasets_), InputError,
+                StrEq("expected classes of the source (car, person), got bike, in val/images"));
 }
 
 TEST_F(ClassNumbers, WhatIsStoredKeepsItsNumbers) {

@@ -1,101 +1,121 @@
 #include "stages/frames/sources/find_source.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <array>
+#include <sstream>
 
 #include "manifests/values/faults.h"
 #include "stages/frames/listing/image_folder.h"
+#include "tests/stages/frames/frames_fixture.h"
 #include "tests/testing/npy_bytes.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
-namespace fs = std::filesystem;
-using ::testing::AllOf;
-using ::testing::Contains;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::Not;
-using ::testing::ThrowsMessage;
+/// A csv table's header, and one with a row for 1.jpg.
+constexpr char kTable[] = "image,class,left,top,right,bottom\n";
+const std::string kOneRow = kTable + "1.jpg,,,,,\n"s;
+constexpr char kNoObjects[] = R"({"annotations": [], "images": []})";
 
-class FindSource : public ::testing::Test {
+class FindSource : public FolderTest {
  protected:
-  void write(const fs::path& name, const std::string& text = "") {
-    fs::create_directories((folder_.path() / name).parent_path());
-    testing::write_file(folder_.path() / name, text);
-  }
-  FoundSource find(const fs::path& name, std::optional<DatasetKind> dataset = std::nullopt) {
-    return find_sources(folder_.path() / name, dataset).front();
-  }
-  fs::path at(const fs::path& name) const { return folder_.path() / name; }
+  using enum DatasetKind;
+  using enum LabelFormat;
 
-  testing::TemporaryFolder folder_;
+  FoundSource find(const fs::path& name, std::optional<DatasetKind> dataset = {}) const {
+    return find_sources(at(name), dataset).front();
+  }
+  fs::path below(const fs::path& path, const fs::path& name) const {
+    return path.lexically_relative(at(name));
+  }
+  /// Writes "FILE, FILE=TEXT, ..." below a folder: empty, or with the text of that name.
+  void lay(const std::string& folder, const std::string& files,
+           const std::map<std::string, std::string>& texts = {}) const {
+    for (std::size_t begin = 0, end; begin < files.size(); begin = end + 2) {
+      end = std::min(files.find(", ", begin), files.size());
+      const std::string file = files.substr(begin, end - begin);
+      const std::size_t sign = file.find('=');
+      write(fs::path(folder) / file.substr(0, sign),
+            sign == file.npos ? "" : texts.at(file.substr(sign + 1)));
+    }
+  }
+  /// A folder with these files, and the labels that are found in it.
+  struct Labels {
+    LabelFormat format;
+    std::string root, path, files, split = "";
+  };
+  void expect_labels(const std::vector<Labels>& cases,
+                     const std::map<std::string, std::string>& texts) const {
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      const auto& [format, root, path, files, split] = cases[i];
+      SCOPED_TRACE(files);
+      const std::string name = "own" + std::to_string(i);
+      lay(name, files, texts);
+      const FoundSource found = find(name);
+      EXPECT_EQ(found.dataset, kFrames);
+      EXPECT_EQ(found.root, (at(name) / root / "").parent_path());
+      ASSERT_TRUE(found.labels) << ::testing::PrintToString(found.unread);
+      EXPECT_EQ(found.labels->format, format);
+      EXPECT_EQ(found.labels->path / "", at(name) / path / "");
+      EXPECT_EQ(find(name + "/" + root).labels->path, found.labels->path);
+      EXPECT_EQ(found.split, split);
+      EXPECT_THAT(found.unread, IsEmpty());
+    }
+  }
 };
 
 TEST_F(FindSource, KnowsEachDatasetByItsNames) {
   const struct {
     std::string root, file;
     DatasetKind dataset;
-    std::string_view layout;
+    std::string_view layout = "";
   } cases[] = {
-      {"object", "label_2/000000.txt", DatasetKind::kKittiObject, ""},
-      {"tracking", "label_02/0000.txt", DatasetKind::kKittiTracking, ""},
-      {"raw", "2011_09_26/2011_09_26_drive_0001_sync/image_02/data/0000000000.png",
-       DatasetKind::kKittiRaw, ""},
-      {"mpii", "mpii_human_pose_v1_u12_1.mat", DatasetKind::kMpii, ""},
-      {"mpii2", "mpii_human_pose_v1_u12_2/mpii_human_pose_v1_u12_1.mat", DatasetKind::kMpii, ""},
-      {"fetch", "S1/Walking-1/annot.h5", DatasetKind::kHuman36m, "fetch"},
-      {"fetch2", "S11/Walking-1/imageSequence/54138969/img_000001.jpg", DatasetKind::kHuman36m,
-       "fetch"},
-      {"extracted", "S1/S1_Walking_1.54138969/S1_Walking_1.54138969_000001.jpg",
-       DatasetKind::kHuman36m, "extracted"},
-      {"official", "S1/MyPoseFeatures/D2_Positions/Walking 1.54138969.cdf", DatasetKind::kHuman36m,
-       "official"},
-      {"images", "a.PNG", DatasetKind::kFrames, ""},
-      {"folders", "clip/1.jpg", DatasetKind::kFrames, ""},
-      {"videos", "clip.MOV", DatasetKind::kFrames, ""},
+      {"object", "label_2/000000.txt", kKittiObject},
+      {"tracking", "label_02/0000.txt", kKittiTracking},
+      {"raw", "2011_09_26/2011_09_26_drive_0001_sync/image_02/data/0000000000.png", kKittiRaw},
+      {"mpii", "mpii_human_pose_v1_u12_1.mat", kMpii},
+      {"mpii2", "mpii_human_pose_v1_u12_2/mpii_human_pose_v1_u12_1.mat", kMpii},
+      {"fetch", "S1/Walking-1/annot.h5", kHuman36m, "fetch"},
+      {"fetch2", "S11/Walking-1/imageSequence/5/img_000001.jpg", kHuman36m, "fetch"},
+      {"extracted", "S1/S1_Walking_1.5/S1_Walking_1.5_000001.jpg", kHuman36m, "extracted"},
+      {"official", "S1/MyPoseFeatures/D2_Positions/Walking 1.5.cdf", kHuman36m, "official"},
+      {"images", "a.PNG", kFrames},
+      {"folders", "clip/1.jpg", kFrames},
+      {"videos", "clip.MOV", kFrames},
   };
   for (const auto& expected : cases) {
+    SCOPED_TRACE(expected.root);
     write(expected.root + "/" + expected.file);
     for (const auto& dataset : {std::optional<DatasetKind>(), std::optional(expected.dataset)}) {
       const FoundSource found = find(expected.root, dataset);
-      EXPECT_EQ(found.dataset, expected.dataset) << expected.root;
-      EXPECT_EQ(found.layout, expected.layout) << expected.root;
+      EXPECT_EQ(found.dataset, expected.dataset);
+      EXPECT_EQ(found.layout, expected.layout);
       EXPECT_EQ(found.root, at(expected.root));
     }
   }
-  EXPECT_EQ(find("videos/clip.MOV").dataset, DatasetKind::kFrames);
+  EXPECT_EQ(find("videos/clip.MOV").dataset, kFrames);
 }
 
 TEST_F(FindSource, LooksIntoTheFolders) {
-  write("kitti/training/label_2/000000.txt");
-  write("kitti/testing/image_2/000000.png");
+  touch({"kitti/training/label_2/000000.txt", "kitti/testing/image_2/000000.png"});
   EXPECT_EQ(find("kitti/").root, at("kitti/training"));
   write("kitti/more/S1/Walking-1/annot.h5");
-  EXPECT_EQ(find("kitti", DatasetKind::kHuman36m).root, at("kitti/more"));
-  EXPECT_THAT([&] { find("kitti"); },
-              ThrowsMessage<InputError>(HasSubstr(
-                  "expected one dataset, got 2: more (human36m), training (kitti_object), "
-                  "in ")));
+  EXPECT_EQ(find("kitti", kHuman36m).root, at("kitti/more"));
+  EXPECT_THROWS(find("kitti"), InputError,
+                "expected one dataset, got 2: more (human36m), training (kitti_object), in ");
 }
 
 TEST_F(FindSource, KittiRawAndTheDevkitLieBesideKittiObject) {
   write("data/kitti/training/label_2/000000.txt");
-  EXPECT_THAT(find("data/kitti").remarks,
-              AllOf(Contains(HasSubstr("no devkit")), Contains(HasSubstr("no prev_2")),
-                    Contains(HasSubstr("no calib"))));
+  for (const char* remark : {"no devkit", "no prev_2", "no calib"}) {
+    EXPECT_THAT(find("data/kitti").remarks, Contains(HasSubstr(remark)));
+  }
   write("data/kitti/devkit/mapping/train_mapping.txt");
   FoundSource found = find("data/kitti");
   EXPECT_EQ(found.devkit, at("data/kitti/devkit"));
   EXPECT_EQ(found.raw_root, std::nullopt);
   EXPECT_THAT(found.remarks, Contains(HasSubstr("no raw_root")));
-  write("data/raw/2011_09_26/2011_09_26_drive_0001_sync/image_02/data/0000000000.png");
-  write("data/kitti/training/prev_2/000000_01.png");
-  write("data/kitti/training/calib/000000.txt");
+  touch({"data/raw/2011_09_26/2011_09_26_drive_0001_sync/image_02/data/0000000000.png",
+         "data/kitti/training/prev_2/000000_01.png", "data/kitti/training/calib/000000.txt"});
   found = find("data/kitti/training");
   EXPECT_EQ(found.raw_root, at("data/raw"));
   EXPECT_THAT(found.remarks, IsEmpty());
@@ -105,12 +125,10 @@ TEST_F(FindSource, KittiRawAndTheDevkitLieBesideKittiObject) {
 
 TEST_F(FindSource, AListOfPeopleIsKnownByItsContent) {
   const std::string list = R"([{"image": "a.jpg", "joints": []}])";
-  write("people/images/a.jpg");
-  write("people/annot/valid.json", list);
-  write("people/annot/coco.json", R"({"images": []})");
-  write("people/annot/none.json", "[]");
+  lay("people", "images/a.jpg, annot/valid.json=list, annot/coco.json=coco, annot/none.json=none",
+      {{"list", list}, {"coco", R"({"images": []})"}, {"none", "[]"}});
   FoundSource found = find("people");
-  EXPECT_EQ(found.dataset, DatasetKind::kMpiiList);
+  EXPECT_EQ(found.dataset, kMpiiList);
   EXPECT_EQ(found.annotations, at("people/annot/valid.json"));
   EXPECT_THAT(found.remarks, Contains(HasSubstr("no sequences")));
   write("people/annot/train.json", list);
@@ -118,15 +136,14 @@ TEST_F(FindSource, AListOfPeopleIsKnownByItsContent) {
   found = find("people");
   EXPECT_EQ(found.annotations, at("people/annot/train.json"));
   EXPECT_EQ(found.sequences, at("sequences"));
-  EXPECT_THAT(found.remarks, ::testing::ElementsAre(HasSubstr("annot/valid.json")));
+  EXPECT_THAT(found.remarks, ElementsAre(HasSubstr("annot/valid.json")));
   write("people/mpii_human_pose_v1_u12_1.mat");
-  EXPECT_EQ(find("people").dataset, DatasetKind::kMpii) << "it has more than the list";
+  EXPECT_EQ(find("people").dataset, kMpii) << "it has more than the list";
 }
 
 TEST_F(FindSource, VideosAreFoundByThemselvesAndInFolders) {
   write("videos/1.mp4");
-  EXPECT_THAT(find("videos").remarks, IsEmpty());
-  EXPECT_THAT(find("videos/1.mp4").remarks, IsEmpty());
+  for (const char* name : {"videos", "videos/1.mp4"}) EXPECT_THAT(find(name).remarks, IsEmpty());
 }
 
 TEST_F(FindSource, SaysOfWhichDatasetTheFramesAreAPart) {
@@ -138,43 +155,39 @@ TEST_F(FindSource, SaysOfWhichDatasetTheFramesAreAPart) {
                {"raw/2011_09_26/a/oxts", "raw/2011_09_26/drive/image_02/data", "raw"},
                {"mpii/mpii_human_pose_v1_u12_1.mat", "mpii/images", "mpii"},
                {"h36m/S1/Walking-1/annot.h5", "h36m/S1/Walking-1/imageSequence/5", "h36m"}};
-  for (const auto& part : cases) {
-    write(part.label);
-    write(part.frames + "/000000.png");
-    const FoundSource found = find(part.frames);
-    EXPECT_EQ(found.root, at(part.frames));
-    ASSERT_FALSE(found.remarks.empty()) << part.frames;
-    EXPECT_THAT(found.remarks.front(),
-                AllOf(HasSubstr("warning: this is only a part of "),
-                      ::testing::EndsWith("eventgan init \"" + at(part.root).string() + "\"")));
+  for (const auto& [label, frames, root] : cases) {
+    touch({label, frames + "/000000.png"});
+    const FoundSource found = find(frames);
+    EXPECT_EQ(found.root, at(frames));
+    ASSERT_FALSE(found.remarks.empty()) << frames;
+    EXPECT_THAT(found.remarks[0], AllOf(HasSubstr("warning: this is only a part of "),
+                                        EndsWith("eventgan init \"" + at(root).string() + "\"")));
   }
-  write("mini/label_2/000000.txt");
-  write("mini/images/000000.png");
-  EXPECT_THAT(find("mini/images").remarks.front(), ::testing::EndsWith("in image_2"));
-  EXPECT_EQ(find("mini").dataset, DatasetKind::kFrames) << "its images are where KITTI has none";
+  touch({"mini/label_2/000000.txt", "mini/images/000000.png"});
+  EXPECT_THAT(find("mini/images").remarks.front(), EndsWith("in image_2"));
+  EXPECT_EQ(find("mini").dataset, kFrames) << "its images are where KITTI has none";
   write("mini/other/000000.png");
   EXPECT_THAT(find("mini/other").remarks, Not(Contains(HasSubstr("a part of"))));
 }
 
 TEST_F(FindSource, SaysWhatThereIsInstead) {
-  write("testing/image_2/000000.png");
-  write("notes/readme.txt");
-  write("images/1.png");
-  const auto refused = [](const std::string& text) {
-    return ThrowsMessage<InputError>(AllOf(HasSubstr(text), Not(HasSubstr("\n"))));
-  };
-  EXPECT_THAT([&] { find("notes"); }, refused("got none of these, in "));
-  EXPECT_THAT([&] { find("notes/readme.txt"); }, refused("got none of these, in "));
-  EXPECT_THAT([&] { find("testing"); }, refused("got none of these, in "));
-  EXPECT_THAT([&] { find("absent"); }, refused("expected a folder or a video, got "));
-  EXPECT_THAT([&] { find("images", DatasetKind::kMpii); },
-              refused("expected mpii, got frames, in "));
-  EXPECT_THAT([&] { find("notes", DatasetKind::kFrames); },
-              refused("expected frames, got none of these, in "));
+  touch({"testing/image_2/000000.png", "notes/readme.txt", "images/1.png"});
+  const struct {
+    const char* name;
+    std::optional<DatasetKind> dataset;
+    const char* got;
+  } cases[] = {{"notes", {}, "got none of these, in "},
+               {"notes/readme.txt", {}, "got none of these, in "},
+               {"testing", {}, "got none of these, in "},
+               {"absent", {}, "expected a folder or a video, got "},
+               {"images", kMpii, "expected mpii, got frames, in "},
+               {"notes", kFrames, "expected frames, got none of these, in "}};
+  for (const auto& [name, dataset, got] : cases) {
+    EXPECT_THROWS(find(name, dataset), InputError, AllOf(HasSubstr(got), Not(HasSubstr("\n"))));
+  }
 }
 
 TEST_F(FindSource, SaysWhatAFileIsAndWhatToDoWithIt) {
-  using namespace std::string_literals;
   const struct {
     std::string name, text, title, way_out;
   } cases[] = {
@@ -189,13 +202,12 @@ TEST_F(FindSource, SaysWhatAFileIsAndWhatToDoWithIt) {
       {"a.zip", "PK\3\4 a.jpg", "an archive", "unpack it"},
       {"w.safetensors", "\x10\0\0\0\0\0\0\0{}"s, "weights", "a manifest names them"},
       {"a.jpg", "\xff\xd8\xff", "an image", "give its folder"}};
-  for (const auto& one : cases) {
-    write(one.name, one.text);
-    const auto is_said =
-        AllOf(HasSubstr("got " + one.title), HasSubstr("in " + at(one.name).string()),
-              HasSubstr(one.way_out), Not(HasSubstr("\n")));
-    EXPECT_THAT(fault_of_file(at(one.name)), is_said);
-    EXPECT_THAT([&] { find(one.name); }, ThrowsMessage<InputError>(is_said));
+  for (const auto& [name, text, title, way_out] : cases) {
+    write(name, text);
+    const auto is_said = AllOf(HasSubstr("got " + title), HasSubstr("in " + at(name).string()),
+                               HasSubstr(way_out), Not(HasSubstr("\n")));
+    EXPECT_THAT(fault_of_file(at(name)), is_said);
+    EXPECT_THROWS(find(name), InputError, is_said);
   }
   write("manifest.json", R"({"format": "eventgan-manifest", "sources": [{"annotations": "a"}]})");
   write("notes.txt", "notes");
@@ -206,304 +218,172 @@ TEST_F(FindSource, SaysWhatAFileIsAndWhatToDoWithIt) {
 }
 
 TEST_F(FindSource, OfSeveralNamesAllWithTheLineForOneManifest) {
-  for (const char* name : {"a", "d"}) {
-    write(std::string("data/") + name + "/label_2/000000.txt");
-    write(std::string("data/") + name + "/image_2/000000.png");
-    write(std::string("many/") + name + "/images/1.png");
+  for (const std::string name : {"a", "d"}) {
+    touch({"data/" + name + "/label_2/000000.txt", "data/" + name + "/image_2/000000.png",
+           "many/" + name + "/images/1.png"});
   }
   write("data/b/1.png");
-  const auto refused = [this](const std::string& names, const std::string& last) {
-    return ThrowsMessage<InputError>(
-        AllOf(HasSubstr("expected one dataset, got " + names + ", in "),
-              HasSubstr("(one manifest of several: eventgan init \""),
-              ::testing::EndsWith(" \"" + at(last).string() + "\")")));
-  };
-  EXPECT_THAT([&] { find("data"); },
-              refused("3: a (kitti_object), b (frames), d (kitti_object)", "data/d"));
-  EXPECT_THAT([&] { find("many"); }, refused("2: a (frames), d (frames)", "many/d"));
+  for (const auto& [name, got] :
+       {std::pair("data", "3: a (kitti_object), b (frames), d (kitti_object)"),
+        {"many", "2: a (frames), d (frames)"}}) {
+    EXPECT_THROWS(find(name), InputError,
+                  AllOf(HasSubstr("expected one dataset, got "s + got + ", in "),
+                        HasSubstr("(one manifest of several: eventgan init \""),
+                        EndsWith(" \"" + at(name / fs::path("d")).string() + "\")")));
+  }
 }
 
 TEST_F(FindSource, LabelsOfOnesOwnLieBesideTheImages) {
   const std::string coco = R"({"info": {}, "images": [{"id": 1, "file_name": "1.jpg"}], )"
                            R"("annotations": [], "categories": []})";
-  const struct {
-    LabelFormat format;
-    std::string root, path;  ///< what is to be found
-    std::vector<std::pair<std::string, std::string>> files;
-  } cases[] = {
-      {LabelFormat::kCoco,
-       "train2017",
-       "annotations/instances_train2017.json",
-       {{"train2017/1.jpg", ""},
-        {"annotations/instances_train2017.json", coco},
-        {"annotations/captions_train2017.json", coco},
-        {"annotations/person_keypoints_train2017.json", coco}}},
-      {LabelFormat::kCoco, "images", "boxes.json", {{"images/1.jpg", ""}, {"boxes.json", coco}}},
-      {LabelFormat::kCoco,
-       "train",
-       "train/_annotations.coco.json",
-       {{"train/1.jpg", ""}, {"train/_annotations.coco.json", coco}, {"test/2.jpg", ""}}},
-      {LabelFormat::kCoco,
-       "",
-       "_annotations.coco.json",
-       {{"1.jpg", ""}, {"_annotations.coco.json", coco}}},
-      {LabelFormat::kYolo,
-       "images",
-       "",
-       {{"images/train/1.jpg", ""}, {"labels/train/1.txt", ""}, {"data.yaml", ""}}},
-      {LabelFormat::kYolo,
-       "images",
-       "labels",
-       {{"images/1.jpg", ""}, {"labels/1.txt", ""}, {"labels/classes.txt", ""}}},
-      {LabelFormat::kYolo,
-       "train/images",
-       "",
-       {{"train/images/1.jpg", ""}, {"train/labels/1.txt", ""}, {"data.yaml", ""}}},
-      {LabelFormat::kYolo, "", "", {{"1.jpg", ""}, {"1.txt", ""}, {"classes.txt", ""}}},
-      {LabelFormat::kVoc,
-       "JPEGImages",
-       "Annotations",
-       {{"JPEGImages/1.jpg", ""}, {"Annotations/1.xml", ""}, {"SegmentationClass/1.png", ""}}},
-      {LabelFormat::kVoc, "", "", {{"1.jpg", ""}, {"1.xml", ""}}},
-      {LabelFormat::kMot, "", "", {{"s/img1/000001.jpg", ""}, {"s/gt/gt.txt", ""}}},
-      {LabelFormat::kMot, "img1", "", {{"img1/000001.jpg", ""}, {"gt/gt.txt", ""}}},
-      {LabelFormat::kMot, "images", "", {{"images/s/000001.jpg", ""}, {"s/gt.txt", ""}}},
-      {LabelFormat::kCsv,
-       "images",
-       "boxes.csv",
-       {{"images/1.jpg", ""},
-        {"boxes.csv", "image,class,left,top,right,bottom\n1.jpg,,,,,\n"},
-        {"others.csv", "image,class,left,top,right,bottom\n2.jpg,,,,,\n"},
-        {"frames.csv", "image,width\n"}}},
-      {LabelFormat::kCsv,
-       "",
-       "boxes.csv",
-       {{"clip.mp4", ""},
-        {"boxes.csv", "image,class,left,top,right,bottom,track\nclip/0,,,,,,\n"}}},
-  };
-  int number = 0;
-  for (const auto& expected : cases) {
-    const std::string name = "own" + std::to_string(number++);
-    for (const auto& [file, text] : expected.files) write(name + "/" + file, text);
-    const FoundSource found = find(name);
-    EXPECT_EQ(found.dataset, DatasetKind::kFrames) << name;
-    EXPECT_EQ(found.root, (at(name) / expected.root / "").parent_path()) << name;
-    ASSERT_TRUE(found.labels) << name;
-    EXPECT_EQ(found.labels->format, expected.format) << name;
-    EXPECT_EQ(found.labels->path / "", at(name) / expected.path / "") << name;
-    EXPECT_EQ(find(name + "/" + expected.root).labels->path, found.labels->path) << name;
-  }
+  expect_labels({{kCoco, "train2017", "annotations/instances_train2017.json",
+                  "train2017/1.jpg, annotations/instances_train2017.json=coco, "
+                  "annotations/captions_train2017.json=coco, "
+                  "annotations/person_keypoints_train2017.json=coco"},
+                 {kCoco, "images", "boxes.json", "images/1.jpg, boxes.json=coco"},
+                 {kCoco, "train", "train/_annotations.coco.json",
+                  "train/1.jpg, train/_annotations.coco.json=coco, test/2.jpg"},
+                 {kCoco, "", "_annotations.coco.json", "1.jpg, _annotations.coco.json=coco"},
+                 {kYolo, "images", "", "images/train/1.jpg, labels/train/1.txt, data.yaml"},
+                 {kYolo, "images", "labels", "images/1.jpg, labels/1.txt, labels/classes.txt"},
+                 {kYolo, "train/images", "", "train/images/1.jpg, train/labels/1.txt, data.yaml"},
+                 {kYolo, "", "", "1.jpg, 1.txt, classes.txt"},
+                 {kVoc, "JPEGImages", "Annotations",
+                  "JPEGImages/1.jpg, Annotations/1.xml, SegmentationClass/1.png"},
+                 {kVoc, "", "", "1.jpg, 1.xml"},
+                 {kMot, "", "", "s/img1/000001.jpg, s/gt/gt.txt"},
+                 {kMot, "img1", "", "img1/000001.jpg, gt/gt.txt"},
+                 {kMot, "images", "", "images/s/000001.jpg, s/gt.txt"},
+                 {kCsv, "images", "boxes.csv",
+                  "images/1.jpg, boxes.csv=one, others.csv=another, frames.csv=sizes"},
+                 {kCsv, "", "boxes.csv", "clip.mp4, boxes.csv=tracks"}},
+                {{"coco", coco},
+                 {"one", kOneRow},
+                 {"another", kTable + "2.jpg,,,,,\n"s},
+                 {"sizes", "image,width\n"},
+                 {"tracks", "image,class,left,top,right,bottom,track\nclip/0,,,,,,\n"}});
 }
 
 TEST_F(FindSource, LabelsLieWhereToolsPutThem) {
-  const std::string mot = "1,1,1,1,2,2,1,1,1\n", yolo = "\xEF\xBB\xBF\n1 0.5 0.5 0.25 0.5\n";
   const auto coco = [](const std::string& images) {
-    return "\xEF\xBB\xBF\n{\"annotations\": [{\"id\": 1, \"bbox\": [1, 2, 3, 4], \"image_id\": "
-           "1}], "
-           "\"categories\": [], \"images\": [" +
+    return "\xEF\xBB\xBF\n{\"annotations\": [{\"id\": 1, \"bbox\": [1, 2, 3, 4], "
+           "\"image_id\": 1}], \"categories\": [], \"images\": [" +
            images + "]}";
   };
-  const std::string listed = coco(R"({"file_name": "1.jpg", "id": 1})");
-  const struct {
-    LabelFormat format;
-    std::string root, path, split;  ///< what is to be found
-    std::vector<std::pair<std::string, std::string>> files;
-  } cases[] = {
-      {LabelFormat::kCoco,
-       "images/default",
-       "annotations/instances_default.json",
-       "",
-       {{"images/default/1.jpg", ""}, {"annotations/instances_default.json", listed}}},
-      {LabelFormat::kCoco,
-       "val2017",
-       "annotations/instances_val2017.json",
-       "val",
-       {{"val2017/1.jpg", ""}, {"annotations/instances_val2017.json", listed}}},
-      {LabelFormat::kCoco,
-       "images",
-       "result.json",
-       "",
-       {{"images/1.jpg", ""}, {"result.json", coco(R"({"file_name": "images\/1\/1.jpg"})")}}},
-      {LabelFormat::kCoco,
-       "images",
-       "a.json",
-       "",
-       {{"images/\uac70 1.jpg", ""}, {"a.json", coco(R"({"file_name": "\uac70 1.jpg"})")}}},
-      {LabelFormat::kCoco,
-       "Images",
-       "Annotations/a.json",
-       "",
-       {{"Images/1.jpg", ""}, {"Annotations/a.json", listed}}},
-      {LabelFormat::kCoco,
-       "",
-       "labels.json",
-       "",
-       {{"data/1.jpg", ""}, {"labels.json", listed}, {"._labels.json", "Mac"}}},
-      {LabelFormat::kYolo, "", "labels", "", {{"1.jpg", ""}, {"labels/1.txt", yolo}}},
-      {LabelFormat::kYolo,
-       "Images",
-       "",
-       "",
-       {{"Images/1.jpg", ""}, {"Labels/1.txt", ""}, {"data.yaml", ""}}},
-      {LabelFormat::kYolo,
-       "",
-       "",
-       "",
-       {{"obj_train_data/1.jpg", ""},
-        {"obj_train_data/1.txt", ""},
-        {"obj.names", "car"},
-        {"obj.data", "classes = 1"},
-        {"train.txt", "data/obj_train_data/1.jpg"}}},
-      {LabelFormat::kYolo,
-       "",
-       "",
-       "",
-       {{"clip.mp4", ""}, {"labels/clip_000012.txt", ""}, {"data.yaml", ""}}},
-      {LabelFormat::kYolo,
-       "",
-       "",
-       "",
-       {{"clip.mp4", ""}, {"clip/12.txt", ""}, {"classes.txt", ""}}},
-      {LabelFormat::kVoc,
-       "images",
-       "annotations/xmls",
-       "",
-       {{"images/1.jpg", ""}, {"annotations/xmls/1.xml", ""}}},
-      {LabelFormat::kVoc, "images", "labels", "", {{"images/1.jpg", ""}, {"labels/1.xml", ""}}},
-      {LabelFormat::kVoc, "images", "xml", "", {{"images/1.jpg", ""}, {"xml/1.xml", ""}}},
-      {LabelFormat::kMot, "", "", "", {{"highway.mp4", ""}, {"highway/gt/gt.txt", mot}}},
-      {LabelFormat::kMot, "", "", "", {{"highway.mp4", ""}, {"highway.txt", mot}}},
-      {LabelFormat::kMot, "", "", "", {{"1.jpg", ""}, {"gt/gt.txt", mot}}},
-      {LabelFormat::kCsv,
-       "",
-       "a.csv",
-       "",
-       {{"highway.mp4", ""}, {"a.csv", "frame;label;x;y;w;h\nhighway.mp4/12;car;1;2;3;4\n"}}},
-      {LabelFormat::kCsv,
-       "train",
-       "train/_annotations.csv",
-       "",
-       {{"train/1.jpg", ""},
-        {"train/_annotations.csv",
-         "filename,width,height,class,xmin,ymin,xmax,ymax\n1.jpg,9,9,car,1,2,3,4\n"}}},
-  };
-  int number = 0;
-  for (const auto& expected : cases) {
-    const std::string name = "tool" + std::to_string(number++);
-    for (const auto& [file, text] : expected.files) write(name + "/" + file, text);
-    const FoundSource found = find(name);
-    EXPECT_EQ(found.root, (at(name) / expected.root / "").parent_path()) << name;
-    ASSERT_TRUE(found.labels) << name << " " << ::testing::PrintToString(found.unread);
-    EXPECT_EQ(found.labels->format, expected.format) << name;
-    EXPECT_EQ(found.labels->path / "", at(name) / expected.path / "") << name;
-    EXPECT_EQ(found.split, expected.split) << name;
-    EXPECT_THAT(found.unread, IsEmpty()) << name;
-  }
+  expect_labels(
+      {{kCoco, "images/default", "annotations/instances_default.json",
+        "images/default/1.jpg, annotations/instances_default.json=coco"},
+       {kCoco, "val2017", "annotations/instances_val2017.json",
+        "val2017/1.jpg, annotations/instances_val2017.json=coco", "val"},
+       {kCoco, "images", "result.json", "images/1.jpg, result.json=label studio"},
+       {kCoco, "images", "a.json", "images/\uac70 1.jpg, a.json=korean"},
+       {kCoco, "Images", "Annotations/a.json", "Images/1.jpg, Annotations/a.json=coco"},
+       {kCoco, "", "labels.json", "data/1.jpg, labels.json=coco, ._labels.json=mac"},
+       {kYolo, "", "labels", "1.jpg, labels/1.txt=yolo"},
+       {kYolo, "Images", "", "Images/1.jpg, Labels/1.txt, data.yaml"},
+       {kYolo, "", "",
+        "obj_train_data/1.jpg, obj_train_data/1.txt, obj.names=car, obj.data=classes, "
+        "train.txt=list"},
+       {kYolo, "", "", "clip.mp4, labels/clip_000012.txt, data.yaml"},
+       {kYolo, "", "", "clip.mp4, clip/12.txt, classes.txt"},
+       {kVoc, "images", "annotations/xmls", "images/1.jpg, annotations/xmls/1.xml"},
+       {kVoc, "images", "labels", "images/1.jpg, labels/1.xml"},
+       {kVoc, "images", "xml", "images/1.jpg, xml/1.xml"},
+       {kMot, "", "", "highway.mp4, highway/gt/gt.txt=mot"},
+       {kMot, "", "", "highway.mp4, highway.txt=mot"},
+       {kMot, "", "", "1.jpg, gt/gt.txt=mot"},
+       {kCsv, "", "a.csv", "highway.mp4, a.csv=frames"},
+       {kCsv, "train", "train/_annotations.csv", "train/1.jpg, train/_annotations.csv=roboflow"}},
+      {{"coco", coco(R"({"file_name": "1.jpg", "id": 1})")},
+       {"label studio", coco(R"({"file_name": "images\/1\/1.jpg"})")},
+       {"korean", coco(R"({"file_name": "\uac70 1.jpg"})")},
+       {"mac", "Mac"},
+       {"yolo", "\xEF\xBB\xBF\n1 0.5 0.5 0.25 0.5\n"},
+       {"car", "car"},
+       {"classes", "classes = 1"},
+       {"list", "data/obj_train_data/1.jpg"},
+       {"mot", "1,1,1,1,2,2,1,1,1\n"},
+       {"frames", "frame;label;x;y;w;h\nhighway.mp4/12;car;1;2;3;4\n"},
+       {"roboflow", "filename,width,height,class,xmin,ymin,xmax,ymax\n1.jpg,9,9,car,1,2,3,4\n"}});
 }
 
 TEST_F(FindSource, WhatLooksLikeLabelsAndIsNotReadIsNamed) {
-  const std::string box = R"({"label": "car", "coordinates": {"x": 1}})";
-  const std::pair<std::string, std::vector<std::pair<std::string, std::string>>> cases[] = {
-      {"CVAT's XML",
-       {{"images/1.jpg", ""}, {"annotations.xml", "<annotations><image id=\"0\"/></annotations>"}}},
-      {"labelme's", {{"1.jpg", ""}, {"1.json", R"({"shapes": [], "imagePath": "1.jpg"})"}}},
-      {"CreateML's",
-       {{"train/1.jpg", ""},
-        {"train/_annotations.createml.json",
-         "[{\"image\": \"1.jpg\", \"annotations\": [" + box + "]}]"}}},
-      {"Label Studio's",
-       {{"images/1.jpg", ""}, {"project.json", R"([{"id": 1, "data": {}, "annotations": []}])"}}},
-      {"YOLO",
-       {{"images/a/1.jpg", ""}, {"images/b/2.jpg", ""}, {"labels/2.txt", "0 .5 .5 .2 .2\n"}}},
-      {"VisDrone's", {{"images/1.jpg", ""}, {"annotations/1.txt", "684,8,273,116,0,0,0,0\n"}}},
-      {"KITTI's",
-       {{"images/1.jpg", ""},
-        {"label_2/1.txt",
-         "Car 0.00 0 -1.58 587 173 614 200 1.65 1.67 3.64 -0.65 1.71 46.70 -1.59\n"}}},
-      {"COCO",
-       {{"images/1.jpg", ""},
-        {"a.json", R"({"images": [{"file_name": "gone.jpg"}], "annotations": [{"bbox": []}]})"}}},
-      {"a table of", {{"1.jpg", ""}, {"a.csv", "1.jpg,1,2,3,4,car\n"}}},
-      {"a table of", {{"00000.ppm", ""}, {"gt.txt", "00000.ppm;774;411;815;446;11\n"}}},
-      {"a table of",
-       {{"train/b6ab.jpg", ""},
-        {"train.csv", "image_id,width,height,bbox,source\nb6ab,9,9,\"[1.0, 2, 3, 4]\",usask\n"}}},
-      {"Open Images'",
-       {{"train/0a1b.jpg", ""},
-        {"boxes.csv",
-         "ImageID,Source,LabelName,Confidence,XMin,XMax,YMin,YMax\n"
-         "0a1b,xclick,/m/0k4j,1,0.1,0.2,0.3,0.4\n"}}},
-      {"BDD100K's",
-       {{"images/100k/train/f-1.jpg", ""},
-        {"labels/det_20/det_train.json",
-         R"([{"name": "f-1.jpg"}, {"name": "f-2.jpg", "labels": [{"box2d": {"x1": 1}}]}])"}}},
-      {"Supervisely's",
-       {{"ds/img/im.jpg", ""},
-        {"ds/ann/im.jpg.json", R"({"tags": [], "size": {"height": 9}, "objects": []})"},
-        {"meta.json", R"({"classes": [], "tags": []})"}}},
-      {"DOTA's",
-       {{"train/images/P1.png", ""},
-        {"train/labelTxt-v1.0/P1.txt",
-         "imagesource:GoogleEarth\ngsd:0.1\n"
-         "1 1 5 1 5 5 1 5 plane 0\n"}}},
-      {"PoseTrack's",
-       {{"images/val/000342_mpii/000000.jpg", ""},
-        {"annotations/val/000342_mpii.json",
-         R"({"images": [{"file_name": "images/val/000342_mpii/000000.jpg"}],)"
-         R"( "annotations": [{"bbox": [1, 2, 3, 4], "keypoints": []}]})"}}},
-      {"UA-DETRAC's",
-       {{"MVI_20011/img00001.jpg", ""},
-        {"MVI_20011.xml", "<sequence name=\"MVI_20011\"><frame num=\"1\"><target_list/>"}}},
-      {"GOT-10k's or LaSOT's",
-       {{"GOT_1/00000001.jpg", ""}, {"GOT_1/groundtruth.txt", "1.0,2.0,3.0,4.0\n"}}},
-      {"UAVDT's", {{"M0101/img000001.jpg", ""}, {"M0101_gt_whole.txt", "1,1,1,2,3,4,1,1,1\n"}}},
-      {"CrowdHuman's",
-       {{"Images/273271,c9db.jpg", ""},
-        {"a.odgt", R"({"ID": "273271,c9db", "gtboxes": [{"fbox": [1, 2, 3, 4]}]})"}}},
-      {"LVIS's",
-       {{"images/000000397133.jpg", ""},
-        {"lvis.json",
-         R"({"images": [{"id": 1, "coco_url": "http://x/train2017/000000397133.jpg"}],)"
-         R"( "annotations": [{"bbox": [1, 2, 3, 4]}]})"}}},
-      {"YouTube-VIS's",
-       {{"JPEGImages/0a1/00000.jpg", ""},
-        {"instances.json",
-         R"({"videos": [{"file_names": ["0a1/00000.jpg"]}], "annotations": [{"bboxes": []}]})"}}},
-      {"nuImages'",
-       {{"samples/CAM/n003.jpg", ""},
-        {"v1.0-mini/object_ann.json", R"([{"token": "a", "category_token": "b", "bbox": [1]}])"}}},
-      {"AI Challenger's",
-       {{"images/70b1.jpg", ""},
-        {"a.json", R"([{"image_id": "70b1", "human_annotations": {"human1": [1, 2, 3, 4]}}])"}}},
-      {"SoccerNet's",
-       {{"img1/000001.jpg", ""},
-        {"Labels-GameState.json", R"({"images": [{"file_name": "000001.jpg"}],)"
-                                  R"( "annotations": [{"bbox_image": {"x": 1}}]})"}}},
-      {"a table of",
-       {{"1.jpg", ""}, {"a.csv", "image,class,left,top,right,bottom,score\n1.jpg,a,0,0,1,1,1\n"}}},
-  };
+  const struct {
+    std::string title, images, labels, text, more = "", more_text = "";
+  } cases[] = {
+      {"CVAT's XML", "images/1.jpg", "annotations.xml",
+       "<annotations><image id=\"0\"/></annotations>"},
+      {"labelme's", "1.jpg", "1.json", R"({"shapes": [], "imagePath": "1.jpg"})"},
+      {"CreateML's", "train/1.jpg", "train/_annotations.createml.json",
+       R"([{"image": "1.jpg", "annotations": [{"label": "car", "coordinates": {"x": 1}}]}])"},
+      {"Label Studio's", "images/1.jpg", "project.json",
+       R"([{"id": 1, "data": {}, "annotations": []}])"},
+      {"YOLO", "images/a/1.jpg, images/b/2.jpg", "labels/2.txt", "0 .5 .5 .2 .2\n"},
+      {"VisDrone's", "images/1.jpg", "annotations/1.txt", "684,8,273,116,0,0,0,0\n"},
+      {"KITTI's", "images/1.jpg", "label_2/1.txt",
+       "Car 0.00 0 -1.58 587 173 614 200 1.65 1.67 3.64 -0.65 1.71 46.70 -1.59\n"},
+      {"COCO", "images/1.jpg", "a.json",
+       R"({"images": [{"file_name": "gone.jpg"}], "annotations": [{"bbox": []}]})"},
+      {"a table of", "1.jpg", "a.csv", "1.jpg,1,2,3,4,car\n"},
+      {"a table of", "00000.ppm", "gt.txt", "00000.ppm;774;411;815;446;11\n"},
+      {"a table of", "train/b6ab.jpg", "train.csv",
+       "image_id,width,height,bbox,source\nb6ab,9,9,\"[1.0, 2, 3, 4]\",usask\n"},
+      {"Open Images'", "train/0a1b.jpg", "boxes.csv",
+       "ImageID,Source,LabelName,Confidence,XMin,XMax,YMin,YMax\n"
+       "0a1b,xclick,/m/0k4j,1,0.1,0.2,0.3,0.4\n"},
+      {"BDD100K's", "images/100k/train/f-1.jpg", "labels/det_20/det_train.json",
+       R"([{"name": "f-1.jpg"}, {"name": "f-2.jpg", "labels": [{"box2d": {"x1": 1}}]}])"},
+      {"Supervisely's", "ds/img/im.jpg", "ds/ann/im.jpg.json",
+       R"({"tags": [], "size": {"height": 9}, "objects": []})", "meta.json",
+       R"({"classes": [], "tags": []})"},
+      {"DOTA's", "train/images/P1.png", "train/labelTxt-v1.0/P1.txt",
+       "imagesource:GoogleEarth\ngsd:0.1\n1 1 5 1 5 5 1 5 plane 0\n"},
+      {"PoseTrack's", "images/val/000342_mpii/000000.jpg", "annotations/val/000342_mpii.json",
+       R"({"images": [{"file_name": "images/val/000342_mpii/000000.jpg"}],)"
+       R"( "annotations": [{"bbox": [1, 2, 3, 4], "keypoints": []}]})"},
+      {"UA-DETRAC's", "MVI_20011/img00001.jpg", "MVI_20011.xml",
+       "<sequence name=\"MVI_20011\"><frame num=\"1\"><target_list/>"},
+      {"GOT-10k's or LaSOT's", "GOT_1/00000001.jpg", "GOT_1/groundtruth.txt", "1.0,2.0,3.0,4.0\n"},
+      {"UAVDT's", "M0101/img000001.jpg", "M0101_gt_whole.txt", "1,1,1,2,3,4,1,1,1\n"},
+      {"CrowdHuman's", "Images/273271,c9db.jpg", "a.odgt",
+       R"({"ID": "273271,c9db", "gtboxes": [{"fbox": [1, 2, 3, 4]}]})"},
+      {"LVIS's", "images/000000397133.jpg", "lvis.json",
+       R"({"images": [{"id": 1, "coco_url": "http://x/train2017/000000397133.jpg"}],)"
+       R"( "annotations": [{"bbox": [1, 2, 3, 4]}]})"},
+      {"YouTube-VIS's", "JPEGImages/0a1/00000.jpg", "instances.json",
+       R"({"videos": [{"file_names": ["0a1/00000.jpg"]}], "annotations": [{"bboxes": []}]})"},
+      {"nuImages'", "samples/CAM/n003.jpg", "v1.0-mini/object_ann.json",
+       R"([{"token": "a", "category_token": "b", "bbox": [1]}])"},
+      {"AI Challenger's", "images/70b1.jpg", "a.json",
+       R"([{"image_id": "70b1", "human_annotations": {"human1": [1, 2, 3, 4]}}])"},
+      {"SoccerNet's", "img1/000001.jpg", "Labels-GameState.json",
+       R"({"images": [{"file_name": "000001.jpg"}], "annotations": [{"bbox_image": {"x": 1}}]})"},
+      {"a table of", "1.jpg", "a.csv",
+       "image,class,left,top,right,bottom,score\n1.jpg,a,0,0,1,1,1\n"}};
   int number = 0;
-  for (const auto& [title, files] : cases) {
+  for (const auto& one : cases) {
     const std::string name = "unread" + std::to_string(number++);
-    for (const auto& [file, text] : files) write(name + "/" + file, text);
+    SCOPED_TRACE(one.title + " " + name);
+    lay(name, one.images);
+    write(fs::path(name) / one.labels, one.text);
+    if (!one.more.empty()) write(fs::path(name) / one.more, one.more_text);
     const FoundSource found = find(name);
-    EXPECT_EQ(found.dataset, DatasetKind::kFrames) << name;
-    EXPECT_FALSE(found.labels) << name;
+    EXPECT_EQ(found.dataset, kFrames);
+    EXPECT_FALSE(found.labels);
     EXPECT_THAT(found.unread,
-                ::testing::ElementsAre(AllOf(
-                    ::testing::StartsWith(at(name).string()),
-                    HasSubstr(" looks like " + title + " labels of these images and is not read: "),
-                    HasSubstr("; "))))
-        << name;
+                ElementsAre(AllOf(StartsWith(at(name).string()),
+                                  HasSubstr(" looks like " + one.title +
+                                            " labels of these images and is not read: "),
+                                  HasSubstr("; "))));
   }
   EXPECT_THAT(find("unread" + std::to_string(number - 1)).unread.front(),
               HasSubstr("it has a column of scores"));
   EXPECT_THAT(find("unread6").unread.front(), HasSubstr("of other classes than KITTI's"));
-  write("none/1.jpg");
-  write("none/1.txt", "a street with two cars\n");
-  write("none/captions.json", R"([{"image": "1.jpg", "caption": "a street"}])");
-  write("none/frames.csv", "image,width,height,sequence,index\n1.jpg,64,48,a,1\n");
-  write("none/1.json", R"({"mine": [1, 2]})");
+  lay("none", "1.jpg, 1.txt=caption, captions.json=captions, frames.csv=frames, 1.json=mine",
+      {{"caption", "a street with two cars\n"},
+       {"captions", R"([{"image": "1.jpg", "caption": "a street"}])"},
+       {"frames", "image,width,height,sequence,index\n1.jpg,64,48,a,1\n"},
+       {"mine", R"({"mine": [1, 2]})"}});
   EXPECT_THAT(find("none").unread, IsEmpty());
 }
 
@@ -526,23 +406,22 @@ TEST_F(FindSource, WhatNamesTheImagesAndIsNotReadIsNamed) {
       {"../all.json", box}};
   int number = 0;
   for (const auto& [file, text] : files) {
-    const std::string name = "named" + std::to_string(number++);
-    write(name + "/set/clip/im1.jpg");
-    write(name + "/set/" + file, text);
-    const fs::path place = at(name + "/set/" + file).lexically_normal();
-    EXPECT_THAT(find(name + "/set").unread,
-                ::testing::ElementsAre(AllOf(::testing::StartsWith(place.string()),
-                                             HasSubstr(" is not read: no reader of its format"))))
-        << file;
-    EXPECT_THAT(find(name + "/set").remarks, IsEmpty()) << file;
-    // With labels it is a remark.
-    write(name + "/set/b.csv", "image,class,left,top,right,bottom\nim1.jpg,a,0,0,1,1\n");
-    EXPECT_TRUE(find(name + "/set").labels) << file;
-    EXPECT_THAT(find(name + "/set").unread, IsEmpty()) << file;
+    SCOPED_TRACE(file);
+    const std::string name = "named" + std::to_string(number++) + "/set";
+    write(name + "/clip/im1.jpg");
+    write(name + "/" + file, text);
+    const std::string place = at(name + "/" + file).lexically_normal().string();
     EXPECT_THAT(
-        find(name + "/set").remarks,
-        ::testing::ElementsAre("1 file with names of these images not read: " + place.string()))
-        << file;
+        find(name).unread,
+        ElementsAre(AllOf(StartsWith(place), HasSubstr(" is not read: no reader of its format"))));
+    EXPECT_THAT(find(name).remarks, IsEmpty());
+    // With labels it is a remark.
+    write(name + "/b.csv", kTable + "im1.jpg,a,0,0,1,1\n"s);
+    const FoundSource labelled = find(name);
+    EXPECT_TRUE(labelled.labels);
+    EXPECT_THAT(labelled.unread, IsEmpty());
+    EXPECT_THAT(labelled.remarks,
+                ElementsAre("1 file with names of these images not read: " + place));
   }
 }
 
@@ -570,9 +449,8 @@ TEST_F(FindSource, WhatNamesTheImagesAndIsNoLabelStopsNothing) {
   EXPECT_THAT(find("quiet").remarks, IsEmpty());
   write("quiet/captions.txt", "IMG_0001.jpg two dogs\n");
   EXPECT_THAT(find("quiet").unread, IsEmpty());
-  EXPECT_THAT(find("quiet").remarks,
-              ::testing::ElementsAre("1 file with names of these images not read: " +
-                                     at("quiet/captions.txt").string()));
+  EXPECT_THAT(find("quiet").remarks, ElementsAre("1 file with names of these images not read: " +
+                                                 at("quiet/captions.txt").string()));
   write("quiet/sets/other/images/IMG_0002.jpg");  // another dataset
   write("quiet/sets/other/boxes.json", R"({"of": "IMG_0001.jpg", "at": [1, 2, 3, 4]})");
   EXPECT_THAT(find("quiet").unread, IsEmpty());
@@ -582,60 +460,48 @@ TEST_F(FindSource, ImagesThatLieTooDeepAreNamed) {
   write("deep/images/train/camA/day1/1.jpg");
   write("deep/labels/train/camA/day1/1.txt", "0 .5 .5 .2 .2\n");
   write("deep/data.yaml", "names: [car]\n");
-  EXPECT_THAT([&] { find("deep"); }, ThrowsMessage<InputError>(::testing::EndsWith(
-                                         "in " + at("deep").string() +
-                                         "; images lie in images/train/camA/day1: run eventgan "
-                                         "convert \"" +
-                                         at("deep/images/train").string() + "\"")));
-  EXPECT_EQ(find("deep/images/train").labels->format, LabelFormat::kYolo);
-  write("fetch/S1/Walking-1/annot.h5");
-  write("fetch/S1/Walking-1/imageSequence/54138969/img_000001.jpg");
-  EXPECT_THAT([&] { find("fetch/S1"); },
-              ThrowsMessage<InputError>(
-                  AllOf(HasSubstr("this is only a part of Human3.6M"),
-                        ::testing::EndsWith("eventgan convert \"" + at("fetch").string() + "\""))));
+  EXPECT_THROWS(find("deep"), InputError,
+                EndsWith("in " + at("deep").string() + "; images lie in images/train/camA/day1: " +
+                         "run eventgan convert \"" + at("deep/images/train").string() + "\""));
+  EXPECT_EQ(find("deep/images/train").labels->format, kYolo);
+  touch({"fetch/S1/Walking-1/annot.h5", "fetch/S1/Walking-1/imageSequence/5/img_000001.jpg"});
+  EXPECT_THROWS(find("fetch/S1"), InputError,
+                AllOf(HasSubstr("this is only a part of Human3.6M"),
+                      EndsWith("eventgan convert \"" + at("fetch").string() + "\"")));
   // ImageNet's videos: the labels' tree stands beside that of the images.
   write("vid/Data/VID/train/set/clip/000000.JPEG");
   write("vid/Annotations/VID/train/set/clip/000000.xml", "<annotation/>");
-  EXPECT_THAT([&] { find("vid"); }, ThrowsMessage<InputError>(HasSubstr("vid/Data/VID/train\"")));
-  EXPECT_THAT(find("vid/Data/VID/train").unread,
-              ::testing::ElementsAre(HasSubstr("looks like Pascal VOC's")));
+  EXPECT_THROWS(find("vid"), InputError, "vid/Data/VID/train\"");
+  EXPECT_THAT(find("vid/Data/VID/train").unread, ElementsAre(HasSubstr("looks like Pascal VOC's")));
 }
 
 TEST_F(FindSource, TextsBesideTheImagesAreTakenWhereTheReaderLooks) {
-  write("a/imgs/1.jpg");
-  write("a/imgs/1.txt");
-  write("a/data.yaml");
+  touch({"a/imgs/1.jpg", "a/imgs/1.txt", "a/data.yaml"});
   EXPECT_EQ(find("a/imgs").labels->path, at("a/imgs")) << "a has neither labels nor these texts";
 }
 
 TEST_F(FindSource, LabelsThatAreLeftOutAreRemarks) {
-  write("a/images/1.jpg");
-  write("a/labels/1.txt");
+  touch({"a/images/1.jpg", "a/labels/1.txt"});
   FoundSource found = find("a");
   EXPECT_FALSE(found.labels);
   EXPECT_EQ(found.root, at("a"));
   EXPECT_THAT(found.remarks, Contains(HasSubstr("no data.yaml or classes.txt")));
   write("a/data.yaml");
-  write("a/boxes.csv", "image,class,left,top,right,bottom\n1.jpg,,,,,\n");
+  write("a/boxes.csv", kOneRow);
   found = find("a");
-  EXPECT_EQ(found.labels->format, LabelFormat::kYolo);
+  EXPECT_EQ(found.labels->format, kYolo);
   EXPECT_THAT(found.remarks, Contains(HasSubstr("labels in another format (csv) left out: " +
                                                 at("a/boxes.csv").string())));
-  for (const char* split : {"train2017", "val2017"}) {
-    write(std::string("c/") + split + "/1.jpg");
-    write(std::string("c/annotations/instances_") + split + ".json",
-          R"({"annotations": [], "images": []})");
-  }
+  touch({"c/train2017/1.jpg", "c/val2017/1.jpg"});
+  write("c/annotations/instances_train2017.json", kNoObjects);
   write("c/annotations/instances_val2017.json", R"({"images": [{"file_name": "gone.jpg"}]})");
   found = find("c");
   EXPECT_EQ(found.root, at("c/train2017"));
   EXPECT_EQ(found.labels->path, at("c/annotations/instances_train2017.json"));
-  write("d/1.jpg");
-  write("d/1.json", R"({"images": "none"})");
-  write("d/other.json", R"({"images": [{"file_name": "2.jpg"}]})");
-  write("d/table.csv", "image,class\n");
-  write("d/notes.txt");
+  lay("d", "1.jpg, 1.json=none, other.json=other, table.csv=table, notes.txt",
+      {{"none", R"({"images": "none"})"},
+       {"other", R"({"images": [{"file_name": "2.jpg"}]})"},
+       {"table", "image,class\n"}});
   EXPECT_FALSE(find("d").labels);
   write("d/near.csv", "image,class,left,top,right,bottom,score\n1.jpg,a,0,0,1,1,1\n");
   found = find("d");
@@ -705,66 +571,56 @@ TEST_F(FindSource, TheProgramsOwnOutputIsPassedOver) {
 }
 
 TEST_F(FindSource, ImagesThatAreLeftOutAreWarnings) {
-  write("a/train/images/1.jpg");
-  write("a/train/labels/1.txt");
-  write("a/valid/images/1.jpg");
-  write("a/data.yaml");
-  write("a/other/2.png");
+  lay("a", "train/images/1.jpg, train/labels/1.txt, valid/images/1.jpg, data.yaml, other/2.png");
   const auto sources = find_sources(at("a"));
   ASSERT_EQ(sources.size(), 1u);
   EXPECT_EQ(sources[0].root, at("a/train/images"));
   EXPECT_THAT(sources[0].remarks, Contains("warning: 2 folders of images left out: other, valid"));
   EXPECT_THAT(find("a/train").remarks, IsEmpty());
   // One file has the labels of both.
-  write("b/train/1.jpg");
-  write("b/val/1.jpg");
-  write("b/boxes.csv",
-        "image,class,left,top,right,bottom\ntrain/1.jpg,a,0,0,1,1\nval/1.jpg,a,0,0,1,1\n");
+  touch({"b/train/1.jpg", "b/val/1.jpg"});
+  write("b/boxes.csv", kTable + "train/1.jpg,a,0,0,1,1\nval/1.jpg,a,0,0,1,1\n"s);
   EXPECT_EQ(find_sources(at("b")).size(), 1u);
   EXPECT_EQ(find("b").root, at("b"));
   EXPECT_THAT(find("b").remarks,
-              ::testing::ElementsAre(HasSubstr("warning: images of val are in split train, too")));
+              ElementsAre(HasSubstr("warning: images of val are in split train, too")));
 }
 
 TEST_F(FindSource, ListsOfSplitsAreNamed) {
-  write("voc/JPEGImages/1.jpg");
-  write("voc/Annotations/1.xml");
+  touch({"voc/JPEGImages/1.jpg", "voc/Annotations/1.xml"});
   write("voc/ImageSets/Main/train.txt", "1\n");
   write("voc/ImageSets/Main/car_train.txt", "1 1\n");
-  EXPECT_THAT(find("voc").remarks,
-              ::testing::ElementsAre(
-                  "warning: 1 list of a split not used in " + at("voc/ImageSets/Main").string() +
-                  ": train.txt; give each split its own source with \"ids\", a sample id a line"));
-  write("flat/test.jpg");  // has a label so called
-  write("flat/test.txt");
+  EXPECT_THAT(
+      find("voc").remarks,
+      ElementsAre("warning: 1 list of a split not used in " + at("voc/ImageSets/Main").string() +
+                  ": train.txt; give each split its own source with \"ids\", a sample id a "
+                  "line"));
+  touch({"flat/test.jpg", "flat/test.txt"});  // has a label so called
   EXPECT_THAT(find("flat").remarks, Not(Contains(HasSubstr("of a split"))));
 }
 
 TEST_F(FindSource, FoldersOfSequencesMayBeTwoDeep) {
-  write("days/monday/a/1.jpg");
-  write("days/tuesday/b/1.jpg");
-  EXPECT_EQ(find("days").dataset, DatasetKind::kFrames);
+  touch({"days/monday/a/1.jpg", "days/tuesday/b/1.jpg"});
+  EXPECT_EQ(find("days").dataset, kFrames);
   EXPECT_EQ(find("days").root, at("days"));
   // A folder of datasets is none.
-  write("sets/one/images/1.jpg");
-  write("sets/two/images/1.jpg");
-  EXPECT_THROW(find("sets"), InputError);
+  touch({"sets/one/images/1.jpg", "sets/two/images/1.jpg"});
+  EXPECT_THROWS(find("sets"), InputError,
+                "expected one dataset, got 2: one (frames), two (frames), in ");
 }
 
 TEST_F(FindSource, ASplitsImagesMayHaveLabelsOfAnyFormatBesideThem) {
   const std::string coco = R"({"images": [{"id": 1, "file_name": "1.jpg"}], "annotations": []})";
-  for (const char* split : {"train", "val"}) {
-    write("voc/" + std::string(split) + "/images/1.jpg");
-    write("voc/" + std::string(split) + "/annotations/1.xml");
-    write("coco/" + std::string(split) + "/images/1.jpg");
-    write("coco/" + std::string(split) + "/annotations.json", coco);
+  for (const std::string split : {"train", "val"}) {
+    lay("voc/" + split, "images/1.jpg, annotations/1.xml");
+    lay("coco/" + split, "images/1.jpg, annotations.json=coco", {{"coco", coco}});
   }
-  for (const char* name : {"voc", "coco"}) {
+  for (const std::string name : {"voc", "coco"}) {
     const auto sources = find_sources(at(name));
     ASSERT_EQ(sources.size(), 2u) << name;
     for (const FoundSource& source : sources) {
       const std::string split = source.split.empty() ? "train" : std::string(source.split);
-      EXPECT_THAT(source.root.string(), ::testing::StartsWith((at(name) / split).string()));
+      EXPECT_THAT(source.root.string(), StartsWith((at(name) / split).string()));
       ASSERT_TRUE(source.labels) << source.root;
       EXPECT_THAT(source.labels->path.string(), HasSubstr(split + "/annotations"));
     }
@@ -773,146 +629,134 @@ TEST_F(FindSource, ASplitsImagesMayHaveLabelsOfAnyFormatBesideThem) {
 }
 
 TEST_F(FindSource, SplitsWithLabelsOfTheirOwnAreSources) {
+  /// "SPLIT: ROOT, LABELS" of each.
   const auto splits = [&](const fs::path& name) {
-    std::vector<std::array<std::string, 3>> found;
+    Texts found;
     for (const FoundSource& source : find_sources(at(name))) {
-      found.push_back({std::string(source.split),
-                       source.root.lexically_relative(at(name)).generic_string(),
-                       source.labels->path.lexically_relative(at(name)).generic_string()});
+      found.push_back(std::string(source.split) + ": " + below(source.root, name).generic_string() +
+                      ", " + below(source.labels->path, name).generic_string());
     }
     return found;
   };
-  using Splits = std::vector<std::array<std::string, 3>>;
-  for (const char* split : {"valid", "train", "test"}) {
-    write("roboflow/" + std::string(split) + "/images/1.jpg");
-    write("roboflow/" + std::string(split) + "/labels/1.txt");
-    write("yolo/images/" + std::string(split) + "/1.jpg");
-    if (split != std::string("test")) write("yolo/labels/" + std::string(split) + "/1.txt");
-    write("voc/" + std::string(split) + "/1.jpg");
-    write("voc/" + std::string(split) + "/1.xml");
+  for (const std::string split : {"valid", "train", "test"}) {
+    lay("roboflow/" + split, "images/1.jpg, labels/1.txt");
+    write("yolo/images/" + split + "/1.jpg");
+    if (split != "test") write("yolo/labels/" + split + "/1.txt");
+    lay("voc/" + split, "1.jpg, 1.xml");
   }
-  for (const char* name : {"Training", "VAL"}) {
-    write("caps/" + std::string(name) + "/1.jpg");
-    write("caps/" + std::string(name) + "/1.xml");
-    write("dev/" + std::string(name == std::string("VAL") ? "dev" : "train") + "/1.jpg");
-    write("dev/" + std::string(name == std::string("VAL") ? "dev" : "train") + "/1.xml");
+  for (const std::string folder : {"caps/Training", "caps/VAL", "dev/train", "dev/dev"}) {
+    lay(folder, "1.jpg, 1.xml");
   }
-  EXPECT_EQ(splits("caps"), (Splits{{"", "Training", "Training"}, {"val", "VAL", "VAL"}}));
-  EXPECT_EQ(splits("dev"), (Splits{{"", "train", "train"}, {"val", "dev", "dev"}}));
+  EXPECT_THAT(splits("caps"), ElementsAre(": Training, Training", "val: VAL, VAL"));
+  EXPECT_THAT(splits("dev"), ElementsAre(": train, train", "val: dev, dev"));
   write("roboflow/data.yaml");
-  EXPECT_EQ(splits("roboflow"), (Splits{{"", "train/images", "."},
-                                        {"val", "valid/images", "."},
-                                        {"test", "test/images", "."}}));
+  EXPECT_THAT(splits("roboflow"),
+              ElementsAre(": train/images, .", "val: valid/images, .", "test: test/images, ."));
   EXPECT_THAT(find("roboflow").remarks, IsEmpty());
   write("yolo/data.yaml");
-  EXPECT_EQ(splits("yolo"), (Splits{{"", "images/train", "."}, {"val", "images/valid", "."}}));
+  EXPECT_THAT(splits("yolo"), ElementsAre(": images/train, .", "val: images/valid, ."));
   EXPECT_THAT(find("yolo").remarks,
-              ::testing::ElementsAre("warning: 1 folder of images left out: images/test"));
+              ElementsAre("warning: 1 folder of images left out: images/test"));
   EXPECT_EQ(splits("yolo/images").size(), 2u);
-  EXPECT_EQ(splits("voc"),
-            (Splits{{"", "train", "train"}, {"val", "valid", "valid"}, {"test", "test", "test"}}));
-  for (const char* split : {"train2017", "val2017"}) {
-    write("coco/" + std::string(split) + "/1.jpg");
-    write("coco/annotations/instances_" + std::string(split) + ".json",
-          R"({"annotations": [], "images": []})");
+  EXPECT_THAT(splits("voc"),
+              ElementsAre(": train, train", "val: valid, valid", "test: test, test"));
+  for (const std::string split : {"train2017", "val2017"}) {
+    write("coco/" + split + "/1.jpg");
+    write("coco/annotations/instances_" + split + ".json", kNoObjects);
   }
-  EXPECT_EQ(splits("coco"), (Splits{{"", "train2017", "annotations/instances_train2017.json"},
-                                    {"val", "val2017", "annotations/instances_val2017.json"}}));
+  EXPECT_THAT(splits("coco"), ElementsAre(": train2017, annotations/instances_train2017.json",
+                                          "val: val2017, annotations/instances_val2017.json"));
   // Other images of the folder would be lost.
-  write("yolo/images/more/1.jpg");
-  write("yolo/labels/more/1.txt");
-  EXPECT_EQ(splits("yolo"), (Splits{{"", "images", "."}}));
+  touch({"yolo/images/more/1.jpg", "yolo/labels/more/1.txt"});
+  EXPECT_THAT(splits("yolo"), ElementsAre(": images, ."));
   // A folder that was asked for is its split alone.
-  EXPECT_EQ(splits("voc/valid"), (Splits{{"", ".", "."}}));
+  EXPECT_THAT(splits("voc/valid"), ElementsAre(": ., ."));
 }
 
 TEST_F(FindSource, SplitsAreAsTheDatasetSays) {
-  const std::string text = "0 .5 .5 .2 .2\n";
   const struct {
-    std::string name;
-    std::vector<std::array<std::string, 3>> splits;  ///< split, root, list
-    std::vector<std::pair<std::string, std::string>> files;
-    std::vector<std::string> images;
-    std::vector<std::string> remarks = {};
+    std::string name, splits;  ///< "SPLIT ROOT LIST; ..." as they are found
+    std::string images, files;
+    std::map<std::string, std::string> texts;
+    Texts remarks = {};
   } cases[] = {
       {"folders",
-       {{"", "images/a", ""}, {"", "images/b", ""}, {"val", "images/c", ""}},
-       {{"data.yaml",
-         "path: .\ntrain:\n  - images/a\n  - images/b\nval: images/c\nnames: [car]\n"}},
-       {"images/a/1", "images/b/2", "images/c/3"}},
+       " images/a ; images/b ;val images/c ;",
+       "images/a/1 images/b/2 images/c/3",
+       "data.yaml=yaml",
+       {{"yaml", "path: .\ntrain:\n  - images/a\n  - images/b\nval: images/c\nnames: [car]\n"}}},
       {"holdout",
-       {{"", "images/train", ""}, {"val", "images/holdout", ""}},
-       {{"own.yaml", "train: ../x/images/train\nval: /elsewhere/images/holdout/\nnames: [car]\n"}},
-       {"images/train/1", "images/holdout/2"}},
+       " images/train ;val images/holdout ;",
+       "images/train/1 images/holdout/2",
+       "own.yaml=yaml",
+       {{"yaml", "train: ../x/images/train\nval: /elsewhere/images/holdout/\nnames: [car]\n"}}},
       {"lists",
-       {{"", "images", "autosplit_train.txt"},
-        {"val", "images", "autosplit_val.txt"},
-        {"test", "images", "autosplit_test.txt"}},
-       {{"data.yaml",
+       " images autosplit_train.txt;val images autosplit_val.txt;test images autosplit_test.txt;",
+       "images/1 images/2 images/3",
+       "data.yaml=yaml, autosplit_train.txt=1, autosplit_val.txt=2, autosplit_test.txt=3",
+       {{"yaml",
          "train: autosplit_train.txt\nval: autosplit_val.txt\ntest: autosplit_test.txt\n"
          "names: [car]\n"},
-        {"autosplit_train.txt", "./images/1.jpg\n"},
-        {"autosplit_val.txt", "./images/2.jpg\n"},
-        {"autosplit_test.txt", "./images/3.jpg\n"}},
-       {"images/1", "images/2", "images/3"}},
+        {"1", "./images/1.jpg\n"},
+        {"2", "./images/2.jpg\n"},
+        {"3", "./images/3.jpg\n"}}},
       {"by_name",
-       {{"", "images", "autosplit_train.txt"}, {"val", "images", "autosplit_val.txt"}},
-       {{"classes.txt", "car\n"},
-        {"autosplit_train.txt", "./images/1.jpg\n"},
-        {"autosplit_val.txt", "./images/2.jpg\n./images/1.jpg\n"}},
-       {"images/1", "images/2", "images/3"},
+       " images autosplit_train.txt;val images autosplit_val.txt;",
+       "images/1 images/2 images/3",
+       "classes.txt=car, autosplit_train.txt=1, autosplit_val.txt=2 and 1",
+       {{"car", "car\n"},
+        {"1", "./images/1.jpg\n"},
+        {"2 and 1", "./images/2.jpg\n./images/1.jpg\n"}},
        {"warning: 1 image in lists of two splits, as by_name/autosplit_*.txt says",
         "warning: 1 image left out: in no list of by_name/autosplit_*.txt"}},
       {"darknet",
-       {{"", "data", "data/train.txt"}, {"test", "data", "data/test.txt"}},
-       {{"data/obj.data", "classes = 1\ntrain = data/train.txt\nvalid = data/test.txt\n"},
-        {"data/obj.names", "car\n"},
-        {"data/train.txt", "data/obj/1.jpg\n"},
-        {"data/test.txt", "data/obj/2.jpg\n"}},
-       {"data/obj/1", "data/obj/2"}},
+       " data data/train.txt;test data data/test.txt;",
+       "data/obj/1 data/obj/2",
+       "data/obj.data=data, data/obj.names=car, data/train.txt=1, data/test.txt=2",
+       {{"data", "classes = 1\ntrain = data/train.txt\nvalid = data/test.txt\n"},
+        {"car", "car\n"},
+        {"1", "data/obj/1.jpg\n"},
+        {"2", "data/obj/2.jpg\n"}}},
       {"one",
-       {{"", "images", ""}},
-       {{"data.yaml", "train: images/train\nval: images/train\nnames: [car]\n"}},
-       {"images/train/1"},
+       " images ;",
+       "images/train/1",
+       "data.yaml=yaml",
+       {{"yaml", "train: images/train\nval: images/train\nnames: [car]\n"}},
        {"warning: one/data.yaml gives one/images/train two splits: it is in one, train"}}};
-  for (const auto& expected : cases) {
-    const fs::path root = at(expected.name);
-    for (const auto& [file, content] : expected.files) write(expected.name + "/" + file, content);
-    for (const std::string& image : expected.images) {
-      write(expected.name + "/" + image + ".jpg");
-      std::string label = image;
-      if (label.starts_with("images")) label.replace(0, 6, "labels");
-      write(expected.name + "/" + label + ".txt", text);
+  for (const auto& [name, splits, images, files, texts, remarks] : cases) {
+    SCOPED_TRACE(name);
+    lay(name, files, texts);
+    std::istringstream each(images);
+    for (std::string image; each >> image;) {
+      write(name + "/" + image + ".jpg");
+      if (image.starts_with("images")) image.replace(0, 6, "labels");
+      write(name + "/" + image + ".txt", "0 .5 .5 .2 .2\n");
     }
-    std::vector<std::array<std::string, 3>> splits;
-    for (const FoundSource& source : find_sources(root)) {
-      ASSERT_TRUE(source.labels) << expected.name;
-      const fs::path below = source.root.lexically_relative(root);
-      splits.push_back({std::string(source.split), below == "." ? "" : below.generic_string(),
-                        source.ids ? source.ids->lexically_relative(root).generic_string() : ""});
+    std::string found;
+    for (const FoundSource& source : find_sources(at(name))) {
+      ASSERT_TRUE(source.labels);
+      const fs::path root = below(source.root, name);
+      found += std::string(source.split) + " " + (root == "." ? "" : root.generic_string()) + " " +
+               (source.ids ? below(*source.ids, name).generic_string() : "") + ";";
     }
-    EXPECT_EQ(splits, expected.splits) << expected.name;
-    std::vector<std::string> remarks = find(expected.name).remarks;
-    for (std::string& remark : remarks) {
+    EXPECT_EQ(found, splits);
+    Texts told = find(name).remarks;
+    for (std::string& remark : told) {
       for (std::size_t i; (i = remark.find(at("").string())) != remark.npos;) {
         remark.erase(i, at("").string().size());
       }
     }
-    EXPECT_EQ(remarks, expected.remarks) << expected.name;
+    EXPECT_EQ(told, remarks);
   }
 }
 
 TEST_F(FindSource, KnowsRecordingsOfEventCameras) {
-  write("ecd/events.txt");
-  write("ecd/images/1.png");
+  touch({"ecd/events.txt", "ecd/images/1.png", "tables/notes.txt", "many/one/events.txt",
+         "many/two/events.txt"});
   write("tables/a.csv", "t,x,y,p\n");
-  write("tables/notes.txt");
-  write("many/one/events.txt");
-  write("many/two/events.txt");
   for (const char* root : {"ecd", "tables/a.csv", "tables", "many"}) {
-    const FoundSource found = find(root);
-    EXPECT_EQ(found.dataset, DatasetKind::kRecording) << root;
-    EXPECT_EQ(found.root, at(root));
+    EXPECT_EQ(find(root).dataset, kRecording) << root;
+    EXPECT_EQ(find(root).root, at(root));
   }
   EXPECT_EQ(find("ecd").title, "recording of an event camera (ECD)");
   EXPECT_THAT(find("ecd").remarks, IsEmpty());
@@ -920,28 +764,27 @@ TEST_F(FindSource, KnowsRecordingsOfEventCameras) {
   EXPECT_EQ(find("tables").columns, EventFields());
   write("microseconds/a.csv", "x,y,t_us,p\n");
   EXPECT_EQ(find("microseconds").columns.t, "t_us");
-  // Numbers beside images are no events; [N, 4] of them are only if one says so.
-  write("numbers/clip/1.png");
-  write("numbers/boxes/a.npy", testing::npy_doubles({1, 4}, {0, 0, 1, 1}));
-  EXPECT_EQ(find("numbers").dataset, DatasetKind::kFrames);
-  EXPECT_EQ(find("numbers/boxes/a.npy").dataset, DatasetKind::kRecording);
-  // Or their labels beside them do, if they are no labels of images.
+  // Numbers beside images are no events; [N, 4] of them are only if one says so, or their labels
+  // beside them do, if they are no labels of images.
   const std::string events = testing::npy_doubles({1, 4}, {0, 0, 1, 1});
-  for (const char* name : {"windows/a", "windows/b", "yolo/labels/1", "poses/a"}) {
-    write(name + std::string(".npy"), events);
+  for (const char* name :
+       {"numbers/boxes/a", "windows/a", "windows/b", "yolo/labels/1", "poses/a"}) {
+    write(name + ".npy"s, events);
   }
-  write("windows/a.txt", "");
-  write("windows/b.txt", "0 0.5 0.5 0.1 0.1\n");
-  EXPECT_EQ(find("windows").dataset, DatasetKind::kRecording);
-  write("yolo/images/1.png");
-  write("yolo/labels/1.txt", "0 0.5 0.5 0.1 0.1\n");
-  EXPECT_EQ(find("yolo").dataset, DatasetKind::kFrames);
+  touch({"numbers/clip/1.png", "windows/a.txt", "yolo/images/1.png", "clip/1.png", "clip/2.png"});
+  for (const char* name : {"windows/b.txt", "yolo/labels/1.txt"}) {
+    write(name, "0 0.5 0.5 0.1 0.1\n");
+  }
   write("poses/a.txt", "hello");
-  EXPECT_THROW(find("poses"), InputError);
-  write("clip/1.png");
-  write("clip/2.png");
   write("clip/a.csv", "t,x,y,p\n");
-  EXPECT_EQ(find("clip").dataset, DatasetKind::kFrames);
+  for (const auto& [name, dataset] : {std::pair("numbers", kFrames),
+                                      {"numbers/boxes/a.npy", kRecording},
+                                      {"windows", kRecording},
+                                      {"yolo", kFrames},
+                                      {"clip", kFrames}}) {
+    EXPECT_EQ(find(name).dataset, dataset) << name;
+  }
+  EXPECT_THROWS(find("poses"), InputError, "got none of these, in ");
 }
 
 }  // namespace

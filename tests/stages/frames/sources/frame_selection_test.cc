@@ -1,28 +1,10 @@
 #include "stages/frames/sources/frame_selection.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <map>
-
-#include "manifests/values/faults.h"
 #include "stages/frames/sources/open_dataset.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
-
-using ::testing::_;
-using ::testing::Contains;
-using ::testing::Each;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::Not;
-using ::testing::Pair;
-using ::testing::SizeIs;
-using ::testing::ThrowsMessage;
 
 TEST(FrameOriginTest, IsWhatTheSequencesNameTells) {
   EXPECT_EQ(frame_origin(DatasetKind::kHuman36m, "S1/Directions-1/54138969"),
@@ -36,36 +18,28 @@ TEST(FrameOriginTest, IsWhatTheSequencesNameTells) {
 }
 
 /// Subjects S1 and S5, of each two actions seen by cameras 7 and 8, three frames each.
-class FrameSelectionTest : public ::testing::Test {
+class FrameSelectionTest : public FolderTest {
  protected:
   FrameSelectionTest() {
     spec_.dataset = DatasetKind::kHuman36m;
     spec_.root = "h36m";
     for (const char* subject : {"S1", "S5"}) {
-      for (const char* action : {"Eating-1", "Walking-1"}) {
-        for (const char* camera : {"7", "8"}) {
-          const std::string sequence = std::string(subject) + "/" + action + "/" + camera;
-          for (const char* number : {"1", "6", "11"}) {
+      for (const char* action : {"/Eating-1", "/Walking-1"}) {
+        for (const char* camera : {"/7", "/8"}) {
+          for (const char* number : {"/1", "/6", "/11"}) {
             LabelledFrame& frame = frames_.emplace_back();
-            frame.sample_id = sequence + "/" + number;
-            frame.sequence = sequence;
+            frame.sequence = std::string(subject) + action + camera;
+            frame.sample_id = frame.sequence + number;
           }
         }
       }
     }
   }
 
-  std::vector<LabelledFrame> selected() const {
-    return select_frames(frames_, spec_, folder_.path(), 7).frames;
-  }
+  FrameSelection select() const { return select_frames(frames_, spec_, folder_.path(), 7); }
+  std::vector<LabelledFrame> selected() const { return select().frames; }
+  Texts ids() const { return ids_of(selected()); }
 
-  std::vector<std::string> ids() const {
-    std::vector<std::string> ids;
-    for (const LabelledFrame& frame : selected()) ids.push_back(frame.sample_id);
-    return ids;
-  }
-
-  const testing::TemporaryFolder folder_;
   std::vector<LabelledFrame> frames_;
   SourceSpec spec_;
 };
@@ -73,28 +47,26 @@ class FrameSelectionTest : public ::testing::Test {
 TEST_F(FrameSelectionTest, TakesAllUnlessAsked) { EXPECT_THAT(selected(), SizeIs(24)); }
 
 TEST_F(FrameSelectionTest, TakesTheIdsOfAListInTheDatasetsOrder) {
-  testing::write_file(folder_ / "ids.txt", "\xEF\xBB\xBF S5/Walking-1/8/11\r\n\nS1/Eating-1/7/6");
+  write("ids.txt", "\xEF\xBB\xBF S5/Walking-1/8/11\r\n\nS1/Eating-1/7/6");
   spec_.selection.ids = "ids.txt";
   EXPECT_THAT(ids(), ElementsAre("S1/Eating-1/7/6", "S5/Walking-1/8/11"));
 }
 
 TEST_F(FrameSelectionTest, AListMayNameImages) {
-  testing::write_file(folder_ / "val.txt",
-                      "./data/S5/Walking-1/8/11.jpg\n/far/away/S1/Eating-1/7/6.PNG\nS1/none.jpg\n");
+  write("val.txt", "./data/S5/Walking-1/8/11.jpg\n/far/away/S1/Eating-1/7/6.PNG\nS1/none.jpg\n");
   spec_.selection.ids = "val.txt";
   EXPECT_THAT(ids(), ElementsAre("S1/Eating-1/7/6", "S5/Walking-1/8/11"));
-  EXPECT_THAT(select_frames(frames_, spec_, folder_.path(), 0).notes,
-              ElementsAre("1 image without a label in val.txt"));
+  EXPECT_THAT(select().notes, ElementsAre("1 image without a label in val.txt"));
 }
 
 TEST_F(FrameSelectionTest, AnIdThatIsNotThereIsAnError) {
-  testing::write_file(folder_ / "ids.txt", "S1/Eating-1/7/6\nS9\n");
+  write("ids.txt", "S1/Eating-1/7/6\nS9\n");
   spec_.selection.ids = "ids.txt";
-  EXPECT_THAT([&] { selected(); },
-              ThrowsMessage<InputError>("expected sample ids of the source, got 1 that it does not "
-                                        "have (S9), in ids.txt"));
+  EXPECT_THROWS(selected(), InputError,
+                StrEq("expected sample ids of the source, got 1 that it does not "
+                      "have (S9), in ids.txt"));
   spec_.selection.ids = "absent.txt";
-  EXPECT_THAT([&] { selected(); }, ThrowsMessage<InputError>(HasSubstr("absent.txt")));
+  EXPECT_THROWS(selected(), InputError, "absent.txt");
 }
 
 TEST_F(FrameSelectionTest, SubjectsCamerasAndActionsMustAllHold) {
@@ -103,10 +75,9 @@ TEST_F(FrameSelectionTest, SubjectsCamerasAndActionsMustAllHold) {
   spec_.selection.actions = {"Walking-1"};
   EXPECT_THAT(selected(), SizeIs(6));
   spec_.selection.cameras = {"7", "9"};
-  EXPECT_THAT(
-      [&] { selected(); },
-      ThrowsMessage<InputError>("expected cameras of the source, got 1 that it does not have "
-                                "(9), in h36m"));
+  EXPECT_THROWS(selected(), InputError,
+                StrEq("expected cameras of the source, got 1 that it does not have "
+                      "(9), in h36m"));
 }
 
 TEST_F(FrameSelectionTest, FractionsAreOfWholeSequencesAndComplement) {
@@ -126,7 +97,7 @@ TEST_F(FrameSelectionTest, FractionsKeepTheCamerasOfATakeTogether) {
   std::map<std::string, int> frames_of_take;
   for (const std::string& id : ids()) ++frames_of_take[id.substr(0, id.find("-1"))];
   EXPECT_THAT(frames_of_take, Each(Pair(_, 6)));
-  EXPECT_THAT(select_frames(frames_, spec_, folder_.path(), 7).notes, IsEmpty());
+  EXPECT_THAT(select().notes, IsEmpty());
 }
 
 TEST_F(FrameSelectionTest, FramesWithoutASequenceCountByThemselves) {
@@ -135,36 +106,33 @@ TEST_F(FrameSelectionTest, FramesWithoutASequenceCountByThemselves) {
   const std::size_t count = selected().size();
   EXPECT_GT(count, 4u);
   EXPECT_LT(count, 20u);
-  EXPECT_THAT(select_frames(frames_, spec_, folder_.path(), 7).notes,
-              ElementsAre(HasSubstr("24 labelled frames without a sequence")));
+  EXPECT_THAT(select().notes, ElementsAre(HasSubstr("24 labelled frames without a sequence")));
   spec_.selection.fraction = {0, 1};
-  EXPECT_THAT(select_frames(frames_, spec_, folder_.path(), 7).notes, IsEmpty());
+  EXPECT_THAT(select().notes, IsEmpty());
 }
 
 TEST_F(FrameSelectionTest, OneSequenceIsTakenWholeOrNotAtAll) {
   spec_.dataset = DatasetKind::kFrames;
   for (LabelledFrame& frame : frames_) frame.sequence = "clip";
-  spec_.selection.fraction = {0, 0.5};
-  std::string refused;
-  std::size_t count = 0;
-  for (int half = 0; half < 2; ++half) {
+  int refused = 0;
+  for (const double begin : {0.0, 0.5}) {
+    spec_.selection.fraction = {begin, begin + 0.5};
     try {
-      const FrameSelection taken = select_frames(frames_, spec_, folder_.path(), 7);
-      count += taken.frames.size();
+      const FrameSelection taken = select();
+      EXPECT_THAT(taken.frames, SizeIs(24));
       EXPECT_THAT(taken.notes,
                   ElementsAre("one sequence, clip, which fraction takes whole or not at all"));
     } catch (const InputError& error) {
-      refused += error.what();
+      EXPECT_THAT(error.what(), HasSubstr("one sequence, clip"));
+      ++refused;
     }
-    spec_.selection.fraction = {0.5, 1};
   }
-  EXPECT_EQ(count, 24u);
-  EXPECT_THAT(refused, HasSubstr("one sequence, clip"));
+  EXPECT_EQ(refused, 1);
 }
 
 TEST_F(FrameSelectionTest, NothingLeftIsAnError) {
   spec_.selection.fraction = {0, 1e-9};
-  EXPECT_THAT([&] { selected(); }, ThrowsMessage<InputError>(HasSubstr("got none of 24")));
+  EXPECT_THROWS(selected(), InputError, "got none of 24");
   frames_.clear();  // what is wrong with such a source is told elsewhere
   EXPECT_THAT(selected(), IsEmpty());
 }

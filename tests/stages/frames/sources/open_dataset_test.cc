@@ -1,37 +1,24 @@
 #include "stages/frames/sources/open_dataset.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 
 #include <exception>
-#include <string>
-#include <utility>
 
-#include "stages/frames/dataset/dataset.h"
 #include "stages/frames/listing/source_folders.h"
-#include "tests/testing/shared_data.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
+#include "tests/stages/frames/frames_fixture.h"
 
 namespace eventgan {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using testing::TemporaryFolder;
-using testing::write_file;
-
-TEST(SourceRoot, WritesPathsAsTheManifestDoes) {
-  EXPECT_EQ(SourceRoot("kitti/training", "/data").written("a/b"), "kitti/training/a/b");
-  EXPECT_EQ(SourceRoot("kitti/training//", "/data").written("a"), "kitti/training/a");
-  EXPECT_EQ(SourceRoot("kitti", "/data").written(""), "kitti");
-  EXPECT_EQ(SourceRoot("/", "/data").written("a"), "/a");
-  EXPECT_EQ(SourceRoot("", "/data").written("a"), "a");
-}
-
-TEST(SourceRoot, OpensPathsBelowTheManifestUnlessTheyAreAbsolute) {
+TEST(SourceRoot, WritesPathsAsTheManifestDoesAndOpensThemBelowItUnlessTheyAreAbsolute) {
+  const std::array<const char*, 3> written[] = {{"kitti/training", "a/b", "kitti/training/a/b"},
+                                                {"kitti/training//", "a", "kitti/training/a"},
+                                                {"kitti", "", "kitti"},
+                                                {"/", "a", "/a"},
+                                                {"", "a", "a"}};
+  for (const auto& [root, path, expected] : written) {
+    EXPECT_EQ(SourceRoot(root, "/data").written(path), expected);
+  }
   EXPECT_EQ(SourceRoot("kitti", "/data").on_disk("a/b"), "/data/kitti/a/b");
   EXPECT_EQ(SourceRoot("/kitti", "/data").on_disk("a"), "/kitti/a");
   EXPECT_EQ(SourceRoot("kitti", "/data").on_disk(""), "/data/kitti");
@@ -53,25 +40,19 @@ TEST(SourceRoot, AFileThatCannotBeReadIsNamedWithTheReason) {
   const TemporaryFolder folder;
   write_file(folder / "root/sub/file", "");
   const SourceRoot root("root", folder.path());
-  EXPECT_EQ(root.read("none").fault().reason,
-            "expected a readable file, got 'No such file or directory', in root/none");
-  EXPECT_THAT(root.read("sub").fault().reason, HasSubstr("Is a directory"));
-  EXPECT_THROW(root.read_or_throw("none"), InputError);
+  const char* none = "expected a readable file, got 'No such file or directory', in root/none";
+  EXPECT_EQ(fault_of(root.read("none")), none);
+  EXPECT_THROWS(root.read_or_throw("none"), InputError, none);
+  EXPECT_THAT(fault_of(root.read("sub")), HasSubstr("Is a directory"));
 }
 
 TEST(SourceRoot, RequiresFolders) {
   const TemporaryFolder folder;
   write_file(folder / "root/sub/file", "");
   const SourceRoot root("root", folder.path());
-  root.require_folder("");
-  root.require_folder("sub");
+  for (const char* path : {"", "sub"}) root.require_folder(path);
   for (const char* path : {"none", "sub/file"}) {
-    try {
-      root.require_folder(path);
-      FAIL() << path;
-    } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), AllOf(HasSubstr("expected a folder"), HasSubstr(path)));
-    }
+    EXPECT_THROWS(root.require_folder(path), InputError, "expected a folder", path);
   }
 }
 
@@ -91,21 +72,21 @@ TEST(SourceRoot, WhatCannotBeReadIsThereAllTheSame) {
   const TemporaryFolder folder;
   write_file(folder / "root/file", "");
   ASSERT_EQ(::mkfifo((folder / "root/fifo").c_str(), 0600), 0);
-  std::filesystem::create_symlink("loop", folder / "root/loop");
-  std::filesystem::create_symlink("nowhere", folder / "root/dangling");
+  fs::create_symlink("loop", folder / "root/loop");
+  fs::create_symlink("nowhere", folder / "root/dangling");
   const SourceRoot root("root", folder.path());
   for (const auto& [name, reason] : {std::pair("fifo", "Not a regular file"),
                                      std::pair("loop", "Too many levels of symbolic links"),
                                      std::pair("dangling", "No such file or directory")}) {
     EXPECT_TRUE(root.has_file(name)) << name;
-    EXPECT_EQ(root.read(name).fault().reason,
+    EXPECT_EQ(fault_of(root.read(name)),
               "expected a readable file, got '" + std::string(reason) + "', in root/" + name);
   }
 }
 
 // What each kind of dataset misses first in an empty folder tells which one was opened.
 TEST(OpenDataset, OpensTheKindTheManifestNames) {
-  const testing::TemporaryFolder folder;
+  const TemporaryFolder folder;
   const std::pair<DatasetKind, const char*> missing[] = {
       {DatasetKind::kKittiObject, "./image_2"},
       {DatasetKind::kKittiTracking, "./label_02"},
@@ -119,12 +100,7 @@ TEST(OpenDataset, OpensTheKindTheManifestNames) {
     SourceSpec spec;
     spec.dataset = kind;
     spec.root = ".";
-    try {
-      open_dataset(spec, folder.path());
-      ADD_FAILURE() << "opened an empty folder as " << to_string(kind);
-    } catch (const std::exception& error) {
-      EXPECT_THAT(error.what(), HasSubstr(what)) << to_string(kind);
-    }
+    EXPECT_THROWS(open_dataset(spec, folder.path()), std::exception, what) << to_string(kind);
   }
 }
 
@@ -137,14 +113,9 @@ TEST(OpenDataset, RefusesNamesWithNul) {
   spec.annotations = "mpii/list.json";
   write_file(folder / "mpii/images/a.jpg", "");
   write_file(folder / "mpii/list.json", R"([{"image": "a.jpg\u0000x"}])");
-  try {
-    open_dataset(spec, folder.path());
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(),
-                 "expected names of frames without NUL, got \"mpii/images/a.jpg\\u0000x\", in "
-                 "mpii/list.json:a.jpg\\u0000x");
-  }
+  EXPECT_THROWS(open_dataset(spec, folder.path()), InputError,
+                StrEq("expected names of frames without NUL, got \"mpii/images/a.jpg\\u0000x\", in "
+                      "mpii/list.json:a.jpg\\u0000x"));
 }
 
 TEST(OpenDataset, OpensRealDataOfEveryKind) {

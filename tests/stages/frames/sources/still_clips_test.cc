@@ -1,22 +1,14 @@
 #include "stages/frames/sources/still_clips.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "manifests/values/outlines.h"
 #include "stages/frames/decoding/pair_reader.h"
 #include "stages/frames/sources/class_numbers.h"
+#include "tests/stages/frames/frames_fixture.h"
 #include "tests/testing/fake_dataset.h"
-#include "tests/testing/temporary_folder.h"
 
 namespace eventgan {
 namespace {
@@ -35,16 +27,13 @@ Box still_object(const Rectangle& box) {
 }
 
 /// Two stills of a dark ground and a lighter and a bright square, the brighter one nearer.
-class StillClipsTest : public ::testing::Test {
+class StillClipsTest : public FolderTest {
  protected:
   StillClipsTest() {
     cv::Mat image(kStillSize.height, kStillSize.width, CV_8UC1, cv::Scalar(kDark));
     image(cv::Rect(60, 40, 30, 30)) = kFar;
     image(cv::Rect(80, 55, 25, 30)) = kNear;
-    std::filesystem::create_directories(folder_ / "clip");
-    for (const char* name : {"0000.png", "0001.png"}) {
-      cv::imwrite((folder_ / "clip" / name).string(), image);
-    }
+    write_stills(image);
     still_.original = "text";
     still_.boxes = {still_object({60, 40, 90, 70}), still_object({80, 55, 105, 85})};
     manifest_.directory = folder_.path();
@@ -55,7 +44,17 @@ class StillClipsTest : public ::testing::Test {
     source.pairs.gaps = {1};
   }
 
+  void write_stills(const cv::Mat& image) const {
+    fs::create_directories(at("clip"));
+    for (const char* name : {"clip/0000.png", "clip/0001.png"}) {
+      cv::imwrite(at(name).string(), image);
+    }
+  }
   PairSpec& pairs() { return manifest_.sources[0].pairs; }
+  void nothing_moves() {
+    pairs().stills = StillsSpec{{0, 0}, 0, 0};
+    pairs().stills->objects = ObjectMotionSpec{{0, 0}, 0, 0, 0};
+  }
 
   const Dataset& open() {
     auto dataset = std::make_unique<testing::FakeDataset>("clip", 2);
@@ -65,6 +64,11 @@ class StillClipsTest : public ::testing::Test {
     make_clips(manifest_, datasets_);
     number_classes(manifest_.sources, datasets_);
     return *datasets_[0];
+  }
+  /// Of what the first frame's pair is made.
+  MadePair first_pair() {
+    const Dataset& dataset = open();
+    return *dataset.made_pair(dataset.labelled_frames()[0].label_key);
   }
 
   /// Both frames of the labelled frame's pair, grey levels.
@@ -87,7 +91,6 @@ class StillClipsTest : public ::testing::Test {
     return both;
   }
 
-  testing::TemporaryFolder folder_;
   JobManifest manifest_;
   Annotation still_;
   std::vector<std::unique_ptr<Dataset>> datasets_;
@@ -164,23 +167,19 @@ TEST_F(StillClipsTest, OneFrameIsTheSameInBothOfItsPairs) {
 
 TEST_F(StillClipsTest, WithoutMotionLabelsAreTheStillsInTheWindow) {
   pairs().stills = StillsSpec{{0, 0}, 0, 0};
-  Box ignored{.class_id = 0, .xyxy = {0, 0, 30, 30}, .ignore = true};
-  still_.boxes.push_back(ignored);
+  still_.boxes.push_back({.class_id = 0, .xyxy = {0, 0, 30, 30}, .ignore = true});
   still_.boxes.push_back({.class_id = 0, .xyxy = {0, 0, 19, 19}});    // outside of the window
   still_.boxes.push_back({.class_id = 0, .xyxy = {10, 40, 30, 60}});  // half of it is
   still_.persons.resize(1);
   still_.persons[0].joints = {{{70, 50}, 1}, {kMissingPoint, 0}};
   still_.persons[0].center = {75, 60};
   still_.persons[0].scale = 2;
-  const Dataset& dataset = open();
-  const Annotation annotation = *dataset.annotation(dataset.labelled_frames()[9].label_key);
-  ASSERT_EQ(annotation.boxes.size(), 4u);
-  EXPECT_EQ(annotation.boxes[0].xyxy, (Rectangle{40, 25, 70, 55}));
-  EXPECT_EQ(annotation.boxes[1].xyxy, (Rectangle{60, 40, 85, 70}));
-  EXPECT_EQ(annotation.boxes[2].xyxy, (Rectangle{0, 0, 10, 15}));
-  EXPECT_TRUE(annotation.boxes[2].ignore);
-  EXPECT_EQ(annotation.boxes[3].xyxy, (Rectangle{0, 25, 10, 45}));
-  EXPECT_FLOAT_EQ(annotation.boxes[3].truncation, 0.5f);
+  const Annotation annotation = annotation_of(open(), 9);
+  EXPECT_THAT(rectangles(annotation),
+              ElementsAre(Rectangle{40, 25, 70, 55}, Rectangle{60, 40, 85, 70},
+                          Rectangle{0, 0, 10, 15}, Rectangle{0, 25, 10, 45}));
+  EXPECT_TRUE(annotation.boxes.at(2).ignore);
+  EXPECT_FLOAT_EQ(annotation.boxes.at(3).truncation, 0.5f);
   EXPECT_EQ(annotation.boxes[3].track_id, 4);
   ASSERT_EQ(annotation.persons.size(), 1u);
   EXPECT_EQ(annotation.persons[0].joints[0].at, (Point{50, 35}));
@@ -190,60 +189,52 @@ TEST_F(StillClipsTest, WithoutMotionLabelsAreTheStillsInTheWindow) {
 }
 
 TEST_F(StillClipsTest, WhatIsCoveredIsToldAndJointsBehindItAreHidden) {
-  pairs().stills = StillsSpec{{0, 0}, 0, 0};
-  pairs().stills->objects = ObjectMotionSpec{{0, 0}, 0, 0, 0};
+  nothing_moves();
   still_.boxes = {still_object({60, 40, 90, 70}), still_object({60, 45, 90, 75})};
   still_.persons.resize(2);
   for (const std::size_t k : {0u, 1u}) {
     still_.persons[k].box = still_.boxes[k].xyxy;
     still_.persons[k].joints = {{{70, 42}, 1}, {{70, 60}, 1}};
   }
-  const Dataset& dataset = open();
-  const Annotation annotation = *dataset.annotation(dataset.labelled_frames()[0].label_key);
-  ASSERT_EQ(annotation.boxes.size(), 2u);
-  EXPECT_EQ(annotation.boxes[0].occlusion, 2);  // 5 of 30 rows are seen
-  EXPECT_EQ(annotation.boxes[0].xyxy, (Rectangle{40, 25, 70, 30}));
-  EXPECT_EQ(annotation.boxes[1].occlusion, -1) << "as in the still, where it is not annotated";
-  EXPECT_EQ(annotation.boxes[1].xyxy, (Rectangle{40, 30, 70, 60}));
+  const Annotation annotation = annotation_of(open());
+  EXPECT_THAT(rectangles(annotation),
+              ElementsAre(Rectangle{40, 25, 70, 30}, Rectangle{40, 30, 70, 60}));
+  EXPECT_EQ(annotation.boxes.at(0).occlusion, 2);  // 5 of 30 rows are seen
+  EXPECT_EQ(annotation.boxes.at(1).occlusion, -1) << "as in the still, where it is not annotated";
   EXPECT_EQ(annotation.persons[0].joints[0].visible, 1);
   EXPECT_EQ(annotation.persons[0].joints[1].visible, 0);
   EXPECT_EQ(annotation.persons[1].joints[1].visible, 1);
 }
 
 TEST_F(StillClipsTest, KittisDifficultyOcclusionAndTruncationAreThoseOfTheFrame) {
-  pairs().stills = StillsSpec{{0, 0}, 0, 0};
-  pairs().stills->objects = ObjectMotionSpec{{0, 0}, 0, 0, 0};
-  // Of 30 px height: a far one half covered, one that another covers nowhere, one that the frame
-  // cuts at x = 20, and one that is not alone in knowing nothing of its occlusion.
-  still_.boxes = {still_object({60, 40, 90, 70}), still_object({60, 57, 90, 87}),
-                  still_object({10, 40, 30, 70}), still_object({110, 40, 130, 70})};
-  const int occlusions[] = {3, 1, 0, 3};
-  for (std::size_t k = 0; k < 4; ++k) {
-    Box& box = still_.boxes[k];
-    box.occlusion = occlusions[k];
+  nothing_moves();
+  const struct {
+    Rectangle box;  ///< of 30 px height
+    int occlusion_in_still, occlusion, difficulty;
+    float truncation;
+  } cases[] = {
+      {{60, 40, 90, 70}, 3, 1, -1, 0},    // a far one half covered: 17 of 30 rows, too low
+      {{60, 57, 90, 87}, 1, 1, 1, 0},     // covered nowhere: moderate
+      {{10, 40, 30, 70}, 0, 0, 2, 0.5},   // that the frame cuts at x = 20: hard
+      {{110, 40, 130, 70}, 3, 3, -1, 0},  // not alone in knowing nothing of its occlusion
+  };
+  still_.boxes.clear();
+  for (const auto& one : cases) {
+    Box& box = still_.boxes.emplace_back(still_object(one.box));
+    box.occlusion = one.occlusion_in_still;
     box.truncation = 0;
     box.difficulty = 0;
   }
   const auto boxes = [&](DatasetKind dataset) {
     manifest_.sources[0].dataset = dataset;
-    const Dataset& clips = open();
-    return clips.annotation(clips.labelled_frames()[3].label_key)->boxes;
+    return annotation_of(open(), 3).boxes;
   };
   const std::vector<Box> object = boxes(DatasetKind::kKittiObject);
   ASSERT_EQ(object.size(), 4u);
-  const struct {
-    int occlusion, difficulty;
-    float truncation;
-  } expected[] = {
-      {1, -1, 0},   // 17 of 30 rows are left: too low
-      {1, 1, 0},    // moderate
-      {0, 2, 0.5},  // hard
-      {3, -1, 0},   // unknown
-  };
   for (std::size_t k = 0; k < 4; ++k) {
-    EXPECT_EQ(object[k].occlusion, expected[k].occlusion) << k;
-    EXPECT_EQ(object[k].difficulty, expected[k].difficulty) << k;
-    EXPECT_EQ(object[k].truncation, expected[k].truncation) << k;
+    EXPECT_EQ(object[k].occlusion, cases[k].occlusion) << k;
+    EXPECT_EQ(object[k].difficulty, cases[k].difficulty) << k;
+    EXPECT_EQ(object[k].truncation, cases[k].truncation) << k;
   }
   const std::vector<Box> tracking = boxes(DatasetKind::kKittiTracking);
   EXPECT_EQ(tracking.at(2).truncation, 1) << "a level";
@@ -274,9 +265,7 @@ class CutOutClips : public StillClipsTest {
     cv::RNG random(5);
     random.fill(image, cv::RNG::UNIFORM, 10, 60);
     image(cv::Rect(65, 45, 28, 32)) = kNear;
-    for (const char* name : {"0000.png", "0001.png"}) {
-      cv::imwrite((folder_ / "clip" / name).string(), image);
-    }
+    write_stills(image);
     still_.boxes = {{.class_id = 0, .xyxy = {65 - kRoom, 45 - kRoom, 93 + kRoom, 77 + kRoom}}};
     pairs().stills->objects->rotation_deg = 0;
     pairs().stills->objects->rests = 0;
@@ -325,7 +314,7 @@ TEST_F(CutOutClips, IsDoneOnceForAllFramesOfAClip) {
     return dataset.made_pair(all[static_cast<std::size_t>(i)].label_key)->outlines;
   };
   EXPECT_EQ(counts(0), (OutlineCounts{0, 1, 0}));
-  std::filesystem::remove_all(folder_ / "clip");
+  fs::remove_all(folder_ / "clip");
   EXPECT_EQ(counts(1), OutlineCounts());
   EXPECT_FALSE(is_fault(dataset.annotation(all[20].label_key))) << "the first still is known";
   EXPECT_TRUE(is_fault(dataset.annotation(all[30].label_key))) << "the second is not";
@@ -338,8 +327,7 @@ TEST_F(CutOutClips, WhatIsTooSmallIsAnEllipseAndWhatIsIgnoredIsNone) {
   still_.boxes.push_back({.class_id = 0, .xyxy = {30, 30, 42, 40}});
   still_.boxes.push_back({.class_id = 0, .xyxy = {100, 60, 130, 90}, .ignore = true});
   still_.boxes.push_back(still_object({30, 60, 50, 80}));
-  const Dataset& dataset = open();
-  const MadePair made = *dataset.made_pair(dataset.labelled_frames()[0].label_key);
+  const MadePair made = first_pair();
   EXPECT_EQ(made.outlines, (OutlineCounts{1, 1, 1}));
   ASSERT_EQ(made.boxes.size(), 4u);
   EXPECT_FALSE(made.boxes[1].outline.empty());
@@ -354,19 +342,14 @@ TEST_F(CutOutClips, WhatIsTooSmallIsAnEllipseAndWhatIsIgnoredIsNone) {
 
 TEST_F(CutOutClips, NothingIsCutOutWhereObjectsDoNotMove) {
   pairs().stills = StillsSpec();
-  const Dataset& dataset = open();
-  const MadePair made = *dataset.made_pair(dataset.labelled_frames()[0].label_key);
-  EXPECT_EQ(made.outlines, OutlineCounts());
-  EXPECT_TRUE(made.boxes[0].outline.empty());
+  EXPECT_EQ(first_pair().outlines, OutlineCounts());
+  EXPECT_TRUE(first_pair().boxes[0].outline.empty());
 }
 
 TEST_F(CutOutClips, TheBoxIsTheLabelsWhereNothingMoves) {
-  pairs().stills = StillsSpec{{0, 0}, 0, 0};
-  pairs().stills->objects = ObjectMotionSpec{{0, 0}, 0, 0, 0};
-  const Dataset& dataset = open();
-  const Annotation annotation = *dataset.annotation(dataset.labelled_frames()[3].label_key);
-  ASSERT_EQ(annotation.boxes.size(), 1u);
-  EXPECT_EQ(annotation.boxes[0].xyxy, (Rectangle{41, 26, 77, 66}));  // 20 and 15 px less
+  nothing_moves();
+  EXPECT_THAT(rectangles(annotation_of(open(), 3)),
+              ElementsAre(Rectangle{41, 26, 77, 66}));  // 20 and 15 px less
 }
 
 TEST_F(StillClipsTest, ARiderIsAsVisibleOnHisHorseAsInTheStill) {
@@ -378,9 +361,9 @@ TEST_F(StillClipsTest, ARiderIsAsVisibleOnHisHorseAsInTheStill) {
   still_.persons[0].box = still_.boxes[0].xyxy;
   still_.persons[0].joints = {{{80, 50}, 1}};
   const Dataset& dataset = open();
-  for (const LabelledFrame& labelled : dataset.labelled_frames()) {
-    const Annotation annotation = *dataset.annotation(labelled.label_key);
-    ASSERT_EQ(annotation.boxes.size(), 2u) << labelled.sample_id;
+  for (std::size_t i = 0; i < dataset.labelled_frames().size(); ++i) {
+    const Annotation annotation = annotation_of(dataset, i);
+    ASSERT_EQ(annotation.boxes.size(), 2u) << i;
     EXPECT_EQ(annotation.boxes[0].occlusion, -1);
     EXPECT_EQ(annotation.persons.at(0).joints[0].visible, 1);
   }
@@ -414,12 +397,10 @@ TEST_F(StillClipsTest, ThereIsNothingToBeMadeOfOtherSources) {
 }
 
 TEST_F(StillClipsTest, AnImageThatIsNotThereIsAFaultOfItsFrames) {
+  fs::remove(at("clip/0000.png"));
   const Dataset& dataset = open();
-  std::filesystem::remove(folder_ / "clip" / "0000.png");
-  const std::string key = open().labelled_frames()[0].label_key;
-  EXPECT_TRUE(is_fault(datasets_[0]->annotation(key)));
-  EXPECT_TRUE(is_fault(datasets_[0]->made_pair(key)));
-  (void)dataset;
+  EXPECT_THAT(fault_of(dataset), HasSubstr("0000.png"));
+  EXPECT_TRUE(is_fault(dataset.made_pair(dataset.labelled_frames()[0].label_key)));
 }
 
 }  // namespace
