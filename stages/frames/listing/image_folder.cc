@@ -115,7 +115,9 @@ ImageFolder list_image_folder(const fs::path& folder) {
   listed.folders = std::move(folders);
   listed.left_out = std::move(passed_over);
   const auto first_png = std::ranges::find_if(files, is_png);
-  if (first_png != files.end() && is_own_picture(folder / *first_png)) {
+  const auto last_png = std::find_if(files.rbegin(), files.rend(), is_png);
+  if (first_png != files.end() &&
+      (is_own_picture(folder / *first_png) || is_own_picture(folder / *last_png))) {
     std::erase_if(files, [&](const std::string& name) {
       if (!is_png(name) || !is_own_picture(folder / name)) return false;
       listed.left_out.push_back(name + " (eventgan's picture)");

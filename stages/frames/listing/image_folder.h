@@ -42,9 +42,9 @@ struct ImageFolder {
 };
 
 /// Lists `folder`, passing over hidden entries. Of two images of one name the one of the
-/// extension that comes first in kImageExtensions counts. Where the first PNG is a picture of
-/// `preview` or `realism`, all of these are left out. An absent folder is empty. Throws InputError
-/// if it cannot be listed.
+/// extension that comes first in kImageExtensions counts. Where the first or last PNG is a picture
+/// of `preview` or `realism`, all of these are left out. An absent folder is empty. Throws
+/// InputError if it cannot be listed.
 ImageFolder list_image_folder(const std::filesystem::path& folder);
 
 /// Throws UsageError if images or videos lie in `folder` that the program has not drawn: among
