@@ -1,6 +1,7 @@
 #include "manifests/files/own_file.h"
 
 #include <algorithm>
+#include <array>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -95,33 +96,40 @@ bool has_own_mark(std::string_view beginning) {
   });
 }
 
-bool is_own_output(const fs::path& folder) {
+bool is_own_output(const fs::path& folder) try {
   std::error_code unknown;
   if (fs::exists(folder / ".export" / "export.txt", unknown)) return true;
-  const auto is_there = [&](const char* name, OwnFile kind) {
-    return fs::exists(folder / name, unknown) && is_replaceable(folder / name, kind);
+  const auto is_own = [](const fs::path& file, OwnFile kind) {
+    std::error_code none;
+    const auto bytes = fs::file_size(file, none);
+    return !none && bytes > 0 && is_replaceable(file, kind);
   };
-  try {
-    if (!is_there("plan.json", OwnFile::kPlan) && !is_there("run.json", OwnFile::kRunRecord)) {
-      return false;
-    }
-  } catch (const std::runtime_error&) {  // nobody may read it
+  if (!is_own(folder / "plan.json", OwnFile::kPlan) &&
+      !is_own(folder / "run.json", OwnFile::kRunRecord)) {
     return false;
   }
+  // A person's labels or recordings among results are still found: what convert does not replace.
   const auto is_result = [&](const fs::path& file) {
-    const std::string extension = file.extension().string();
-    return extension == ".json" || extension == ".html" || extension == ".index" ||
-           (extension == ".h5" && fs::exists(fs::path(file).replace_extension(".json"), unknown));
+    constexpr std::array<std::string_view, 6> kNames{
+        "plan.json", "run.json", "amendments.json", "dataset.json", "dataset.h5", "report.html"};
+    const auto beside = [&](const char* extension) {
+      return fs::path(file).replace_extension(extension);
+    };
+    return std::ranges::find(kNames, file.filename()) != kNames.end() ||
+           file.extension() == ".index" ||
+           ((file.extension() == ".json" || file.extension() == ".h5") &&
+            fs::exists(beside(".h5"), unknown) && is_own(beside(".json"), OwnFile::kCommitRecord));
   };
   fs::directory_iterator entry(folder, unknown);
   for (; !unknown && entry != fs::directory_iterator(); entry.increment(unknown)) {
-    const bool is_hidden = entry->path().filename().string().starts_with('.');
+    if (entry->path().filename().string().starts_with('.')) continue;
     std::error_code gone;
-    const bool is_own =
-        entry->is_directory(gone) ? is_own_output(entry->path()) : is_result(entry->path());
-    if (!is_hidden && !is_own) return false;
+    const bool is_folder = entry->is_directory(gone) && !entry->is_symlink(gone);
+    if (!(is_folder ? is_own_output(entry->path()) : is_result(entry->path()))) return false;
   }
   return !unknown;
+} catch (const std::runtime_error&) {  // nobody may read it
+  return false;
 }
 
 void require_replaceable(const fs::path& file, OwnFile kind) {

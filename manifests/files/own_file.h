@@ -41,7 +41,7 @@ bool is_replaceable(const std::filesystem::path& file, OwnFile kind);
 bool has_own_mark(std::string_view beginning);
 
 /// Whether a folder is an export, or an output folder of `convert` or `plan` with nothing but their
-/// results: no images, no other recordings, and of folders only such ones. A search for images,
+/// results: no images, labels or recordings, and of folders only such ones. A search for images,
 /// labels and recordings passes over it.
 bool is_own_output(const std::filesystem::path& folder);
 

@@ -16,11 +16,10 @@
 namespace eventgan {
 
 /// Writes a committed shard again with some of its quarantined samples redone. Everything else is
-/// copied, rows as they are and volumes chunk by chunk, without being decoded; made again from its
-/// inputs, a good sample would be lost where these are gone by now, and a new class would cost the
-/// whole source. The file is begun only when a redone sample proves different: of a shard whose
-/// samples all fail as they did before, nothing is touched. One that is not committed leaves the
-/// shard as it was. Thread safety: one thread at a time.
+/// copied, rows as they are and volumes chunk by chunk, without being decoded: redoing a good
+/// sample would lose it if its inputs are gone. The file is begun only when a redone sample proves
+/// different: of a shard whose samples all fail as they did before, nothing is touched. One that is
+/// not committed leaves the shard as it was. Thread safety: one thread at a time.
 class ShardRewrite {
  public:
   /// `record` is that of the shard in `folder`, whose bytes are known to be the commit record's.

@@ -98,7 +98,7 @@ std::vector<MaskWork> list_work(const JobManifest& manifest,
 }
 
 /// Throws UsageError if the masks would be read as images by the next search: among the images
-/// themselves, or in a folder that is searched, since no images lie right above it.
+/// themselves, or in a folder that is searched, since its parent has no images.
 void require_apart(const JobManifest& manifest, const std::vector<MaskWork>& works) {
   std::set<fs::path> images;
   const auto on_disk = [&](const fs::path& path) {
@@ -110,14 +110,15 @@ void require_apart(const JobManifest& manifest, const std::vector<MaskWork>& wor
   std::set<fs::path> canonical;
   for (const fs::path& folder : images) canonical.insert(on_disk(folder));
   for (const MaskWork& work : works) {
-    const fs::path masks = fs::weakly_canonical(fs::absolute(work.source->folder));
+    fs::path masks = fs::weakly_canonical(fs::absolute(work.source->folder));
+    if (!masks.has_filename()) masks = masks.parent_path();  // "masks/"
     const fs::path root = on_disk(work.source->spec->root);
     const fs::path below = masks.lexically_relative(root);
     const bool is_in_root = !below.empty() && *below.begin() != "..";
     if (!canonical.contains(masks) && (!is_in_root || canonical.contains(masks.parent_path()))) {
       continue;
     }
-    throw UsageError("expected a folder for masks where none is taken for an image, got one in " +
+    throw UsageError("expected a folder that is not searched for images, got one below " +
                      root.string() + ", in " + masks.string() + " (choose another --out)");
   }
 }

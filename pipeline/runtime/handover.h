@@ -10,7 +10,7 @@ namespace eventgan {
 // For the thread sanitizer, which does not see how oneTBB, not built for it, orders tasks: it would
 // take what they share for races, or, with all reports suppressed that pass through oneTBB, find no
 // race in any task. So the sources that use oneTBB are compiled without the sanitizer, and say here
-// what comes after what. Elsewhere nothing of this does anything.
+// what comes after what. Elsewhere none of this does anything.
 
 /// What a thread has done comes before all that a thread does that takes `thing` over later.
 inline void hand_over([[maybe_unused]] const void* thing) {

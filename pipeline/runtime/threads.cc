@@ -37,7 +37,8 @@ void for_each_index(std::size_t count, int threads, const std::function<void(std
     oneapi::tbb::parallel_for(
         oneapi::tbb::blocked_range<std::size_t>(0, count),
         [&](const auto& range) {
-          const Tasks::Work task(tasks, &range);
+          const char own = 0;  // of this task alone, unlike `range`, whose memory oneTBB uses again
+          const Tasks::Work task(tasks, &own);
           for (std::size_t i = range.begin(); i != range.end(); ++i) work(i);
         },
         oneapi::tbb::simple_partitioner());

@@ -95,12 +95,14 @@ NumberedSequence number(const Images& images) {
 
 bool is_png(const fs::path& name) { return lower_extension(name) == ".png"; }
 
-bool is_own_picture(const fs::path& file) {
+bool is_own_picture(const fs::path& file) try {
   std::string reason, start(kBeforePixels, '\0');
   const auto opened = InputFile::open(file, reason);
   if (!opened) return false;  // said where it is read
   start.resize(opened->read_some(0, start));
   return has_own_mark(start);
+} catch (const InputError&) {
+  return false;  // said where it is read
 }
 
 }  // namespace
@@ -157,8 +159,8 @@ ImageFolder list_image_folder(const fs::path& folder) {
 
 void require_no_images(const fs::path& folder) {
   const auto refuse = [&](const std::string& name) {
-    throw UsageError("expected a folder without images of others, got " + name + ", in " +
-                     folder.string() + " (choose another folder to write to)");
+    throw UsageError("expected a folder without images or videos that eventgan did not draw, got " +
+                     name + ", in " + folder.string() + " (choose another folder to write to)");
   };
   const ImageFolder listed = list_image_folder(folder);
   if (!listed.frames.empty()) refuse(listed.frames.frames().front().second);

@@ -67,8 +67,22 @@ bool has_no_names(const fs::path& labels) {
   return yolo_names_file(labels).empty() && yolo_names_file(labels.parent_path()).empty();
 }
 
-/// The first of the formats, but VOC's or a table's names before YOLO's numbers; masks beside boxes
-/// are their outlines, the others are remarks.
+/// Whether each of YOLO's texts in a folder has a file of VOC's, with the names.
+bool covers(const FoundLabels& voc, const fs::path& texts) {
+  const auto stems = [](const fs::path& folder, std::string_view extension) {
+    std::set<std::string> names;
+    for (const fs::path name : look_into(folder).files) {
+      if (lower_extension(name) == extension) names.insert(name.stem().string());
+    }
+    return names;
+  };
+  if (voc.format != LabelFormat::kVoc) return false;
+  const std::set<std::string> wanted = stems(texts, ".txt");
+  return !wanted.empty() && std::ranges::includes(stems(voc.path, ".xml"), wanted);
+}
+
+/// The first of the formats, but VOC's names before YOLO's numbers; masks beside boxes are their
+/// outlines, the others are remarks.
 std::optional<FoundLabels> find_any(const FoundFrames& frames, std::vector<std::string>& remarks) {
   std::optional<FoundLabels> found;
   for (const LabelReader* const reader : kLabelReaders) {
@@ -80,11 +94,12 @@ std::optional<FoundLabels> find_any(const FoundFrames& frames, std::vector<std::
       found->outlines = *path;
     } else {
       FoundLabels other{reader->format, *path};
-      if (found->format == LabelFormat::kYolo && has_no_names(found->path)) {
-        std::swap(*found, other);
-      }
+      const bool lacks_names = found->format == LabelFormat::kYolo && has_no_names(found->path);
+      const bool is_better = lacks_names && covers(other, found->path);
+      if (is_better) std::swap(*found, other);
       remarks.push_back("labels in another format (" + std::string(to_string(other.format)) +
-                        ") left out: " + other.path.string());
+                        ") left out: " + other.path.string() +
+                        (lacks_names && !is_better ? ", which has the names of the classes" : ""));
     }
   }
   return found;

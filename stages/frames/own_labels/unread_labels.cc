@@ -173,6 +173,18 @@ bool is_of_cameras(const std::string& text) {
 }
 
 /// A table whose rows begin with one of the images, or whose header has them and edges.
+/// Whether a table's header has a column of scores.
+bool has_scores(std::string_view table) {
+  const std::string header = in_small_letters(std::string(table.substr(0, table.find('\n'))));
+  for (std::size_t begin = 0; begin <= header.size();) {
+    const std::size_t end = std::min(header.find_first_of(",;\t\r", begin), header.size());
+    const std::string_view name = std::string_view(header).substr(begin, end - begin);
+    if (name == "score" || name == "scores" || name.starts_with("conf")) return true;
+    begin = end + 1;
+  }
+  return false;
+}
+
 bool is_table(const LabelFile& file) {
   const std::string_view line = std::string_view(file.text).substr(0, file.text.find('\n'));
   CsvReader reader(file.text, separator_of(file.text));
@@ -360,22 +372,17 @@ constexpr std::array kUnreadFormats{
                    return file.is_of_image && is_yolo_text(file.text).value_or(false);
                  },
                  kNoBeside, "put it beside its image, or into labels/FOLDER for images/FOLDER"},
-    UnreadFormat{"KITTI's", ".txt",
-                 [](const LabelFile& file) { return file.is_of_image && is_kitti_text(file); },
-                 "texts as KITTI has them are read as the dataset kitti_object",
-                 "name the folders training/image_2 and training/label_2, and give the one above; "
-                 "of other classes than KITTI's (Car, Van, Pedestrian, ...) convert them to COCO"},
+    UnreadFormat{
+        "KITTI's", ".txt",
+        [](const LabelFile& file) { return file.is_of_image && is_kitti_text(file); },
+        "texts as KITTI has them are read as the dataset kitti_object",
+        "name the folders training/image_2 and training/label_2, and give the one above; "
+        "if the classes are not KITTI's (Car, Van, Pedestrian, ...), convert them to COCO"},
     UnreadFormat{"DOTA's", ".txt",
                  [](const LabelFile& file) { return file.is_of_image && is_dota_text(file); },
                  kNoReader, "convert them to COCO or YOLO with upright boxes"},
     UnreadFormat{"a table of", ".csv",
-                 [](const LabelFile& file) {
-                   const std::string header =
-                       in_small_letters(file.text.substr(0, file.text.find('\n')));
-                   const bool has_scores =
-                       header.find("score") != header.npos || header.find("conf") != header.npos;
-                   return has_scores && is_table(file);
-                 },
+                 [](const LabelFile& file) { return has_scores(file.text) && is_table(file); },
                  "it has a column of scores, as a detector's results",
                  "if it is the ground truth, take that column out"},
     UnreadFormat{"a table of", ".csv", is_table, "its columns or names of images are others",

@@ -90,6 +90,8 @@ TEST(OwnFile, AFolderOfResultsAloneIsTheProgramsOwn) {
   write_file(folder / "out/a-train-00000-of-00001.h5", "");
   EXPECT_FALSE(is_own()) << "a recording, or a shard that is not done";
   write_file(folder / "out/a-train-00000-of-00001.json", "{}");
+  EXPECT_FALSE(is_own()) << "a recording with labels";
+  write_file(folder / "out/a-train-00000-of-00001.json", R"({"format":"eventgan-commit-record"})");
   EXPECT_TRUE(is_own());
   write_file(folder / "out/more/plan.json", R"({"format":"eventgan-plan"})");
   EXPECT_TRUE(is_own()) << "with a folder of the same kind";

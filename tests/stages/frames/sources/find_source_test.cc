@@ -378,7 +378,7 @@ TEST_F(FindSource, WhatLooksLikeLabelsAndIsNotReadIsNamed) {
   }
   EXPECT_THAT(find("unread" + std::to_string(number - 1)).unread.front(),
               HasSubstr("it has a column of scores"));
-  EXPECT_THAT(find("unread6").unread.front(), HasSubstr("of other classes than KITTI's"));
+  EXPECT_THAT(find("unread6").unread.front(), HasSubstr("if the classes are not KITTI's"));
   lay("none", "1.jpg, 1.txt=caption, captions.json=captions, frames.csv=frames, 1.json=mine",
       {{"caption", "a street with two cars\n"},
        {"captions", R"([{"image": "1.jpg", "caption": "a street"}])"},
@@ -522,13 +522,17 @@ TEST_F(FindSource, NamesOfClassesGoBeforeYolosNumbers) {
   };
   write("a/xml/1.xml", "<annotation/>");
   expect(LabelFormat::kVoc, "yolo");
+  write("a/images/2.jpg");
+  write("a/labels/2.txt");  // of all images there are texts alone: the remark says where names are
+  expect(LabelFormat::kYolo, "voc");
+  EXPECT_THAT(find("a").remarks, Contains(HasSubstr("has the names of the classes")));
   write("a/classes.txt", "walker\n");
   expect(LabelFormat::kYolo, "voc");
   fs::remove_all(at("a/xml"));
   write("a/boxes.csv", "image,class,left,top,right,bottom\n1.jpg,walker,0,0,1,1\n");
   expect(LabelFormat::kYolo, "csv");
   fs::remove(at("a/classes.txt"));
-  expect(LabelFormat::kCsv, "yolo");
+  EXPECT_THAT(find("a").remarks, Contains(HasSubstr("has the names of the classes")));
 }
 
 /// Among or beside images, what the program has made is neither image nor label nor recording.
@@ -545,7 +549,8 @@ TEST_F(FindSource, TheProgramsOwnOutputIsPassedOver) {
   };
   const std::vector<std::string> before = sequences();
   write("set/out/plan.json", R"({"format":"eventgan-plan"})");
-  write("set/out/labels.json", R"({"images": [{"file_name": "1.jpg"}], "annotations": []})");
+  write("set/out/s-00000.h5");
+  write("set/out/s-00000.json", R"({"format":"eventgan-commit-record"})");
   write("set/yolo/.export/export.txt", "format yolo\n");
   write("set/yolo/images/train/1.png");
   write("set/previews/s_0000.png", picture);
@@ -563,11 +568,25 @@ TEST_F(FindSource, TheProgramsOwnOutputIsPassedOver) {
   EXPECT_NO_THROW(require_no_images(at("set/out")));
   for (const char* name : {"set/previews", "set/a"}) {
     EXPECT_THAT([&] { require_no_images(at(name)); },
-                ThrowsMessage<UsageError>(HasSubstr("expected a folder without images of others")));
+                ThrowsMessage<UsageError>(HasSubstr(
+                    "expected a folder without images or videos that eventgan did not draw")));
   }
-  // A folder of images with results among them is not the program's.
+  // A folder of images with results among them is not the program's,
   write("set/b/run.json", R"({"manifest_folder": "/a"})");
   EXPECT_THAT(sequences(), Contains("b"));
+  // nor one with labels or a recording, nor one whose plan is empty.
+  const auto is_hidden = [&] { return !list_image_folder(at("set")).left_out.empty(); };
+  fs::remove_all(at("set/yolo"));
+  EXPECT_TRUE(is_hidden());
+  for (const char* name : {"set/out/labels.json", "set/out/camera.h5"}) {
+    write(name, R"({"images": [{"file_name": "1.jpg"}], "annotations": []})");
+    EXPECT_FALSE(is_hidden()) << name;
+    fs::remove(at(name));
+  }
+  fs::create_directory_symlink(".", at("set/out/.again"));
+  EXPECT_TRUE(is_hidden());
+  write("set/out/plan.json");
+  EXPECT_FALSE(is_hidden());
 }
 
 TEST_F(FindSource, ImagesThatAreLeftOutAreWarnings) {
