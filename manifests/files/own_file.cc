@@ -110,8 +110,9 @@ bool is_own_output(const fs::path& folder) try {
   }
   // A person's labels or recordings among results are still found: what convert does not replace.
   const auto is_result = [&](const fs::path& file) {
-    constexpr std::array<std::string_view, 6> kNames{
-        "plan.json", "run.json", "amendments.json", "dataset.json", "dataset.h5", "report.html"};
+    constexpr std::array<std::string_view, 7> kNames{
+        "plan.json",    "manifest.json", "run.json",   "amendments.json",
+        "dataset.json", "dataset.h5",    "report.html"};
     const auto beside = [&](const char* extension) {
       return fs::path(file).replace_extension(extension);
     };

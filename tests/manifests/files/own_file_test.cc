@@ -93,6 +93,8 @@ TEST(OwnFile, AFolderOfResultsAloneIsTheProgramsOwn) {
   EXPECT_FALSE(is_own()) << "a recording with labels";
   write_file(folder / "out/a-train-00000-of-00001.json", R"({"format":"eventgan-commit-record"})");
   EXPECT_TRUE(is_own());
+  write_file(folder / "out/manifest.json", R"({"format":"eventgan-manifest"})");
+  EXPECT_TRUE(is_own());
   write_file(folder / "out/more/plan.json", R"({"format":"eventgan-plan"})");
   EXPECT_TRUE(is_own()) << "with a folder of the same kind";
   for (const char* mine : {"out/1.png", "out/notes/1.png"}) {
