@@ -176,13 +176,15 @@ class Workflow(unittest.TestCase):
         for step in trixie["steps"] + checks["steps"] + image["steps"]:
             self.assertRegex(step.get("uses", "actions/checkout@v4"), r"@v\d+$")
 
-    def test_the_fuzzers_run_at_night(self):
+    def test_clang_tidy_and_the_fuzzers_run_at_night(self):
         workflow = yaml.safe_load((SOURCE / ".github" / "workflows" / "nightly.yml").read_text())
         self.assertIn("schedule", workflow[True])  # YAML 1.1 takes `on` for a truth value
         self.assertIn(".ci/run nightly", [step.get("run") for step in workflow["jobs"]["checks"]["steps"]])
-        fuzzing = (SOURCE / ".ci" / "run").read_text().partition('step "fuzzers"')[2]
-        self.assertRegex(fuzzing, r"^\nif \[\[ \$\{1:-\} != nightly \]\]; then\n  echo")
-        self.assertNotIn("preset fuzz", fuzzing.partition("elif")[0])
+        always, end, at_night = re.split(r"(?m)^(if \[\[ \$nightly != nightly \]\]; then\n  step .*\n  exit\nfi)$",
+                                         (SOURCE / ".ci" / "run").read_text())
+        for command in ("cmake --preset fuzz", "run-clang-tidy"):
+            self.assertIn(command, at_night)
+            self.assertNotIn(command, always)
 
     def test_a_release_is_what_bootstrap_makes_on_the_oldest_debian(self):
         workflow = yaml.safe_load((SOURCE / ".github" / "workflows" / "release.yml").read_text())
