@@ -301,11 +301,11 @@ void add_ignored_regions(const CocoImage& entry, ImageSize image, const CocoInde
       index.categories, [](const auto& category) { return !category.keypoints.empty(); });
   const auto of = with_joints == index.categories.end() ? index.categories.begin() : with_joints;
   for (const std::vector<Point>& corners : entry.ignored) {
-    Outline outline = outline_of_parts({corners});
+    const Outline outline = outline_of_parts({corners});
     add_box({.class_id = static_cast<int>(of - index.categories.begin()),
              .xyxy = bounds(outline),
              .ignore = true,
-             .outline = std::move(outline)},
+             .outline = outline},
             image, place, annotation);
   }
 }
