@@ -109,7 +109,9 @@ void require_apart(const JobManifest& manifest, const std::vector<MaskWork>& wor
   }
   std::set<fs::path> canonical;
   for (const fs::path& folder : images) canonical.insert(on_disk(folder));
+  std::set<const OutlinedSource*> seen;
   for (const MaskWork& work : works) {
+    if (!seen.insert(work.source).second) continue;
     fs::path masks = fs::weakly_canonical(fs::absolute(work.source->folder));
     if (!masks.has_filename()) masks = masks.parent_path();  // "masks/"
     const fs::path root = on_disk(work.source->spec->root);
