@@ -277,6 +277,7 @@ class ForeignFolders(program.InFolder):
                  ["export", out, "--to", "raw", "--out", images / "raw"],
                  ["simulate", simulation, "--output", images / "simulated"],
                  ["outline", out / "manifest.json", "--out", images / "a" / "masks"],
+                 ["outline", out / "manifest.json", "--out", f"{images}/a/more_masks/"],
                  ["convert", images, "--output", images], ["preview", images, "--out", images / "more"]]
         refused = [["preview", out, "--out", images / "a"], ["preview", out, "--out", images / "b", "--sheet"],
                    ["preview", out, "--out", images / "a", "--video"],

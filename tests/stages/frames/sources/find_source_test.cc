@@ -379,6 +379,9 @@ TEST_F(FindSource, WhatLooksLikeLabelsAndIsNotReadIsNamed) {
   EXPECT_THAT(find("unread" + std::to_string(number - 1)).unread.front(),
               HasSubstr("it has a column of scores"));
   EXPECT_THAT(find("unread6").unread.front(), HasSubstr("if the classes are not KITTI's"));
+  write("board/score.jpg");  // a name that says score, in a table without a header
+  write("board/mine.csv", "score.jpg,car,0,0,9,9\n");
+  EXPECT_THAT(find("board").unread, ElementsAre(::testing::Not(HasSubstr("column of scores"))));
   lay("none", "1.jpg, 1.txt=caption, captions.json=captions, frames.csv=frames, 1.json=mine",
       {{"caption", "a street with two cars\n"},
        {"captions", R"([{"image": "1.jpg", "caption": "a street"}])"},
