@@ -108,6 +108,16 @@ struct Person {
   bool operator==(const Person&) const = default;
 };
 
+/// How what each pixel of a volume shows of the labelled image moves from the pair's previous image
+/// to its next one: by so many pixels of the volume, in steps of 1/128.
+struct PixelFlow {
+  std::vector<float> px;            ///< [2, y, x], x first; 0 where the volume shows no image
+  std::vector<std::uint8_t> valid;  ///< [y, x] 1: seen in both images; else 0
+
+  bool empty() const { return px.empty(); }  ///< there is no flow
+  bool operator==(const PixelFlow&) const = default;
+};
+
 /// Everything a dataset says about one frame.
 struct Annotation {
   /// The annotation as the dataset holds it. Text formats (KITTI): the bytes of the file,

@@ -140,7 +140,7 @@ Outcome<SharedImage> PairReader::still_image(const FramePair& pair, ImageOrienta
 
 Outcome<PreparedPair> PairReader::still(const FramePair& planned, ImageOrientation orientation,
                                         std::int64_t stride, const std::vector<Box>& boxes,
-                                        const Settle& settle) const {
+                                        const Settle& settle, bool with_flow) const {
   try {
     Outcome<SharedImage> decoded = still_image(planned, orientation, stride);
     if (is_fault(decoded)) return decoded.fault();
@@ -151,19 +151,22 @@ Outcome<PreparedPair> PairReader::still(const FramePair& planned, ImageOrientati
     OutlineCounts outlines;
     if (!pair.objects.empty()) outlines = cut_out_missing(view, outlined);
     FramesBetween between;
+    PixelFlow flow;
+    PixelFlow* const wanted = with_flow ? &flow : nullptr;
     std::array<PreparedFrame, 2> frames;
     if (tells_between_ && pair.poses.empty()) {  // its ends are the frames
-      between = frames_between(image, pair, spec_, outlined);
+      between = frames_between(image, pair, spec_, outlined, wanted);
       for (const int end : {0, 1}) {
         frames[end] = {between.at(end).pixels, place(image->size, spec_, pair)};
       }
     } else {
-      frames = prepare_still(view, pair, spec_, outlined);
+      frames = prepare_still(view, pair, spec_, outlined, wanted);
       if (tells_between_) between = frames_between(image, pair, spec_, outlined);
     }
     PreparedPair prepared = prepare_pair(frames[0], frames[1]);
     prepared.outlines = outlines;
     prepared.between = std::move(between);
+    prepared.flow = std::move(flow);
     if (settle) prepared.settled = std::move(pair);
     return prepared;
   } catch (const std::runtime_error& error) {
@@ -183,9 +186,9 @@ void PairReader::expect(const FramePair& pair, ImageOrientation orientation) con
 
 Outcome<PreparedPair> PairReader::read(const FramePair& pair, ImageOrientation orientation,
                                        std::int64_t still_stride, const std::vector<Box>& boxes,
-                                       const Settle& settle) const {
+                                       const Settle& settle, bool with_flow) const {
   if (pair.motion || !pair.poses.empty()) {
-    return still(pair, orientation, still_stride, boxes, settle);
+    return still(pair, orientation, still_stride, boxes, settle, with_flow);
   }
   const auto outcome = frames(pair, orientation);
   if (is_fault(outcome)) return outcome.fault();

@@ -77,10 +77,11 @@ class PairReader {
   /// that a still is in, each so many of whose frames are taken (SourceSpec::every). `boxes`: those
   /// that FramePair::objects is of; those without an outline are cut out of the image (cut_out.h).
   /// `settle`: what a still's pair is once its image's size is known; PreparedPair::settled then.
+  /// `with_flow`: fills PreparedPair::flow of a still.
   Outcome<PreparedPair> read(const FramePair& pair,
                              ImageOrientation orientation = ImageOrientation::kStored,
                              std::int64_t still_stride = 1, const std::vector<Box>& boxes = {},
-                             const Settle& settle = {}) const;
+                             const Settle& settle = {}, bool with_flow = false) const;
 
   /// Has the system load the images of a pair that will be read soon, so that reading it does not
   /// wait for the disk. (Videos are read in order; the system looks ahead in these by itself.)
@@ -95,7 +96,7 @@ class PairReader {
                                    std::int64_t stride) const;
   Outcome<PreparedPair> still(const FramePair& planned, ImageOrientation orientation,
                               std::int64_t stride, const std::vector<Box>& boxes,
-                              const Settle& settle) const;
+                              const Settle& settle, bool with_flow) const;
 
   std::filesystem::path base_;
   ImageSpec spec_;

@@ -110,14 +110,19 @@ class MovingStill {
   /// The frame at u, 0 previous to 1 next; it may be the image itself. Thread safe.
   cv::Mat at(double u) const {
     if (u == pair_.label_position) return image_;
-    std::vector<AffineMap> objects(pair_.objects.size());
-    for (std::size_t k = 0; k < objects.size(); ++k) {
-      if (pair_.objects[k]) objects[k] = object_map(k, u);
-    }
-    return layers_.frame(image_map(u), objects);
+    return layers_.frame(image_map(u), object_maps(u));
   }
 
   double moved_end() const { return 1 - pair_.label_position; }
+
+  /// StillLayers::seen of that frame.
+  cv::Mat seen(double u) const { return layers_.seen(object_maps(u)); }
+
+  /// Where what lies at a point of the labelled image lies in the moved frame, if it is what `seen`
+  /// calls `number`.
+  AffineMap step(std::size_t number) const {
+    return inverse(number == 0 ? image_map(moved_end()) : object_map(number - 1, moved_end()));
+  }
 
   /// No point of the image or of an object moves farther than that, pixels of the image.
   double displacement_px() const {
@@ -141,6 +146,15 @@ class MovingStill {
     const ImageMotion& motion = *pair_.objects[k];
     return motion == ImageMotion() ? image_map(u)
                                    : object_to_labelled(size_, pair_, motion, boxes_.at(k), u);
+  }
+
+  /// Of the boxes that have a motion; the others' are not looked at.
+  std::vector<AffineMap> object_maps(double u) const {
+    std::vector<AffineMap> maps(pair_.objects.size());
+    for (std::size_t k = 0; k < maps.size(); ++k) {
+      if (pair_.objects[k]) maps[k] = object_map(k, u);
+    }
+    return maps;
   }
 
   /// What the image holds of it, as points: an edge lies half a pixel before the centre of the
@@ -183,6 +197,7 @@ class ClipFrames {
   ClipFrames(const Resizable& still, const FramePair& pair, const std::vector<Box>& boxes)
       : from_(pair.poses.at(0)),
         to_(pair.poses.at(1)),
+        label_position_(pair.label_position),
         type_(still.image.type()),
         clip_({{still.image.rows, still.image.cols}, still.image.data, still.channels}, boxes,
               from_) {}
@@ -195,8 +210,22 @@ class ClipFrames {
 
   double displacement_px() const { return clip_.displacement_px(from_, to_); }
 
+  double moved_end() const { return 1 - label_position_; }
+
+  /// As MovingStill's, of either end.
+  cv::Mat seen(double u) const {
+    std::vector<std::uint16_t> pixels = clip_.seen(u == 0 ? from_ : to_);
+    if (pixels.empty()) return {};
+    return cv::Mat(clip_.size().height, clip_.size().width, CV_16UC1, pixels.data()).clone();
+  }
+
+  AffineMap step(std::size_t number) const {
+    return label_position_ == 0 ? clip_.step(from_, to_, number) : clip_.step(to_, from_, number);
+  }
+
  private:
   StillPose from_, to_;
+  double label_position_;
   int type_;
   StillClip clip_;
 };
@@ -209,6 +238,53 @@ std::vector<std::uint8_t> cut(const cv::Mat& grey, const VisiblePart& part) {
     pixels.insert(pixels.end(), row, row + part.size.width);
   }
   return pixels;
+}
+
+/// `Moving`: MovingStill or ClipFrames.
+template <class Moving>
+PixelFlow flow_of(const Moving& moving, const Placement& placement) {
+  constexpr double kSteps = 128;  // to a pixel, as in DSEC's files; they compress well, too
+  const VisiblePart part = visible_part(placement);
+  const AffineMap to_volume = placement.source_to_volume(), to_source = inverse(to_volume);
+  const double moved_end = moving.moved_end();
+  const cv::Mat here = moving.seen(1 - moved_end), there = moving.seen(moved_end);
+  const auto shown = [&](const cv::Mat& seen, Point at) -> std::size_t {
+    if (seen.empty()) return 0;
+    const Point source = mapped(to_source, at);
+    const auto nearest = [](double place, int count) {
+      return std::clamp(static_cast<int>(std::lround(place)), 0, count - 1);
+    };
+    return seen.at<std::uint16_t>(nearest(source.y, seen.rows), nearest(source.x, seen.cols));
+  };
+  std::vector<std::optional<AffineMap>> steps;  // from the labelled frame, in the volume
+  const auto step_of = [&](std::size_t number) -> const AffineMap& {
+    if (steps.size() <= number) steps.resize(number + 1);
+    auto& step = steps[number];
+    if (!step) step = compose(compose(to_volume, moving.step(number)), to_source);
+    return *step;
+  };
+  const std::size_t pixels = placement.volume.pixel_count();
+  PixelFlow flow{std::vector<float>(2 * pixels), std::vector<std::uint8_t>(pixels)};
+  const int right = part.volume_x + part.size.width, bottom = part.volume_y + part.size.height;
+  for (int y = part.volume_y; y < bottom; ++y) {
+    const std::size_t row = static_cast<std::size_t>(y) * placement.volume.width;
+    for (int x = part.volume_x; x < right; ++x) {
+      const Point at{double(x), double(y)};
+      const std::size_t number = shown(here, at);
+      const Point moved = mapped(step_of(number), at);
+      const double dx = std::nearbyint((moved.x - x) * kSteps) / kSteps;
+      const double dy = std::nearbyint((moved.y - y) * kSteps) / kSteps;
+      const Point target{x + dx, y + dy};
+      const bool is_inside = target.x >= part.volume_x && target.x <= right - 1 &&
+                             target.y >= part.volume_y && target.y <= bottom - 1;
+      const double sign = moved_end == 1 ? 1 : -1;  // of time
+      const std::size_t pixel = row + static_cast<std::size_t>(x);
+      flow.px[pixel] = static_cast<float>(sign * dx + 0.0);  // no -0
+      flow.px[pixels + pixel] = static_cast<float>(sign * dy + 0.0);
+      flow.valid[pixel] = is_inside && shown(there, target) == number;
+    }
+  }
+  return flow;
 }
 
 constexpr auto kInputOfGrey = [] {
@@ -233,17 +309,20 @@ PreparedFrame prepare_frame(const ImageView& frame, const ImageSpec& spec) {
 }
 
 std::array<PreparedFrame, 2> prepare_still(const ColourView& image, const FramePair& pair,
-                                           const ImageSpec& spec, const std::vector<Box>& boxes) {
+                                           const ImageSpec& spec, const std::vector<Box>& boxes,
+                                           PixelFlow* flow) {
   return unless_refused([&] {
     const Resizable still = grey_if_first(image, spec);
     if (!pair.poses.empty()) {
       const Placement placement = place(clip_window(image.size).size, spec);
       const ClipFrames clip(still, pair, boxes);
+      if (flow) *flow = flow_of(clip, placement);
       return std::array{prepare({clip.at(0), still.channels}, placement, spec),
                         prepare({clip.at(1), still.channels}, placement, spec)};
     }
     const Placement placement = place(image.size, spec, pair);
     const MovingStill moving(still, pair, boxes);
+    if (flow) *flow = flow_of(moving, placement);
     std::array<PreparedFrame, 2> frames = {
         prepare({moving.at(moving.moved_end()), still.channels}, placement, spec),
         prepare(still, placement, spec)};
@@ -267,7 +346,8 @@ namespace {
 /// `Moving`: MovingStill or ClipFrames. The image lives as long as what tells its frames.
 template <class Moving>
 FramesBetween between_of(const SharedImage& image, const FramePair& pair, const ImageSpec& spec,
-                         const std::vector<Box>& boxes, const Placement& placement) {
+                         const std::vector<Box>& boxes, const Placement& placement,
+                         PixelFlow* flow) {
   struct Kept {
     SharedImage image;
     Resizable still;
@@ -279,6 +359,7 @@ FramesBetween between_of(const SharedImage& image, const FramePair& pair, const 
           moving(still, pair, boxes) {}
   };
   const auto kept = std::make_shared<const Kept>(image, pair, spec, boxes);
+  if (flow) *flow = flow_of(kept->moving, placement);
   return {[kept, spec, placement](double u) {
             return unless_refused([&] {
               PreparedFrame frame =
@@ -292,14 +373,14 @@ FramesBetween between_of(const SharedImage& image, const FramePair& pair, const 
 }  // namespace
 
 FramesBetween frames_between(const SharedImage& image, const FramePair& pair, const ImageSpec& spec,
-                             const std::vector<Box>& boxes) {
+                             const std::vector<Box>& boxes, PixelFlow* flow) {
   return unless_refused([&] {
     if (!pair.poses.empty()) {
       const Placement placement = place(clip_window(image->size).size, spec);
-      return between_of<ClipFrames>(image, pair, spec, boxes, placement);
+      return between_of<ClipFrames>(image, pair, spec, boxes, placement, flow);
     }
     const Placement placement = place(image->size, spec, pair);
-    return between_of<MovingStill>(image, pair, spec, boxes, placement);
+    return between_of<MovingStill>(image, pair, spec, boxes, placement, flow);
   });
 }
 

@@ -56,6 +56,7 @@ struct PreparedPair {
   FramesBetween between = {};             ///< of a still, where a reader was asked to keep it
   OutlineCounts outlines = {};            ///< of a still whose objects move on their own
   std::optional<FramePair> settled = {};  ///< of a still: the pair it is with its image's size
+  PixelFlow flow = {};                    ///< of a still, where a reader was asked for it
 };
 
 /// An image [y, x] or [y, x, channel] uint8, C order, 0..255, owned by somebody else.
@@ -86,9 +87,16 @@ inline constexpr int kMostStillSide = 32766;
 /// moved. Of a clip (FramePair::poses), both are what its window shows of the image as it is then,
 /// and boxes are those of the still. Throws as above, also if too little would be left or a side is
 /// beyond kMostStillSide. Thread safe.
+///
+/// `flow`, unless it is null, becomes the pair's: for each pixel of the volume the motion of the
+/// image, or of the object that covers at least half of the labelled image's pixel there, by the
+/// maps that made the frames, whatever the placement. Valid where the same thing is seen at the
+/// place in the other frame to which it leads, between the outermost pixels' centres of what the
+/// volume shows.
 std::array<PreparedFrame, 2> prepare_still(const ColourView& image, const FramePair& pair,
                                            const ImageSpec& spec,
-                                           const std::vector<Box>& boxes = {});
+                                           const std::vector<Box>& boxes = {},
+                                           PixelFlow* flow = nullptr);
 
 /// The moved frame of a still's pair, of the image's size: each pixel is the image where
 /// moved_to_labelled leads from it, bicubic (Keys with a = -0.75, places rounded to 1/32 px);
@@ -101,9 +109,9 @@ ColourFrame move_still(const ColourFrame& image, const FramePair& pair,
 
 /// What prepare_still makes the two ends of: at label_position it is that image, at the other end
 /// the moved one, and between them image and objects move steadily
-/// (manifests/values/still_motion.h). Throws as prepare_still.
+/// (manifests/values/still_motion.h). `flow` is as prepare_still has it. Throws as prepare_still.
 FramesBetween frames_between(const SharedImage& image, const FramePair& pair, const ImageSpec& spec,
-                             const std::vector<Box>& boxes);
+                             const std::vector<Box>& boxes, PixelFlow* flow = nullptr);
 
 /// The generator's input of 8-bit grey: x = (u/255 - 0.5) * 2 in [-1, 1], in single precision.
 /// `input` must have the size of `grey`. Thread safe.

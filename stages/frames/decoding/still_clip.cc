@@ -69,6 +69,28 @@ struct StillClip::State {
     return object_in_clip(image, pose, pose.objects.at(k).value(), boxes[k]);
   }
 
+  /// For StillLayers.
+  std::vector<AffineMap> maps_back(const StillPose& pose) const {
+    std::vector<AffineMap> maps(boxes.size());
+    for (const StillObject& object : objects) {
+      maps[object.box] = inverse(object_map(pose, object.box));
+    }
+    return maps;
+  }
+
+  /// The window's part of what is of the image's size, row after row.
+  template <class Element>
+  std::vector<Element> windowed(const cv::Mat& whole) const {
+    const std::size_t size = whole.elemSize() / sizeof(Element);
+    std::vector<Element> pixels;
+    pixels.reserve(size * window.size.pixel_count());
+    for (int y = window.y; y < window.y + window.size.height; ++y) {
+      const Element* row = whole.ptr<Element>(y) + size * static_cast<std::size_t>(window.x);
+      pixels.insert(pixels.end(), row, row + size * static_cast<std::size_t>(window.size.width));
+    }
+    return pixels;
+  }
+
   ImageSize image;
   ClipWindow window;
   std::vector<Box> boxes;
@@ -84,21 +106,26 @@ ImageSize StillClip::size() const { return state_->window.size; }
 
 std::vector<std::uint8_t> StillClip::frame(const StillPose& pose) const {
   return unless_refused([&] {
-    const ClipWindow& window = state_->window;
-    std::vector<AffineMap> maps(state_->boxes.size());
-    for (const StillObject& object : state_->objects) {
-      maps[object.box] = inverse(state_->object_map(pose, object.box));
-    }
-    const cv::Mat whole = state_->layers.frame(inverse(image_in_clip(state_->image, pose)), maps);
-    std::vector<std::uint8_t> pixels;
-    const std::size_t bytes = whole.elemSize();
-    pixels.reserve(bytes * window.size.pixel_count());
-    for (int y = window.y; y < window.y + window.size.height; ++y) {
-      const std::uint8_t* row = whole.ptr(y) + bytes * static_cast<std::size_t>(window.x);
-      pixels.insert(pixels.end(), row, row + bytes * static_cast<std::size_t>(window.size.width));
-    }
-    return pixels;
+    return state_->windowed<std::uint8_t>(
+        state_->layers.frame(inverse(image_in_clip(state_->image, pose)), state_->maps_back(pose)));
   });
+}
+
+std::vector<std::uint16_t> StillClip::seen(const StillPose& pose) const {
+  return unless_refused([&] {
+    const cv::Mat whole = state_->layers.seen(state_->maps_back(pose));
+    return whole.empty() ? std::vector<std::uint16_t>() : state_->windowed<std::uint16_t>(whole);
+  });
+}
+
+AffineMap StillClip::step(const StillPose& from, const StillPose& to, std::size_t number) const {
+  const auto placed = [&](const StillPose& pose) {
+    const AffineMap map =
+        number == 0 ? image_in_clip(state_->image, pose) : state_->object_map(pose, number - 1);
+    const AffineMap into_window{1, 0, -double(state_->window.x), 0, 1, -double(state_->window.y)};
+    return compose(into_window, map);
+  };
+  return compose(placed(to), inverse(placed(from)));
 }
 
 double StillClip::displacement_px(const StillPose& from, const StillPose& to) const {

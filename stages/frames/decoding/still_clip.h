@@ -1,12 +1,14 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "manifests/values/frames.h"
 #include "manifests/values/labels.h"
+#include "manifests/values/still_motion.h"
 #include "stages/frames/decoding/prepared_frame.h"
 
 namespace eventgan {
@@ -25,6 +27,14 @@ class StillClip {
   /// The frame at a pose: [y, x, channel] uint8 of size(), with the image's channels. Throws
   /// std::runtime_error if OpenCV refuses it.
   std::vector<std::uint8_t> frame(const StillPose& pose) const;
+
+  /// What each pixel of that frame shows: [y, x] of size(), 0 the image, else 1 + the box of the
+  /// object. Empty if there is nothing but the image.
+  std::vector<std::uint16_t> seen(const StillPose& pose) const;
+
+  /// Where what lies at a point of the frame at `from` lies in the frame at `to`, if it is what
+  /// `seen` calls `number`.
+  AffineMap step(const StillPose& from, const StillPose& to, std::size_t number) const;
 
   /// No point of a frame moves farther from the one pose to the other.
   double displacement_px(const StillPose& from, const StillPose& to) const;

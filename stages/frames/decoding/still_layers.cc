@@ -264,4 +264,18 @@ cv::Mat StillLayers::frame(const AffineMap& background,
   return frame;
 }
 
+cv::Mat StillLayers::seen(const std::vector<AffineMap>& objects) const {
+  if (layers_.empty()) return {};
+  cv::Mat seen(background_.size(), CV_16UC1, cv::Scalar(0));
+  for (const Layer& layer : layers_) {
+    const AffineMap& map = objects[layer.box];
+    const cv::Rect area = seen_in(layer, map);
+    if (area.empty()) continue;
+    constexpr int kHalf = 128;
+    seen(area).setTo(static_cast<double>(layer.box + 1),
+                     sampled(layer.cover, layer.area.tl(), map, area, cv::INTER_LINEAR) >= kHalf);
+  }
+  return seen;
+}
+
 }  // namespace eventgan

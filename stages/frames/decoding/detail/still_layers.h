@@ -36,6 +36,10 @@ class StillLayers {
   /// edge is about a pixel soft. Thread safe.
   cv::Mat frame(const AffineMap& background, const std::vector<AffineMap>& objects) const;
 
+  /// What each pixel of that frame shows: [y, x] uint16, 0 the background, else 1 + the box of the
+  /// object that hides at least half of it. Empty if there is nothing but background.
+  cv::Mat seen(const std::vector<AffineMap>& objects) const;
+
  private:
   /// An object; what is outside `area` does not belong to it.
   struct Layer {
