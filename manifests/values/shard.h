@@ -70,6 +70,7 @@ struct ShardSample {
   float scale = 1;        ///< value = stored code x scale for uint8; 1 for floats
   Annotation annotation;  ///< empty boxes and persons if the annotation could not be read
   VolumeLabels labels;    ///< as many entries as `annotation`
+  PixelFlow flow = {};    ///< of the volume's size, in numbers that float16 holds; may be empty
 };
 
 /// A sample that a shard keeps a slot for but no volume.

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <functional>
 #include <limits>
@@ -16,6 +17,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/half.h"
 #include "manifests/values/outlines.h"
 #include "manifests/values/pair_key.h"
 #include "manifests/values/placement.h"
@@ -28,6 +30,7 @@
 #include "stages/frames/sources/open_dataset.h"
 #include "stages/frames/sources/still_clips.h"
 #include "stages/labels/label_mapping.h"
+#include "stages/shards/codec/quantization.h"
 #include "stages/shards/shard_rows.h"
 #include "stages/shards/shard_tables.h"
 
@@ -40,6 +43,7 @@ bool same(double a, double b) {
   return std::abs(a - b) <= 1e-9 + 1e-14 * std::abs(b) || (std::isnan(a) && std::isnan(b));
 }
 bool same(float a, float b) { return a == b || (std::isnan(a) && std::isnan(b)); }
+bool same(Half a, Half b) { return a == b || (is_nan(a) && is_nan(b)); }
 // Of bytes, those of outlines: last bits of 64 can lie between two numbers of 32.
 bool same(const std::vector<char>& a, const std::vector<char>& b) {
   if (a == b) return true;
@@ -65,6 +69,7 @@ std::string value_text(const std::string& text) { return '"' + text + '"'; }
 std::string value_text(const std::vector<char>& bytes) {
   return count_text(std::ssize(bytes), "byte");
 }
+std::string value_text(Half number) { return fmt::format("{}", from_half(number.bits)); }
 template <class Number>
 std::string value_text(Number number) {
   return fmt::format("{}", +number);  // of 8 bits: a number, no letter
@@ -74,6 +79,8 @@ std::string value_text(Number number) {
 template <class Element>
 Element no_value() {
   if constexpr (std::is_floating_point_v<Element>) return std::numeric_limits<Element>::quiet_NaN();
+  if constexpr (std::is_same_v<Element, Half>) return kHalfNan;
+  if constexpr (std::is_same_v<Element, std::uint8_t>) return 0;
   if constexpr (std::is_integral_v<Element>) return -1;
   return Element();
 }
@@ -238,6 +245,7 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
     expected.threshold = threshold->mean;
   }
   expected.tiles = stored.tiles;
+  expected.flow = stored.flow;
   expected.annotation = std::move(annotation);
   expected.labels = std::move(*mapped);
   ShardHeader header = reader.header();

@@ -93,7 +93,9 @@ struct MappedRows {
 /// set (-1, 255). HDF5 1.10 has no such value for text, which reads as empty.
 template <class Number>
 Number missing_value() {
-  if constexpr (std::is_floating_point_v<Number>) {
+  if constexpr (std::is_same_v<Number, Half>) {
+    return kHalfNan;
+  } else if constexpr (std::is_floating_point_v<Number>) {
     return std::numeric_limits<Number>::quiet_NaN();
   } else {
     return static_cast<Number>(-1);
@@ -124,8 +126,6 @@ Hdf5Handle create_virtual_dataset(hid_t location, const std::string& path,
   }
   return create_dataset(location, path, type, space_of(dims, path), creation);
 }
-
-constexpr std::uint16_t kHalfNan = 0x7e00;
 
 /// A shard's path, from the view's group instead of the root.
 std::string below_group(const char* path) { return path + 1; }
@@ -194,7 +194,7 @@ class ViewColumns {
       create_virtual_dataset(group_, path, spec.path, element_type<Element>(), shape, rows, missing)
           .close(path);
     };
-    if constexpr (std::is_arithmetic_v<Element>) {
+    if constexpr (is_number<Element>) {
       const auto missing = missing_value<Element>();
       create(&missing);
     } else {

@@ -201,6 +201,32 @@ Rectangle shown_area(const ShardSample& sample, ImageSize volume) {
   return {shown[0], shown[1], shown[2], shown[3]};
 }
 
+namespace {
+
+/// None, or that of the first pixel whose flow is not as shard_tables.h has it.
+std::optional<std::string> flow_fault(const ShardTables& tables, const ShardSample& sample,
+                                      ImageSize size) {
+  if (tables.flow.empty() != tables.flow_valid.empty()) {
+    return "expected both flow and flow_valid or neither, got one";
+  }
+  const PixelFlow& flow = sample.flow;
+  const double sign = sample.pair.label_position == 0 ? 1 : -1;  // to the other image
+  const std::size_t pixels = flow.valid.size();
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const float dx = flow.px[i], dy = flow.px[pixels + i];
+    if (!std::isfinite(dx) || !std::isfinite(dy)) return "expected finite flow, got other numbers";
+    if (flow.valid[i] > 1) return "expected flow_valid of 0 or 1, got another number";
+    const double x = static_cast<double>(i % size.width) + sign * dx;
+    const double y = static_cast<double>(i / size.width) + sign * dy;
+    if (flow.valid[i] != 0 && !(x >= 0 && y >= 0 && x <= size.width - 1 && y <= size.height - 1)) {
+      return "expected valid flow to lead to a place in the volume, got one beyond it";
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
 std::vector<std::string> label_faults(const ShardHeader& header, const ShardTables& tables,
                                       int slot, const ShardSample& sample) {
   std::vector<std::string> faults;
@@ -228,6 +254,9 @@ std::vector<std::string> label_faults(const ShardHeader& header, const ShardTabl
   }
   if (sample.threshold && !(std::isfinite(*sample.threshold) && *sample.threshold > 0)) {
     faults.push_back("expected a finite threshold > 0, got " + std::to_string(*sample.threshold));
+  }
+  if (auto fault = flow_fault(tables, sample, header.volume.size)) {
+    faults.push_back(std::move(*fault));
   }
   for (std::size_t i = 0; i < sample.annotation.boxes.size(); ++i) {
     const int class_id = sample.annotation.boxes[i].class_id;

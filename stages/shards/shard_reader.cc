@@ -81,6 +81,7 @@ class ColumnReader {
     if (columns_ == Columns::kCounted && !is_counted(spec)) return;
     if (columns_ == Columns::kOverview && !is_overview(spec)) return;
     if (spec.optional() && H5Lexists(shard_.file, spec.path, H5P_DEFAULT) <= 0) return;
+    if (columns_ == Columns::kCounted && spec.is_image) return column.resize(1);
     Dims dims;
     try {
       column = read_dataset<Element>(shard_.file, spec.path, dims);

@@ -13,7 +13,9 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/values/half.h"
 #include "manifests/values/outlines.h"
+#include "stages/shards/codec/quantization.h"
 
 namespace eventgan {
 namespace {
@@ -84,6 +86,38 @@ void put(std::vector<double>& column, const std::optional<ImageMotion>& motion, 
       motion ? std::optional(Numbers{motion->x_px, motion->y_px, motion->angle_deg, motion->scale})
              : std::nullopt,
       row);
+}
+
+/// The nearest float16 of a number that has one.
+Half half_of(float value) {
+  constexpr std::uint16_t kSign = 0x8000;
+  const std::uint16_t size = to_half(std::abs(value));
+  return {static_cast<std::uint16_t>(value < 0 ? size | kSign : size)};
+}
+
+void append_flow(const PixelFlow& flow, ImageSize size, std::size_t row, ShardTables& to) {
+  if (flow.empty() && to.flow.empty()) return;
+  std::vector<Half> px;
+  px.reserve(flow.px.size());
+  for (const float each : flow.px) px.push_back(half_of(each));
+  put<Half>(to.flow, px, 2 * size.pixel_count(), row, kHalfNan);
+  to.flow_valid.resize(size.pixel_count() * row);
+  to.flow_valid.insert(to.flow_valid.end(), flow.valid.begin(), flow.valid.end());
+  to.flow_valid.resize(size.pixel_count() * (row + 1));
+}
+
+/// Empty if all is NaN.
+PixelFlow flow_at(const ShardTables& from, ImageSize size, std::size_t row) {
+  const std::size_t pixels = size.pixel_count();
+  if (from.flow.empty() || from.flow_valid.empty()) return {};
+  const std::span px = std::span(from.flow).subspan(2 * pixels * row, 2 * pixels);
+  if (std::ranges::all_of(px, [](Half each) { return is_nan(each); })) return {};
+  PixelFlow flow;
+  flow.px.reserve(px.size());
+  for (const Half each : px) flow.px.push_back(from_half(each.bits));
+  const std::span valid = std::span(from.flow_valid).subspan(pixels * row, pixels);
+  flow.valid.assign(valid.begin(), valid.end());
+  return flow;
 }
 
 void append_pair(const ShardHeader& header, const ShardSample& sample, PairColumns& to) {
@@ -209,6 +243,11 @@ void append_row(const ShardHeader& header, const ShardSample& sample, ShardTable
   if (sample.valid && sample.tiles.size() != tiles) {
     throw std::logic_error("expected the tiles of the header's grid (" + sample.sample_id + ")");
   }
+  const std::size_t pixels = header.volume.size.pixel_count();
+  if (!sample.flow.empty() &&
+      (sample.flow.px.size() != 2 * pixels || sample.flow.valid.size() != pixels)) {
+    throw std::logic_error("expected a flow of the volume's size (" + sample.sample_id + ")");
+  }
   const bool labelled =
       sample.valid || !sample.labels.boxes.empty() || !sample.labels.persons.empty();
   if (labelled) check_labels(header.label_schema, sample);
@@ -226,6 +265,7 @@ void append_row(const ShardHeader& header, const ShardSample& sample, ShardTable
                                sample.annotation.original.end());
   put(tables.projection, sample.labels.projection, row);
   put(tables.projection_source, sample.annotation.projection, row);
+  append_flow(sample.flow, header.volume.size, row, tables);
   tables.valid.push_back(sample.valid);
   if (labelled) {
     for (std::size_t i = 0; i < sample.labels.boxes.size(); ++i) {
@@ -426,6 +466,7 @@ ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, in
 
   sample.annotation.projection = projection_if_any(tables.projection_source, row);
   sample.labels.projection = projection_if_any(tables.projection, row);
+  sample.flow = flow_at(tables, header.volume.size, row);
 
   const auto rows_of = [row](const std::vector<std::int64_t>& offsets, auto&& each) {
     for (std::int64_t k = offsets[row]; k < offsets[row + 1]; ++k)

@@ -16,6 +16,7 @@
 #include "manifests/documents/json_text.h"
 #include "manifests/values/events.h"
 #include "manifests/values/text.h"
+#include "stages/shards/codec/quantization.h"
 #include "stages/shards/detail/shard_objects.h"
 #include "stages/shards/shard_tables.h"
 
@@ -240,7 +241,13 @@ Json by_name(const std::map<Key, std::int64_t>& counts) {
 /// `inner` dimensions of a row, nested.
 template <class Element>
 Json nested(std::span<const std::size_t> inner, std::span<const Element> elements) {
-  if (inner.empty()) return elements.front();
+  if (inner.empty()) {
+    if constexpr (std::is_same_v<Element, Half>) {
+      return from_half(elements.front().bits);
+    } else {
+      return elements.front();
+    }
+  }
   Json list = Json::array();
   const std::size_t size = inner.front() == 0 ? 0 : elements.size() / inner.front();
   for (std::size_t i = 0; i < inner.front(); ++i) {
@@ -259,6 +266,10 @@ Json row_json(const ColumnSpec& spec, const std::vector<Element>& column, std::s
     if constexpr (std::is_floating_point_v<Element>) {
       const auto is_nan = [](Element number) { return std::isnan(number); };
       if (!elements.empty() && std::ranges::all_of(elements, is_nan)) return nullptr;
+    }
+    if constexpr (std::is_same_v<Element, Half>) {
+      const auto is_none = [](Half number) { return is_nan(number); };
+      if (!elements.empty() && std::ranges::all_of(elements, is_none)) return nullptr;
     }
     return nested(std::span<const std::size_t>(spec.inner), std::span<const Element>(elements));
   }

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/values/half.h"
 #include "manifests/values/labels.h"
 #include "manifests/values/shard.h"
 
@@ -80,6 +81,8 @@ struct ShardTables {
   PairColumns pairs;
   std::vector<std::vector<char>> original;            ///< bytes
   std::vector<double> projection, projection_source;  ///< empty as long as no sample has one
+  std::vector<Half> flow;                             ///< this and the next likewise
+  std::vector<std::uint8_t> flow_valid;
   BoxColumns boxes;
   PoseColumns poses;
   std::vector<std::uint8_t> valid;
@@ -126,8 +129,16 @@ struct ColumnSpec {
   /// elements, as many as these are. None: nothing but NaN, and an empty text.
   std::vector<double> unknown = {};
 
+  /// A row is an image: it is a chunk of its own, and an array where other values are JSON.
+  bool is_image = false;
+
   ColumnSpec with_unknown(std::vector<double> row) && {
     unknown = std::move(row);
+    return std::move(*this);
+  }
+
+  ColumnSpec as_image() && {
+    is_image = true;
     return std::move(*this);
   }
 
@@ -153,6 +164,8 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   const std::size_t joints = header.label_schema.joint_names.size();
   const auto rows = static_cast<std::size_t>(tile_grid(header).height);
   const auto columns = static_cast<std::size_t>(tile_grid(header).width);
+  const auto height = static_cast<std::size_t>(header.volume.size.height);
+  const auto width = static_cast<std::size_t>(header.volume.size.width);
   using enum Rows;
   using enum Numbers;
   using enum Mapped;
@@ -307,6 +320,27 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
                    {},
                    "projection"},
         tables.projection_source);
+  visit(
+      ColumnSpec{"/labels/flow",
+                 "x, y: how what a pixel shows of the labelled image moves from the previous image "
+                 "to the next, px of the volume, by 1/128 ([Geometry](#geometry)); 0 beyond the "
+                 "image; NaN: quarantined",
+                 kSamples,
+                 {2, height, width},
+                 kAny,
+                 {},
+                 "flow"}
+          .as_image(),
+      tables.flow);
+  visit(ColumnSpec{"/labels/flow_valid",
+                   "1: seen in both images; 0: covered or beyond the border in the other one",
+                   kSamples,
+                   {height, width},
+                   kAny,
+                   {},
+                   "flow"}
+            .as_image(),
+        tables.flow_valid);
 
   auto& b = tables.boxes;
   visit(ColumnSpec{"/labels/boxes/offsets", "First row of each sample, then R", kOffsets},

@@ -68,7 +68,8 @@ void ShardWriter::State::write_columns() {
     if (spec.optional() && column.empty()) return;
     Dims dims{rows(spec.rows)};
     dims.insert(dims.end(), spec.inner.begin(), spec.inner.end());
-    write_dataset(file.id(), spec.path, column, dims, header.deflate_level);
+    write_dataset(file.id(), spec.path, column, dims, header.deflate_level,
+                  spec.is_image ? 1 : kRowsPerChunk);
   });
 }
 

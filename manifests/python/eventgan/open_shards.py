@@ -17,8 +17,8 @@ import h5py
 import numpy as np
 
 FORMAT, FORMAT_VERSION = "eventgan-shard", "1.0"
-FEATURES = frozenset(("tiles", "times", "origin", "motion", "threshold", "projection", "difficulty", "outlines",
-                      "object_motion", "person_boxes", "joints3d", "camera", "joint_aliases"))
+FEATURES = frozenset(("tiles", "times", "origin", "motion", "threshold", "projection", "flow", "difficulty",
+                      "outlines", "object_motion", "person_boxes", "joints3d", "camera", "joint_aliases"))
 
 PathLike = Union[str, os.PathLike]
 Sample = dict[str, Any]

@@ -11,8 +11,6 @@
 namespace eventgan {
 namespace {
 
-constexpr hsize_t kRowsPerChunk = 4096;
-
 std::mutex& hdf5_mutex() {
   static std::mutex mutex;
   return mutex;
@@ -35,6 +33,8 @@ std::string type_name() {
     return "str";
   } else if constexpr (std::is_same_v<Element, std::vector<char>>) {
     return "bytes";
+  } else if constexpr (std::is_same_v<Element, Half>) {
+    return "float16";
   } else {
     const std::string bits = std::to_string(8 * sizeof(Element));
     if (std::is_floating_point_v<Element>) return "float" + bits;
@@ -262,7 +262,7 @@ std::vector<Element> read_elements(hid_t dataset, const std::string& path, hid_t
   std::vector<Element> values;
   if (stored.empty()) return values;
   checked(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, stored.data()), "read", path);
-  if constexpr (std::is_arithmetic_v<Element>) return stored;
+  if constexpr (is_number<Element>) return stored;
   const Reclaim<Stored> reclaim{type, space, stored};
   values.reserve(stored.size());
   for (const Stored& value : stored) values.push_back(InMemory<Element>::to(value));
@@ -271,15 +271,15 @@ std::vector<Element> read_elements(hid_t dataset, const std::string& path, hid_t
 
 template <class Element>
 void write_dataset(hid_t file, const std::string& path, const std::vector<Element>& values,
-                   const Dims& dims, int deflate_level) {
+                   const Dims& dims, int deflate_level, hsize_t rows_per_chunk) {
   if (element_count(dims) != values.size()) throw std::logic_error("values do not fill " + path);
   const Hdf5Handle creation = creation_properties(H5P_DATASET_CREATE);
   if (!values.empty()) {
     Dims chunk = dims;
-    chunk[0] = std::min(chunk[0], kRowsPerChunk);
+    chunk[0] = std::min(chunk[0], rows_per_chunk);
     set_chunks(creation, chunk, path);
     // Of text the filters would only see HDF5's references to it.
-    if (std::is_arithmetic_v<Element>) set_filters(creation, deflate_level, path);
+    if (is_number<Element>) set_filters(creation, deflate_level, path);
   }
   Hdf5Handle dataset =
       create_dataset(file, path, element_type<Element>(), space_of(dims, path), creation);
@@ -303,7 +303,7 @@ std::vector<Element> read_dataset(hid_t file, const std::string& path, Dims& dim
   template void write_elements(hid_t, const std::string&, const std::vector<Element>&);            \
   template std::vector<Element> read_elements<Element>(hid_t, const std::string&, hid_t);          \
   template void write_dataset(hid_t, const std::string&, const std::vector<Element>&, const Dims&, \
-                              int);                                                                \
+                              int, hsize_t);                                                       \
   template std::vector<Element> read_dataset<Element>(hid_t, const std::string&, Dims&)
 
 EVENTGAN_INSTANTIATE(std::int8_t);
@@ -311,6 +311,7 @@ EVENTGAN_INSTANTIATE(std::uint8_t);
 EVENTGAN_INSTANTIATE(std::int32_t);
 EVENTGAN_INSTANTIATE(std::uint32_t);
 EVENTGAN_INSTANTIATE(std::int64_t);
+EVENTGAN_INSTANTIATE(Half);
 EVENTGAN_INSTANTIATE(float);
 EVENTGAN_INSTANTIATE(double);
 EVENTGAN_INSTANTIATE(std::string);

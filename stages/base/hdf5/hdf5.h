@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/values/half.h"
+
 namespace eventgan {
 
 // HDF5 with owned identifiers, and errors as exceptions. All of this program's HDF5 goes through
@@ -129,11 +131,16 @@ Hdf5Handle bytes_type();
 Hdf5Handle number_type(std::size_t size, bool is_float, bool is_signed);
 
 template <class Element>
+inline constexpr bool is_number = std::is_arithmetic_v<Element> || std::is_same_v<Element, Half>;
+
+template <class Element>
 Hdf5Handle element_type() {
   if constexpr (std::is_same_v<Element, std::string>) {
     return text_type();
   } else if constexpr (std::is_same_v<Element, std::vector<char>>) {
     return bytes_type();
+  } else if constexpr (std::is_same_v<Element, Half>) {
+    return number_type(sizeof(Half), true, true);
   } else {
     return number_type(sizeof(Element), std::is_floating_point_v<Element>,
                        std::is_signed_v<Element>);
@@ -175,11 +182,13 @@ void write_elements(hid_t dataset, const std::string& path, const std::vector<El
 template <class Element>
 std::vector<Element> read_elements(hid_t dataset, const std::string& path, hid_t type);
 
-/// Creates and writes a whole dataset: C order, chunks of up to 4096 rows, numbers with filters. A
-/// dataset without elements has neither.
+inline constexpr hsize_t kRowsPerChunk = 4096;
+
+/// Creates and writes a whole dataset: C order, chunks of up to so many rows, numbers with filters.
+/// A dataset without elements has neither.
 template <class Element>
 void write_dataset(hid_t file, const std::string& path, const std::vector<Element>& values,
-                   const Dims& dims, int deflate_level);
+                   const Dims& dims, int deflate_level, hsize_t rows_per_chunk = kRowsPerChunk);
 
 /// Reads a whole dataset; `dims` gets its shape. Throws also if its type is another one.
 template <class Element>

@@ -22,7 +22,8 @@ struct ShardFile {
 /// Which columns to read.
 enum class Columns {
   kAll,
-  kCounted,  ///< those that a commit record's numbers are counts of, and the ids of samples
+  kCounted,  ///< those that a commit record's numbers are counts of, and the ids of samples; of
+             ///< images one element, for that they are there
   kOverview  ///< see read_overview
 };
 

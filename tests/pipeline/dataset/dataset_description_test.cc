@@ -118,7 +118,7 @@ TEST(DatasetDescription, SaysWhatTheDatasetIs) {
   EXPECT_EQ(text["format"], "eventgan-dataset");
   EXPECT_EQ(text["version"], "1.0");
   EXPECT_THAT(text["features"],
-              ElementsAre("camera", "difficulty", "joint_aliases", "joints3d", "motion",
+              ElementsAre("camera", "difficulty", "flow", "joint_aliases", "joints3d", "motion",
                           "object_motion", "origin", "outlines", "person_boxes", "projection",
                           "threshold", "tiles", "times"));
   EXPECT_EQ(text["name"], "demo");

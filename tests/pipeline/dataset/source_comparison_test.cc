@@ -123,6 +123,7 @@ TEST_F(RowDifferences, AreOfColumnsThatTheShardLacksToo) {
 
 void change(std::string& text) { text += "x"; }
 void change(std::vector<char>& bytes) { bytes.push_back('x'); }
+void change(Half& number) { number = {}; }
 template <class Number>
 void change(Number& number) {
   number = number == number ? static_cast<Number>(number + 1) : 1;  // NaN: there was none

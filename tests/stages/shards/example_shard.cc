@@ -192,6 +192,16 @@ ExampleShard example_shard(StoredType type, int deflate_level) {
   person.pair.previous = person.pair.next;
   person.pair.previous.time_s = kNan;
   person.pair.motion = ImageMotion{-1.5, 0.25, 0.75, 1.0078125};
+  // Seen in both images from the column on, and up to the row, that the flow leads back into them.
+  const ImageSize pixels = shard.header.volume.size;
+  for (const float px : {0.5f, -0.25f}) {
+    person.flow.px.insert(person.flow.px.end(), pixels.pixel_count(), px);
+  }
+  for (int y = 0; y < pixels.height; ++y) {
+    for (int x = 0; x < pixels.width; ++x) {
+      person.flow.valid.push_back(x - 0.5 >= 0 && y + 0.25 <= pixels.height - 1);
+    }
+  }
   add_person(person, plain_person());
   add(shard, person, volume(4, size));
   return shard;

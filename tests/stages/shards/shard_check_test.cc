@@ -146,6 +146,27 @@ TEST_F(ShardCheck, AThresholdIsANumberAboveZero) {
   }
 }
 
+TEST_F(ShardCheck, FlowLeadsFromPixelToPixel) {
+  const testing::ExampleShard sound = testing::example_shard();
+  const auto found = [&](const std::function<void(PixelFlow&)>& change) {
+    testing::ExampleShard example = sound;
+    change(example.samples[4].flow);
+    write(example);
+    return faults();
+  };
+  // The first row's flow leads half a column back, so that its first pixel has none to lead to.
+  EXPECT_THAT(found([](PixelFlow& flow) { flow.valid[0] = 1; }),
+              texts_with({{"expected valid flow to lead to a place in the volume", "000004"}}));
+  EXPECT_THAT(found([](PixelFlow& flow) { flow.valid[9] = 2; }),
+              texts_with({"expected flow_valid of 0 or 1"}));
+  EXPECT_THAT(found([](PixelFlow& flow) { flow.px[0] = NAN; }),
+              texts_with({"expected finite flow"}));
+  EXPECT_THAT(found([](PixelFlow& flow) { flow.px.back() = 2.5f; }), IsEmpty()) << "not valid";
+  write(sound);
+  change([](hid_t file) { H5Ldelete(file, "/labels/flow_valid", H5P_DEFAULT); });
+  EXPECT_THAT(faults(), Contains(HasSubstr("expected both flow and flow_valid or neither")));
+}
+
 TEST_F(ShardCheck, NormalizedVolumesAreSound) {
   testing::ExampleShard example = testing::example_shard(StoredType::kFloat32);
   example.header.normalization = Normalization::kEta98;
@@ -265,9 +286,9 @@ void replace(hid_t file, const char* name, const Value& value) {
 
 using Names = std::vector<std::string>;
 
-const Names kFeatures{"tiles",      "times",      "origin",       "motion",        "threshold",
-                      "projection", "difficulty", "outlines",     "object_motion", "person_boxes",
-                      "joints3d",   "camera",     "joint_aliases"};
+const Names kFeatures{"tiles",        "times",    "origin",     "motion",       "threshold",
+                      "projection",   "flow",     "difficulty", "outlines",     "object_motion",
+                      "person_boxes", "joints3d", "camera",     "joint_aliases"};
 
 TEST_F(ShardCheck, FeaturesAreThoseOfTheColumns) {
   write(testing::example_shard());

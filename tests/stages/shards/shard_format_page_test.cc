@@ -20,6 +20,8 @@ std::string dtype_of() {
     return "str";
   } else if constexpr (std::is_same_v<Element, std::vector<char>>) {
     return "bytes";
+  } else if constexpr (std::is_same_v<Element, Half>) {
+    return "float16";
   } else {
     const std::string kind = std::is_floating_point_v<Element> ? "float"
                              : std::is_unsigned_v<Element>     ? "uint"

@@ -103,6 +103,17 @@ class ShardInH5py(unittest.TestCase):
         np.testing.assert_array_equal(file["pairs/next_time_s"][:], [1.2, np.nan, 1.2, 1.2, 1.2])
         self.assertTrue(np.isnan(file["labels/projection"][1:]).all())
 
+    def test_flow_is_an_array_of_a_chunk_for_each_sample(self):
+        labels = self.open("float16-1")["labels"]
+        flow, valid = labels["flow"], labels["flow_valid"]
+        self.assertEqual((flow.dtype, flow.shape, flow.chunks), (np.float16, (5, 2, 6, 8), (1, 2, 6, 8)))
+        self.assertEqual((valid.dtype, valid.shape, valid.chunks), (np.uint8, (5, 6, 8), (1, 6, 8)))
+        self.assertTrue(np.isnan(flow[:4]).all() and not valid[:4].any())
+        np.testing.assert_array_equal(flow[4], np.broadcast_to([[[0.5]], [[-0.25]]], (2, 6, 8)))
+        # It leads half a column back, a quarter of a row on: from the first column and the last row out of the image.
+        np.testing.assert_array_equal(valid[4], np.pad(np.ones((5, 7)), ((0, 1), (1, 0))))
+        self.assertIn("label_position", flow.attrs["meaning"])
+
     def test_a_source_without_labels_has_empty_datasets(self):
         labels = self.open("unlabelled")["labels"]
         self.assertEqual(labels["boxes/xyxy"].shape, (0, 4))

@@ -96,6 +96,7 @@ void expect_same(const ShardSample& got, const ShardSample& expected) {
   EXPECT_EQ(got.tiles, expected.valid ? expected.tiles : std::vector<std::uint8_t>(4));
   EXPECT_EQ(got.annotation, expected.annotation);
   expect_same(got.labels, expected.labels);
+  EXPECT_EQ(got.flow, expected.flow);
 }
 
 TEST(ShardRoundTrip, EveryFieldComesBack) {

@@ -44,10 +44,11 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
       ElementsAre("/events/tiles", "/events/statistics/generated_fraction", "/pairs/prev_time_s",
                   "/pairs/next_time_s", "/pairs/subject", "/pairs/action", "/pairs/camera",
                   "/pairs/drive", "/pairs/motion", "/pairs/threshold", "/labels/projection",
-                  "/labels/projection_source", "/labels/boxes/difficulty", "/labels/boxes/outline",
-                  "/labels/boxes/motion", "/labels/poses/box", "/labels/poses/box_source",
-                  "/labels/poses/joints3d_mm", "/labels/poses/camera",
-                  "/labels/poses/camera_source", "/labels/poses/camera_distortion"));
+                  "/labels/projection_source", "/labels/flow", "/labels/flow_valid",
+                  "/labels/boxes/difficulty", "/labels/boxes/outline", "/labels/boxes/motion",
+                  "/labels/poses/box", "/labels/poses/box_source", "/labels/poses/joints3d_mm",
+                  "/labels/poses/camera", "/labels/poses/camera_source",
+                  "/labels/poses/camera_distortion"));
 }
 
 TEST(ShardOverview, HasItsColumnsAndNoOthers) {
@@ -186,6 +187,8 @@ TEST_F(ShardSummary, JsonHoldsTheSame) {
             nlohmann::json::parse("[[null, null, null], [4, 5, 3001], [7, 8, 3002]]"));
   EXPECT_TRUE(first["motion"].is_null());
   EXPECT_TRUE(first["threshold"].is_null());
+  EXPECT_TRUE(first["flow"].is_null());
+  EXPECT_EQ(nlohmann::json::parse(sample_json(reader_, 4))["flow"][1][5][7], -0.25);
   EXPECT_EQ(nlohmann::json::parse(sample_json(reader_, 4))["motion"],
             (nlohmann::json{-1.5, 0.25, 0.75, 1.0078125}));
   EXPECT_TRUE(nlohmann::json::parse(sample_json(reader_, 1))["gap_s"].is_null());
