@@ -242,6 +242,16 @@ void list_source(Fields& fields, SourceSpec& spec) {
   of_frames.at("pairs", spec.pairs, objects(list_pairs),
                "which pairs of frames become samples. Of other datasets these are windows of "
                "events.");
+  const auto flow = of_frames.find(
+      "flow", spec.flow, booleans(),
+      "of stills, writes how each pixel moves from the one image of its pair to the other, and "
+      "where both show it: /labels/flow (manifests/guides/shard_format.md).");
+  if (flow && !spec.pairs.stills) {
+    flow->fault(R"(no such key for pairs of sequences (only where from is "stills"))");
+  }
+  fields.rule(R"({"if": {"required": ["flow"]},
+                  "then": {"properties": {"pairs": {
+                      "required": ["from"], "properties": {"from": {"const": "stills"}}}}}})");
 }
 
 // Below 16 pixels a side the network's four halvings leave less than one pixel of the image at

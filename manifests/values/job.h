@@ -156,6 +156,7 @@ struct SourceSpec {
   std::vector<std::string> classes = {};     ///< takes only boxes of these; empty: of all
   SelectionSpec selection;
   PairSpec pairs;
+  bool flow = false;           ///< with pairs of stills: samples have their ShardSample::flow
   RecordingOptions recording;  ///< recording
   WindowSpec window;           ///< of events: in place of `pairs`
 };

@@ -58,6 +58,7 @@ void SampleMessage::fail(std::string reason) {
   const std::string id = " (" + sample.sample_id + ")";
   if (!reason.ends_with(id)) reason += id;
   sample.fault = std::move(reason);
+  sample.flow = {};
   prepared = {};
   free_memory(events);
   free_memory(volume);
@@ -125,13 +126,14 @@ void SampleStages::read_frames(SampleMessage& message, const std::vector<Box>& b
     return pair;
   };
   Outcome<PreparedPair> prepared =
-      reader_.read(message.sample.pair, orientation, source.every, boxes, settle);
+      reader_.read(message.sample.pair, orientation, source.every, boxes, settle, source.flow);
   if (is_fault(prepared)) {
     message.fail(prepared.fault().reason);
   } else {
     message.prepared = std::move(*prepared);
     message.outlines = message.prepared.outlines;
     if (message.prepared.settled) message.sample.pair = std::move(*message.prepared.settled);
+    message.sample.flow = std::move(message.prepared.flow);
     take_placement(message);
   }
 }

@@ -83,6 +83,43 @@ class Stills(program.InFolder):
                         seen += 1
             self.assertEqual(seen, 12)
 
+    def test_flow_is_that_of_the_motion(self):
+        self.photos("voc100", 6)
+        source = {"dataset": "frames", "root": "photos"}
+        for side, position in (("before", 1), ("after", 0)):
+            job = manifest([{**source, "pairs": stills(side)}], generator={"kind": "difference"},
+                           image={"width": 160, "height": 120, "fit": "letterbox", "preset": "mpii"})
+            without = []
+            for path in self.convert(job):
+                with h5py.File(path) as shard:
+                    self.assertNotIn("flow", shard["labels"])
+                    without.append(shard["events/volume"][:])
+            job["sources"][0]["flow"] = True
+            for path, volumes in zip(self.convert(job), without):
+                with h5py.File(path) as shard:
+                    self.assertIn("flow", shard.attrs["features"])
+                    np.testing.assert_array_equal(shard["events/volume"][:], volumes)
+                    pairs = {name: shard["pairs"][name][:] for name in shard["pairs"]}
+                    flow, valid = shard["labels/flow"][:].astype(float), shard["labels/flow_valid"][:]
+                    for slot in range(len(flow)):
+                        self.assert_flow(pairs, slot, position, flow[slot], valid[slot])
+
+    def assert_flow(self, pairs, slot, position, flow, valid):
+        size = pairs["source_size"][slot][::-1]
+        into = np.vstack([pairs["source_to_volume"][slot].reshape(2, 3), [0, 0, 1]])
+        step = into @ np.linalg.inv(moved_to_labelled(size, pairs["motion"][slot], position)) @ np.linalg.inv(into)
+        y, x = np.mgrid[: flow.shape[1], : flow.shape[2]]
+        here = np.stack([x, y, np.ones_like(x)])
+        there = np.tensordot(step, here, 1)
+        expected = (there - here)[:2] * (1 if position == 0 else -1)
+        moves = (flow != 0).any(0)
+        shown = moves.any(1)[:, None] & moves.any(0)  # none in a letterbox's borders
+        self.assertTrue((valid <= shown).all() and valid.mean() > 0.5)
+        np.testing.assert_allclose(flow[:, shown], expected[:, shown], atol=1 / 256 + 1e-9)
+        columns, rows = there[0][valid == 1], there[1][valid == 1]
+        inside = (columns > -0.01) & (columns < flow.shape[2] - 0.99) & (rows > -0.01) & (rows < flow.shape[1] - 0.99)
+        self.assertTrue(inside.all())
+
     def assert_still(self, pairs, slot, position, volume):
         self.assertEqual(pairs["prev_path"][slot], pairs["next_path"][slot])
         self.assertEqual(pairs["label_position"][slot], position)

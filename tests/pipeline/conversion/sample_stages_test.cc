@@ -378,6 +378,28 @@ TEST_F(RatesTest, OfTilesGiveEventsThereAlone) {
   }
 }
 
+TEST_F(SampleStagesTest, AStillHasItsFlowIfTheSourceAsksForIt) {
+  testing::write_flat_image(folder_ / "clip" / "0001.png", {24, 40}, 51);
+  shard_.volume_size = {24, 40};
+  manifest_.sources[0].pairs.stills.emplace();
+  FramePair& pair = shard_.samples[0].pair;
+  pair.previous = pair.next;
+  pair.motion = ImageMotion{.x_px = 2};
+  EXPECT_TRUE(run().sample.flow.empty());
+  manifest_.sources[0].flow = true;
+  const SampleMessage message = run();
+  ASSERT_FALSE(message.failed()) << message.sample.fault;
+  // One row and two columns a side are lost, so that 36 columns become 40.
+  const auto expected = static_cast<float>(std::round(2 * 40.0 / 36 * 128) / 128);
+  ASSERT_EQ(message.sample.flow.px.size(), 2u * 24 * 40);
+  EXPECT_EQ(message.sample.flow.px.front(), expected);
+  EXPECT_EQ(message.sample.flow.px.back(), 0);
+  EXPECT_EQ(message.sample.flow.valid.size(), 24u * 40);
+  shard_.volume_size = {24, 41};
+  const SampleMessage failed = run();
+  EXPECT_TRUE(failed.failed() && failed.sample.flow.empty());
+}
+
 class NoiseTest : public SampleStagesTest {
  protected:
   /// Whether pixels have an event in any channel.
