@@ -16,6 +16,7 @@
 
 #include "manifests/documents/json_text.h"
 #include "manifests/files/atomic_file.h"
+#include "manifests/values/half.h"
 #include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
 #include "pipeline/exports/detail/exporter.h"
@@ -56,7 +57,9 @@ Json json_of(const ColumnSpec& column, std::span<const std::size_t> sides,
 template <class Element>
 Json row_json(const ColumnSpec& column, const std::vector<Element>& values, std::size_t row) {
   if (values.empty()) return {};
-  if constexpr (std::is_same_v<Element, std::string>) {
+  if constexpr (std::is_same_v<Element, Half>) {  // of images, which are no JSON
+    return {};
+  } else if constexpr (std::is_same_v<Element, std::string>) {
     return values[row].empty() ? Json() : Json(values[row]);
   } else if constexpr (std::is_same_v<Element, std::vector<char>>) {  // an outline
     const auto outline = read_outline({values[row].data(), values[row].size()});
@@ -80,7 +83,7 @@ std::string labels_json(const OutgoingSample& sample) {
   visit_columns(tables, header, [&](const ColumnSpec& column, const auto& values) {
     const std::string_view path = column.path;
     if (!path.starts_with("/pairs/") && !path.starts_with("/labels/")) return;
-    if (path == "/labels/original" || column.rows == Rows::kOffsets) return;
+    if (path == "/labels/original" || column.rows == Rows::kOffsets || column.is_image) return;
     const std::string name(column.name());
     const auto each_of = [&](Json& list, const std::vector<std::int64_t>& offsets) {
       const auto first = static_cast<std::size_t>(offsets[slot]);
@@ -119,8 +122,8 @@ const char* dtype_of(StoredType type) {
   return "|u1";
 }
 
-/// `volume` as the shard stores it, and its `scale`.
-std::string volume_npz(const OutgoingSample& sample) {
+/// `volume` as the shard stores it, its `scale`, and of a sample with flow `flow` and `flow_valid`.
+std::string arrays_npz(const OutgoingSample& sample) {
   const ShardHeader& header = sample.reader.header();
   const VolumeShape& shape = header.volume;
   const std::size_t size_bytes = shape.value_count() * stored_size(header.dtype);
@@ -133,8 +136,19 @@ std::string volume_npz(const OutgoingSample& sample) {
   const std::vector<std::size_t> sides{static_cast<std::size_t>(shape.channels()),
                                        static_cast<std::size_t>(shape.size.height),
                                        static_cast<std::size_t>(shape.size.width)};
-  return npz_file({{"volume", npy_file(dtype_of(header.dtype), sides, *stored)},
-                   {"scale", npy_file("<f4", {}, std::vector<float>{sample.labels.scale})}});
+  std::vector<std::pair<std::string, std::string>> arrays = {
+      {"volume", npy_file(dtype_of(header.dtype), sides, *stored)},
+      {"scale", npy_file("<f4", {}, std::vector<float>{sample.labels.scale})}};
+  if (!sample.labels.flow.empty()) {
+    const std::vector<Half>& halves = sample.reader.tables().flow;
+    const std::size_t pixels = shape.size.pixel_count();
+    const std::span row =
+        std::span(halves).subspan(2 * pixels * static_cast<std::size_t>(sample.slot), 2 * pixels);
+    arrays.emplace_back("flow", npy_file("<f2", {2, sides[1], sides[2]}, std::as_bytes(row)));
+    arrays.emplace_back("flow_valid",
+                        npy_file("|u1", {sides[1], sides[2]}, sample.labels.flow.valid));
+  }
+  return npz_file(arrays);
 }
 
 std::string tar_name(const ExportShard& shard) {
@@ -281,7 +295,7 @@ class WebdatasetExporter : public Exporter {
       for_each_index(std::min(kAtOnce, count - first), work.threads, [&](std::size_t i) {
         work.with_sample(shard, reader, static_cast<int>(first + i),
                          [&](const OutgoingSample& sample) {
-                           members[i] = tar_member(sample.name + ".npz", volume_npz(sample)) +
+                           members[i] = tar_member(sample.name + ".npz", arrays_npz(sample)) +
                                         tar_member(sample.name + ".json", labels_json(sample));
                          });
       });

@@ -162,7 +162,6 @@ void describe_columns(hid_t location, const ShardHeader& header,
   }
   if (checked(H5Lexists(location, "labels/flow", H5P_DEFAULT), "look for", "flow") > 0) {
     const Hdf5Handle flow = open_object(location, "labels/flow");
-    write_attribute(flow, "axes", std::string("sample, x and y, y, x"));
     write_attribute(flow, "meaning",
                     std::string("motion from the pair's previous image to its next one, in pixels "
                                 "of the volume, at the pixels of the labelled image: of the next "

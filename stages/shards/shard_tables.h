@@ -321,19 +321,19 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
                    "projection"},
         tables.projection_source);
   visit(
-      ColumnSpec{"/labels/flow",
-                 "x, y: how what a pixel shows of the labelled image moves from the previous image "
-                 "to the next, px of the volume, by 1/128 ([Geometry](#geometry)); 0 beyond the "
-                 "image; NaN: quarantined",
-                 kSamples,
-                 {2, height, width},
-                 kAny,
-                 {},
-                 "flow"}
+      ColumnSpec{
+          "/labels/flow",
+          "x, y: motion, previous to next, of what the labelled image shows there; 0 beyond it; "
+          "NaN: none",
+          kSamples,
+          {2, height, width},
+          kAny,
+          {},
+          "flow"}
           .as_image(),
       tables.flow);
   visit(ColumnSpec{"/labels/flow_valid",
-                   "1: seen in both images; 0: covered or beyond the border in the other one",
+                   "1: seen in both images; else 0",
                    kSamples,
                    {height, width},
                    kAny,

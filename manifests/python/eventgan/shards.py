@@ -23,7 +23,7 @@ PLAN = "plan.json"
 DESCRIPTION, DESCRIPTION_FORMAT, DESCRIPTION_VERSION = "dataset.json", "eventgan-dataset", "1.0"
 VIEW = "dataset.h5"
 SHARD_NAME = re.compile(r"\w[\w.-]*-\w[\w.-]*-\d{5,}-of-\d{5,}\.h5", re.ASCII)  # no path to another folder
-FIELDS = ("volume", "pair", "statistics", "boxes", "persons", "original")
+FIELDS = ("volume", "pair", "statistics", "boxes", "persons", "flow", "original")
 
 
 class InvalidSample(ValueError):
@@ -179,6 +179,8 @@ class Shards(Sequence):
             boxes : arrays with a row for each box: xyxy [n, 4] in volume pixels, class_id, ignore...; `outline`, bytes
                 each, where a box of the shard has one (see `masks`)
             persons : arrays with a row for each person: joints [n, J, 2] in volume pixels, visible, center...
+            flow, flow_valid : float16 [2, H, W], x, then y, from the previous image to the next, at the pixels of the
+                labelled one; uint8 [H, W]. Only where the shard has them, of stills with "flow"
             original : bytes, the annotation as the dataset holds it
             valid, shard, slot : always there: bool; where it comes from
 
@@ -214,6 +216,8 @@ class Shards(Sequence):
             sample["boxes"] = file.rows("labels/boxes", slot)
         if "persons" in fields:
             sample["persons"] = file.rows("labels/poses", slot)
+        if "flow" in fields and file.has("labels/flow"):
+            sample.update((name, file.file["labels/" + name][slot]) for name in ("flow", "flow_valid"))
         if "original" in fields:
             sample["original"] = file.column("labels/original")[slot].tobytes()
         for change in changes:
