@@ -71,6 +71,7 @@ struct RecordedSample {
   std::vector<float> volume;  ///< [2 bins, H, W]
   /// Previous and next, [y, x] or [y, x, channel] uint8 (blue, green, red); empty: there is none.
   std::array<std::vector<std::uint8_t>, 2> frames;
+  PixelFlow flow;  ///< empty: there is none
 };
 
 /// An exporter of recordings. Samples of a sequence whose frames' times are known share its clock;

@@ -94,4 +94,8 @@ std::string encode_jpeg(const ColourView& image, int quality);
 /// else 16 bits grey. Throws as encode_png. Thread safe.
 std::string encode_index_png(ImageSize size, std::span<const std::uint16_t> indices);
 
+/// The bytes of a PNG of 16 bits a channel, red, green, blue: [y, x, 3]. Throws as encode_png.
+/// Thread safe.
+std::string encode_wide_png(ImageSize size, std::span<const std::uint16_t> rgb);
+
 }  // namespace eventgan

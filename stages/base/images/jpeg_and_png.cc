@@ -517,17 +517,32 @@ std::string encode_png(const ColourView& image, bool is_drawn) {
       [&](std::size_t y) { return image.bgr + y * row_bytes; });
 }
 
+namespace {
+
+/// Rows of so many numbers of 16 bits each.
+std::string write_wide_png(ImageSize size, int kind, const std::uint16_t* numbers,
+                           std::size_t row_numbers) {
+  return write_png(
+      size, 16, kind,
+      [](png_structp png, png_infop info) {
+        png_write_info(png, info);
+        if constexpr (std::endian::native == std::endian::little) png_set_swap(png);
+      },
+      [&](std::size_t y) { return numbers + y * row_numbers; });
+}
+
+}  // namespace
+
+std::string encode_wide_png(ImageSize size, std::span<const std::uint16_t> rgb) {
+  return write_wide_png(size, PNG_COLOR_TYPE_RGB, rgb.data(),
+                        3 * static_cast<std::size_t>(std::max(size.width, 0)));
+}
+
 std::string encode_index_png(ImageSize size, std::span<const std::uint16_t> indices) {
   constexpr std::uint16_t kMostWithPalette = 254;  // 255 is nothing, by custom
   const auto width = static_cast<std::size_t>(std::max(size.width, 0));
   if (std::ranges::any_of(indices, [](std::uint16_t index) { return index > kMostWithPalette; })) {
-    return write_png(
-        size, 16, PNG_COLOR_TYPE_GRAY,
-        [](png_structp png, png_infop info) {
-          png_write_info(png, info);
-          if constexpr (std::endian::native == std::endian::little) png_set_swap(png);
-        },
-        [&](std::size_t y) { return indices.data() + y * width; });
+    return write_wide_png(size, PNG_COLOR_TYPE_GRAY, indices.data(), width);
   }
   const std::vector<std::uint8_t> narrow(indices.begin(), indices.end());
   return write_png(

@@ -175,6 +175,14 @@ def test_labels(folder):
     assert shards[1:].class_counts() == {"Car": 1, "DontCare": 0}
 
 
+def test_flow(folder):
+    still = next(sample for sample in Shards(folder, fields=["flow", "pair"]) if sample["pair"]["sample_id"] == "000004")
+    assert still["flow"].dtype == np.float16 and still["flow"].shape == (2, 6, 8)
+    assert (still["flow"][0] == 0.5).all() and (still["flow"][1] == -0.25).all()
+    assert still["flow_valid"].dtype == np.uint8 and still["flow_valid"].sum() == 7 * 5  # within the volume of 8 x 6
+    assert "flow" not in Shards(folder, fields=["pair"])[0]
+
+
 def table(shards):
     """What a notebook shows, by row."""
     rows = xml.etree.ElementTree.fromstring(shards._repr_html_())

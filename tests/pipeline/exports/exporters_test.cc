@@ -305,6 +305,29 @@ TEST_F(Exporters, WebdatasetHasEveryColumnWithNullForWhatIsUnknown) {
   }
 }
 
+TEST_F(Exporters, FlowIsAnArrayInWebdatasetAndImagesInDsec) {
+  const std::filesystem::path tar = exported("webdataset") / "demo-val-00000-of-00001.tar";
+  testing::write_file(folder_ / "a.npz", tar_content(tar, "000004.npz"));
+  const ZipArchive arrays(folder_ / "a.npz");
+  const PixelFlow flow = testing::example_shard().samples[4].flow;
+  std::vector<std::uint16_t> halves;
+  for (const float px : flow.px) {
+    halves.push_back(static_cast<std::uint16_t>(to_half(std::abs(px)) | (px < 0 ? 0x8000 : 0)));
+  }
+  const auto text = [](const auto& bytes) {
+    return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  };
+  EXPECT_EQ(text(arrays.read("flow.npy")), npy_file("<f2", {2, 6, 8}, halves));
+  EXPECT_EQ(text(arrays.read("flow_valid.npy")), npy_file("|u1", {6, 8}, flow.valid));
+  EXPECT_FALSE(json::parse(tar_content(tar, "000004.json")).contains("flow"));
+  // Labelled is the next image: DSEC's backward flow, from there to the previous one.
+  const std::filesystem::path recording = exported("dsec") / "dsec/val/000004";
+  EXPECT_EQ(testing::read_file(recording / "flow/backward_timestamps.txt"),
+            "# from_timestamp_us, to_timestamp_us\n1000000, 0\n");
+  EXPECT_TRUE(std::filesystem::exists(recording / "flow/backward/000000.png"));
+  EXPECT_FALSE(std::filesystem::exists(recording / "flow/forward_timestamps.txt"));
+}
+
 TEST_F(Exporters, EventsHaveTheCountsOfTheVolume) {
   const std::filesystem::path out = exported("events") / "events/val";
   for (const std::size_t slot : {0, 1, 3, 4}) {

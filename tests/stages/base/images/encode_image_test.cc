@@ -59,6 +59,20 @@ TEST(EncodeImage, NumbersAreColoursUnlessTheyAreTooMany) {
   EXPECT_THROWS(encode_index_png({0, 0}, {}), std::runtime_error, "cannot encode an image");
 }
 
+TEST(EncodeImage, WidePngHasEveryBit) {
+  std::vector<std::uint16_t> rgb;
+  for (int i = 0; i < 3 * 4 * 5; ++i) rgb.push_back(static_cast<std::uint16_t>(65535 - 1091 * i));
+  const std::string png = encode_wide_png({4, 5}, rgb);
+  const cv::Mat read =
+      cv::imdecode(std::vector<char>(png.begin(), png.end()), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(read.type(), CV_16UC3);
+  ASSERT_EQ(read.size(), cv::Size(5, 4));
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_EQ(read.at<cv::Vec3w>(i / 5, i % 5),
+              cv::Vec3w(rgb[3 * i + 2], rgb[3 * i + 1], rgb[3 * i]));
+  }
+}
+
 TEST(EncodeImage, RefusesWhatTheFormatsCannotHold) {
   const std::vector<std::uint8_t> row(3 * 65501);
   EXPECT_THROWS(encode_jpeg({{1, 65501}, row.data()}, 90), std::runtime_error,
