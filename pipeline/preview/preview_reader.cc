@@ -297,6 +297,7 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
   content.annotation = std::move(sample.annotation);
   content.labels = std::move(sample.labels);
   content.schema = header.label_schema;
+  content.flow = std::move(sample.flow);
   return content;
 }
 

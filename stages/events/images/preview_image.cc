@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -276,6 +278,43 @@ void draw_labels(const PreviewContent& content, PanelScale scale, LabelStyle sty
   }
 }
 
+/// Red to the right, yellow-green down, cyan to the left, blue-violet up.
+cv::Scalar direction_colour(Point by) {
+  const double half_turns = std::atan2(by.y, by.x) / std::numbers::pi;  // -1..1
+  const auto hue = static_cast<std::uint8_t>(std::lround(90 * (half_turns + 2)) % 180);
+  const cv::Mat hsv(1, 1, CV_8UC3, cv::Scalar(hue, 255, 255));
+  cv::Mat bgr;
+  cv::cvtColor(hsv, bgr, cv::COLOR_HSV2BGR);
+  const cv::Vec3b colour = bgr.at<cv::Vec3b>(0, 0);
+  return {double(colour[0]), double(colour[1]), double(colour[2])};
+}
+
+/// Draws the flow of `content` onto its labelled frame.
+void draw_flow(const PreviewContent& content, PanelScale scale, cv::Mat& panel) {
+  constexpr double kBetween_px = 20;  // two arrows
+  constexpr double kTip = 0.3, kMoves_px = 0.25;
+  const ImageSize size = content.shape.size;
+  const int step = std::max(1, static_cast<int>(std::lround(kBetween_px / scale.factor)));
+  for (int y = step / 2; y < size.height; y += step) {
+    for (int x = step / 2; x < size.width; x += step) {
+      const auto pixel = static_cast<std::size_t>(y) * size.width + static_cast<std::size_t>(x);
+      if (content.flow.valid[pixel] == 0) continue;
+      const Point by{content.flow.px[pixel], content.flow.px[size.pixel_count() + pixel]};
+      const Point at{double(x), double(y)};
+      if (std::hypot(by.x, by.y) < kMoves_px) {
+        draw_joint(panel, scale.point(at), 1, false, kIgnored);
+        continue;
+      }
+      const double before = content.label_position;  // of the motion
+      const cv::Point from = fixed(scale.point({at.x - before * by.x, at.y - before * by.y}));
+      const cv::Point to =
+          fixed(scale.point({at.x + (1 - before) * by.x, at.y + (1 - before) * by.y}));
+      cv::arrowedLine(panel, from, to, kShadow, 3, cv::LINE_AA, kShift, kTip);
+      cv::arrowedLine(panel, from, to, direction_colour(by), 1, cv::LINE_AA, kShift, kTip);
+    }
+  }
+}
+
 constexpr double kCaptionSize = 0.45;
 const cv::Scalar kBackground(32, 28, 26);
 const cv::Scalar kCaptionColour(235, 235, 235);
@@ -289,6 +328,8 @@ void check(const PreviewContent& content) {
   if (content.shape.size.pixel_count() == 0 || !fits(content.previous_bgr.size(), bytes) ||
       !fits(content.next_bgr.size(), bytes) ||
       !fits(content.volume.size(), content.shape.value_count()) ||
+      !fits(content.flow.px.size(), 2 * content.shape.size.pixel_count()) ||
+      2 * content.flow.valid.size() != content.flow.px.size() ||
       content.labels.boxes.size() != content.annotation.boxes.size() ||
       content.labels.persons.size() != content.annotation.persons.size()) {
     throw std::invalid_argument(
@@ -352,6 +393,9 @@ cv::Mat labelled_panel(const PreviewContent& content, int number, PanelScale sca
                                             content.shape.size, scale);
   const bool has_labels = number >= 2 || content.label_position == number;
   draw_labels(content, scale, has_labels ? style : LabelStyle::kHint, panel);
+  if (number == content.label_position && style == LabelStyle::kFull && !content.flow.empty()) {
+    draw_flow(content, scale, panel);
+  }
   return panel;
 }
 
@@ -371,7 +415,9 @@ void draw_time_legend(cv::Mat& canvas, cv::Point at, int room) {
 
 std::string frame_caption(const PreviewContent& content, int number) {
   const std::string name = number == 0 ? "previous frame" : "next frame";
-  if (content.label_position == number) return name + ", labelled";
+  if (content.label_position == number) {
+    return name + (content.flow.empty() ? ", labelled" : ", labelled, with the flow");
+  }
   return name + (content.label_position == 1 - number ? "" : " (the labelled one lies between)");
 }
 

@@ -50,13 +50,16 @@ struct PreviewContent {
   Annotation annotation;
   VolumeLabels labels;  ///< as many entries as `annotation`
   LabelSchema schema;
+  PixelFlow flow = {};  ///< of the volume's size, or empty
 };
 
 /// Draws previous frame, next frame, average-timestamp image, and the polarities. The events and
 /// the labelled frame, whose panel has a bright border, have the boxes (magenta or white, with
 /// their class; ignored regions dashed grey), their outlines as thin lines, and poses (hidden
 /// joints hollow; limbs where the joint names are MPII's or Human3.6M's); on another frame, where
-/// things have moved, thin dashes hint at them. A box's name is where it covers boxes least. Small
+/// things have moved, thin dashes hint at them. Flow is arrows on the labelled frame, from the
+/// place in the previous frame to that in the next, each direction a colour, where both are seen
+/// (dots where nothing moves). A box's name is where it covers boxes least. Small
 /// volumes are enlarged by whole factors, so that text and lines stay readable.
 ///
 /// Time is colour, early blue to late red, the mean over both polarities. Brightness says how many

@@ -176,6 +176,32 @@ TEST(PreviewImage, FourPanels) {
   EXPECT_EQ(cv::countNonZero(panel(image, 3).reshape(1) != 255), 0) << "or white";
 }
 
+TEST(PreviewImage, FlowIsArrowsOnTheLabelledFrame) {
+  const std::size_t pixels = kDrawnSize.pixel_count();
+  for (const int labelled : {0, 1}) {
+    PreviewContent content = content_with(90);
+    content.label_position = labelled;
+    const cv::Mat without = drawn(content);
+    // All moves 4 to the right: red arrows from one frame's place to the other's.
+    content.flow = {std::vector<float>(2 * pixels), std::vector<std::uint8_t>(pixels, 1)};
+    std::fill_n(content.flow.px.begin(), pixels, 4.0f);
+    for (int y = 0; y < kDrawnSize.height / 2; ++y) {
+      std::fill_n(content.flow.valid.begin() + y * kDrawnSize.width, kDrawnSize.width, 0);
+    }
+    const cv::Mat with = drawn(content);
+    for (const int number : {0, 1, 2, 3}) {
+      cv::Mat difference;
+      cv::absdiff(panel(with, number), panel(without, number), difference);
+      const int upper = kPanelHeight / 2 - 8;
+      EXPECT_EQ(cv::countNonZero(difference.rowRange(0, upper).clone().reshape(1)), 0) << number;
+      EXPECT_EQ(cv::countNonZero(difference.reshape(1)) > 0, number == labelled) << number;
+    }
+    // The first arrow of the valid half begins or ends at (2, 42), which is drawn at 4 (2.5, 42.5).
+    const cv::Vec3b on_it = panel(with, labelled).at<cv::Vec3b>(4 * 42 + 2, 4 * (labelled ? 7 : 9));
+    EXPECT_GT(on_it[2], on_it[0] + 60);
+  }
+}
+
 /// So that they are seen on the colours of times and on white.
 TEST(PreviewImage, BoxesAreMagentaOrWhiteWithADarkEdge) {
   PreviewContent content = content_with(90);
