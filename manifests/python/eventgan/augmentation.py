@@ -207,6 +207,36 @@ def move_boxes(boxes: np.ndarray, affine: np.ndarray) -> np.ndarray:
     return np.concatenate([corners.min(1), corners.max(1)], 1)
 
 
+def move_flow(flow: np.ndarray, valid: np.ndarray, affine: np.ndarray, height: int, width: int,
+              label_position: float) -> tuple[np.ndarray, np.ndarray]:
+    """Flow of moved images: each pixel has that of the nearest one of before.
+
+    Parameters
+    ----------
+    flow, valid : numpy.ndarray, [2, H, W], [H, W]
+        As a shard has them: from the previous image to the next, at the pixels of the labelled one.
+    affine : numpy.ndarray, [2, 3]
+        The map of points that both images went through.
+    height, width : int
+        Of the result, pixels.
+    label_position : float
+        0: labelled is the previous image; else the next one.
+
+    Returns
+    -------
+    (numpy.ndarray, numpy.ndarray)
+        [2, height, width], and bool [height, width]: False also where the flow leads out of the result.
+    """
+    here = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1)
+    before = np.rint(move_points(here, inverse(affine))).astype(int)
+    limit = np.array(valid.shape[::-1]) - 1
+    x, y = np.moveaxis(np.clip(before, 0, limit), -1, 0)
+    inside = ((before >= 0) & (before <= limit)).all(-1)
+    there = np.einsum("ij,jyx->iyx", affine[:, :2], flow[:, y, x]) * inside
+    target = here + np.moveaxis(there if label_position == 0 else -there, 0, -1)
+    return there, inside & (valid[y, x] != 0) & ((target >= 0) & (target <= [width - 1, height - 1])).all(-1)
+
+
 def inverse(affine: np.ndarray) -> np.ndarray:
     """The inverse of an affine map, [2, 3]."""
     linear = np.linalg.inv(affine[:, :2])

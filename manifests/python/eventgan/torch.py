@@ -28,15 +28,15 @@ import torch
 from torch import nn
 from torch.utils.data import ConcatDataset, Dataset, WeightedRandomSampler
 
-from .augmentation import (EventAugmentation, Item, detection_item, fitted, inverse, move_boxes, move_points, moved,
-                           numbered, warp)
+from .augmentation import (EventAugmentation, Item, detection_item, fitted, inverse, move_boxes, move_flow, move_points,
+                           moved, numbered, warp)
 from .detection_scores import DONT_CARE
 from .frame_pairs import FrameAugmentation, FramePairs
 from .shards import Shards
 from .words import did_you_mean, sides
 
 __all__ = [
-    "DetectionDataset", "EventAugmentation", "FrameAugmentation", "FramePairs", "HalfVolumes", "Item",
+    "DetectionDataset", "EventAugmentation", "FlowDataset", "FrameAugmentation", "FramePairs", "HalfVolumes", "Item",
     "KeypointDataset", "PoseAugmentation", "PoseDataset", "collate_torchvision", "collate_yolo",
     "exchange_first_convolution", "fitted", "flip_pairs", "heatmaps", "inverse", "mixture", "move_boxes", "move_points",
     "warp",
@@ -115,6 +115,54 @@ class DetectionDataset(Dataset):
                               self._view, self._visible)
         return {**item, "id": sample["pair"]["sample_id"], "index": int(index),
                 "label_position": float(sample["pair"]["label_position"])}
+
+
+class FlowDataset(Dataset):
+    """Volumes with optical flow, of shards made with `"flow": true`. An item is a dictionary:
+
+    volume : [2B, H, W] float32
+    flow : [2, H, W] float32, x, then y, pixels: the motion from the previous image to the next
+    valid : [H, W] bool: seen in both images
+    label_position : float: 1: `flow` is at the pixels of the next image, 0: of the previous one
+    id : str, sample_id
+    index : int, of the sample in `shards`
+
+    Parameters
+    ----------
+    shards : Shards
+    size : (int, int), optional
+        H, W to which volumes are padded with zeros, or cut, at the right and at the bottom. None: unchanged.
+    augmentation : EventAugmentation, optional
+        Changes volume and flow alike; `reverse` where `reverse_all` is True: then the flow leads the other way. None:
+        no changes.
+    view : numpy.ndarray, [2, 3], optional
+        A map of the volume's points that is applied first, such as `fitted(area, size)`. None: none.
+    """
+
+    def __init__(self, shards: Shards, size: tuple[int, int] | None = None,
+                 augmentation: EventAugmentation | None = None, view: np.ndarray | None = None) -> None:
+        self._shards, self._size, self._augmentation, self._view = shards, size and sides(size), augmentation, view
+
+    def __len__(self) -> int:
+        return len(self._shards)
+
+    def __getitem__(self, index: int) -> Item:
+        sample = self._shards.sample(index, {"volume", "pair", "flow"})
+        name, position = sample["pair"]["sample_id"], float(sample["pair"]["label_position"])
+        if "flow" not in sample or np.isnan(sample["flow"]).all():
+            raise ValueError(f'expected a sample with flow ("flow": true in its source), got none, in '
+                             f'{sample["shard"]} ({name})')
+        volume, flow, valid = _decoded(sample), sample["flow"].astype(np.float32), sample["flow_valid"] != 0
+        augmentation = self._augmentation
+        if augmentation and augmentation.reverse:
+            if augmentation.reverse_all and float(torch.rand(())) < augmentation.reverse:
+                volume, flow, position = volume.flip(0), -flow, 1 - position
+            augmentation = dataclasses.replace(augmentation, reverse=0.0)
+        volume, affine = moved(volume, position, augmentation, self._size, self._view)
+        if affine is not None:
+            flow, valid = move_flow(flow, valid, affine, volume.shape[1], volume.shape[2], position)
+        return {"volume": volume, "flow": torch.from_numpy(flow).float(), "valid": torch.from_numpy(valid),
+                "label_position": position, "id": name, "index": int(index)}
 
 
 def collate_yolo(items: Sequence[Item]) -> tuple[torch.Tensor, torch.Tensor, list[str]]:

@@ -63,7 +63,7 @@ std::vector<Written> written_documents() {
       {"dataset": "human36m", "root": "g", "layout": "official", "every": 5, "subjects": ["S1"],
        "cameras": ["2"], "actions": ["Eating"], "pairs": {"gaps": [2]}},
       {"dataset": "frames", "root": "h", "frames_per_second": 29.97,
-       "labels": {"format": "voc", "path": "i", "edges_from": 0},
+       "labels": {"format": "voc", "path": "i", "edges_from": 0}, "flow": true,
        "pairs": {"from": "stills", "frames": 7,
                  "motion": {"translation_px": [1, 2], "rotation_deg": 3, "scale": 0.25, "frames": 2,
                             "rests": 0.75,

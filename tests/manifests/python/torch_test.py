@@ -14,8 +14,8 @@ torch = pytest.importorskip("torch")
 from torch.utils.data import DataLoader
 
 from eventgan import Shards
-from eventgan.torch import (DetectionDataset, EventAugmentation, HalfVolumes, KeypointDataset, PoseAugmentation,
-                            PoseDataset, collate_torchvision, collate_yolo, exchange_first_convolution, fitted,
+from eventgan.torch import (DetectionDataset, EventAugmentation, FlowDataset, HalfVolumes, KeypointDataset,
+                            PoseAugmentation, PoseDataset, collate_torchvision, collate_yolo, exchange_first_convolution, fitted,
                             flip_pairs, heatmaps, inverse, mixture, move_boxes, move_points, warp)
 
 JOINTS = ["nose", "left hand", "right hand"]
@@ -251,6 +251,35 @@ def test_an_area_of_the_volume_fills_the_item(shards):
     np.testing.assert_allclose(mirrored["volume"], item["volume"].flip(2), atol=1e-5)
     keypoints = KeypointDataset(shards, JOINTS, size=(24, 32), view=affine)[0]["keypoints"][0]
     np.testing.assert_allclose(keypoints[1, :2], [(2.25 + 0.5 - 2) * 8 - 0.5, (2.875 + 0.5 - 1) * 8 + 4 - 0.5])
+
+
+STAY = EventAugmentation(flip=0)
+
+
+@pytest.mark.parametrize("augmentation, size, flow, valid", [
+    (None, None, (0.5, -0.25), (1, 0, 8, 5)),  # of 8 x 6; it leads back by half a column, on by a quarter of a row
+    (None, (5, 9), (0.5, -0.25), (1, 0, 8, 4)),
+    (dataclasses.replace(STAY, flip=1), None, (-0.5, -0.25), (0, 0, 7, 5)),
+    (dataclasses.replace(STAY, scale=(2, 2)), None, (1, -0.5), (1, 0, 8, 5)),
+    (dataclasses.replace(STAY, reverse=1, reverse_all=True), None, (-0.5, 0.25), (1, 0, 8, 5)),
+    (dataclasses.replace(STAY, reverse=1, invert=1), None, (0.5, -0.25), (1, 0, 8, 5))])
+def test_flow_moves_with_the_volume(shards, augmentation, size, flow, valid):
+    still = shards[[3]]
+    item = FlowDataset(still, size, augmentation)[0]
+    height, width = size or (6, 8)
+    assert item["id"] == "000004" and item["volume"].shape[1:] == item["valid"].shape == (height, width)
+    left, top, right, bottom = valid
+    expected = torch.zeros(height, width, dtype=torch.bool)
+    expected[top:bottom, left:right] = True
+    assert torch.equal(item["valid"], expected)
+    for channel, value in zip(item["flow"], flow):
+        assert (channel[expected] == value).all()
+    assert item["label_position"] == (0 if augmentation and augmentation.reverse_all else 1)
+
+
+def test_flow_is_asked_for_where_there_is_none(shards):
+    with pytest.raises(ValueError, match='expected a sample with flow .*, got none, in .* \\(000000\\)'):
+        FlowDataset(shards)[0]
 
 
 def test_what_a_yolo_trainer_takes(shards):
