@@ -156,7 +156,7 @@ class FlowDataset(Dataset):
         augmentation = self._augmentation
         if augmentation and augmentation.reverse:
             if augmentation.reverse_all and float(torch.rand(())) < augmentation.reverse:
-                volume, flow, position = volume.flip(0), -flow, 1 - position
+                volume, flow, position = -volume if len(volume) == 1 else volume.flip(0), -flow, 1 - position
             augmentation = dataclasses.replace(augmentation, reverse=0.0)
         volume, affine = moved(volume, position, augmentation, self._size, self._view)
         if affine is not None:
