@@ -216,9 +216,13 @@ std::optional<std::string> flow_fault(const ShardTables& tables, const ShardSamp
     const float dx = flow.px[i], dy = flow.px[pixels + i];
     if (!std::isfinite(dx) || !std::isfinite(dy)) return "expected finite flow, got other numbers";
     if (flow.valid[i] > 1) return "expected flow_valid of 0 or 1, got another number";
-    const double x = static_cast<double>(i % size.width) + sign * dx;
-    const double y = static_cast<double>(i / size.width) + sign * dy;
-    if (flow.valid[i] != 0 && !(x >= 0 && y >= 0 && x <= size.width - 1 && y <= size.height - 1)) {
+    const auto is_inside = [&](std::size_t pixel, float by, int side) {
+      const double at = static_cast<double>(pixel) + sign * by;
+      const double rounding = 0x1p-11 * std::abs(by);  // of float16
+      return at >= -rounding && at <= side - 1 + rounding;
+    };
+    if (flow.valid[i] != 0 && !(is_inside(i % size.width, dx, size.width) &&
+                                is_inside(i / size.width, dy, size.height))) {
       return "expected valid flow to lead to a place in the volume, got one beyond it";
     }
   }

@@ -15,8 +15,9 @@ from torch.utils.data import DataLoader
 
 from eventgan import Shards
 from eventgan.torch import (DetectionDataset, EventAugmentation, FlowDataset, HalfVolumes, KeypointDataset,
-                            PoseAugmentation, PoseDataset, collate_torchvision, collate_yolo, exchange_first_convolution, fitted,
-                            flip_pairs, heatmaps, inverse, mixture, move_boxes, move_points, warp)
+                            PoseAugmentation, PoseDataset, collate_torchvision, collate_yolo,
+                            exchange_first_convolution, fitted, flip_pairs, heatmaps, inverse, mixture, move_boxes,
+                            move_points, warp)
 
 JOINTS = ["nose", "left hand", "right hand"]
 TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
