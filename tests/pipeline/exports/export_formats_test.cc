@@ -91,6 +91,8 @@ TEST(ExportFormats, AFileIsOneOfThoseThatTheRowSays) {
   EXPECT_FALSE(writes(format("mpii"), "annot/train.mat"));
   EXPECT_TRUE(writes(format("webdataset"), "README.md"));
   EXPECT_FALSE(writes(format("webdataset"), "notes.md"));
+  EXPECT_TRUE(writes(format("dsec"), "dsec/val/a/flow/backward/000000.png"));
+  EXPECT_FALSE(writes(format("dsec"), "dsec/val/a/flow/000000.png"));
   EXPECT_TRUE(writes(format("rvt"), "raw/val/a_td_td.h5"));
   EXPECT_TRUE(writes(format("rvt"),
                      "preprocessed/val/a/event_representations_v2/eventgan_nbins=18/"
