@@ -32,7 +32,7 @@ MOST_WORDS = {
     "manifests/guides/real_cameras.md": 1200,
     "manifests/guides/real_events.md": 1600,
     "manifests/guides/realism.md": 750,
-    "manifests/guides/scores.md": 750,
+    "manifests/guides/scores.md": 800,
     "manifests/guides/sensor.md": 700,
     "manifests/guides/shard_format.md": 2600,
     "manifests/guides/simulation.md": 900,

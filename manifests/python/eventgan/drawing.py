@@ -47,6 +47,16 @@ def draw_joints(canvas: np.ndarray, joints: np.ndarray, colour: tuple[int, int, 
             cv2.circle(canvas, ends[0], 2, colour, -1, cv2.LINE_AA)
 
 
+def draw_flow(canvas: np.ndarray, flow: np.ndarray, colour: tuple[int, int, int], step: int = 16) -> None:
+    """Draws flow [2, H, W] in volume pixels onto `of_events`, an arrow each `step` pixels; NaN is left out."""
+    for y, x in np.ndindex(flow.shape[1] // step, flow.shape[2] // step):
+        start = np.array([x, y]) * step + step // 2
+        end = start + np.clip(flow[:, start[1], start[0]].astype(float), -FAR, FAR)
+        if np.isfinite(end).all():
+            cv2.arrowedLine(canvas, *(tuple(int(v) for v in np.round(ZOOM * (point + 0.5) - 0.5))
+                                      for point in (start, end)), colour, 1, cv2.LINE_AA)
+
+
 def of_precision(curves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """uint8 [440, 440, 3] BGR: precision over recall (each [n], by name) as lines in a square from 0 to 1."""
     canvas = np.full((440, 440, 3), 255, np.uint8)

@@ -1,8 +1,9 @@
 """Scores a network's predictions on shards: boxes as PASCAL VOC, COCO and KITTI do, joints as the EventGAN paper and
-MPII do.
+MPII do, optical flow as MVSEC, KITTI and DSEC do.
 
     python3 -m eventgan.evaluate detections found.json --truth out --split val
     python3 -m eventgan.evaluate poses found.json --truth out --split val --dataset mpii --images images
+    python3 -m eventgan.evaluate flows found.npz --truth out --split val
 
 The predictions are a JSON list of
 
@@ -13,8 +14,9 @@ the first as in COCO's results. image_id is a sample's id, or its place in the s
 name, or its place among the sources' classes without DontCare from 1 on: the numbers of `eventgan export --to coco`.
 Boxes and joints are in volume pixels, boxes by edges, joints by pixel centres (shard_format.md, Geometry). `person` is
 the row in the sample and may be left out where there is only one; joints come in the order of Shards.default_joints().
+Flows are an .npz of numpy.savez with an array [2, H, W] (x, then y, volume pixels) for each sample's id.
 
-detection_scores.py and pose_scores.py define the numbers. One that is not defined is null in JSON and "-" in a table.
+detection_scores.py, pose_scores.py and flow_scores.py define the numbers. One that is not defined is null in JSON and "-" in a table.
 """
 
 from __future__ import annotations
@@ -26,13 +28,15 @@ import json
 import math
 import pathlib
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from .detection_scores import (DONT_CARE, KITTI_CLASSES, KITTI_LEVELS, Detections, GroundTruth, curve, detection_scores,
                                kitti_average_precision, match_as_voc, non_maximum_suppression, read_boxes)
+from .flow_scores import flow_scores
 from .pose_scores import Persons, pose_scores, read_persons
 from .open_shards import PathLike, open_shard
 from .shards import Shards
@@ -322,6 +326,56 @@ def evaluate_poses(predictions: PathLike, samples: Samples,
             "joints": pose_scores(found, persons, hidden)}, found, persons
 
 
+def evaluate_flows(predictions: PathLike, samples: Samples) -> tuple[dict[str, Any], Mapping[str, np.ndarray]]:
+    """What `flows` prints, with the flows it was computed from.
+
+    Parameters
+    ----------
+    predictions : str or path
+        An .npz file (see above).
+    samples : Samples
+        Those without flow are left out.
+
+    Returns
+    -------
+    result : dict
+        `flow`: scores of "dense", the pixels where flow is valid, and of "at events", those of them with an event.
+    found : mapping
+        float [2, H, W] by sample id; an array is read when it is asked for.
+
+    Raises
+    ------
+    ValueError
+        No sample has flow, a sample has no prediction, or one that is not [2, H, W] and finite where it is scored.
+    """
+    shards = samples.shards
+    try:
+        found = np.load(predictions)
+        names = set(found.files)
+    except (AttributeError, ValueError, zipfile.BadZipFile) as error:
+        raise ValueError(f"expected an .npz of arrays, got another file, in {predictions}") from error
+    labelled = {name: i for i, name in enumerate(shards.column("sample_id").tolist())
+                if "flow" in shards.sample(i, {"flow"}) and shards.sample(i, {"flow"})["flow_valid"].any()}
+    if not labelled:
+        raise ValueError('expected samples with flow ("flow": true in their source), got none')
+    missing = sorted(labelled.keys() - names)
+    if missing:
+        raise ValueError(f"expected a flow of each of {len(labelled)} samples, got none of {len(missing)}, in "
+                         f"{predictions} (sample {missing[0]})")
+
+    def flows(at_events: bool) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        for name, i in labelled.items():
+            sample = shards.sample(i, {"volume", "flow"})
+            scored, flow = sample["flow_valid"] != 0, found[name]
+            if flow.shape != sample["flow"].shape or not np.isfinite(flow[:, scored]).all():
+                raise ValueError(f"expected finite numbers of shape {sample['flow'].shape}, got {flow.dtype} of shape "
+                                 f"{flow.shape}, in {predictions} (sample {name})")
+            yield flow, sample["flow"], scored & (sample["volume"] != 0).any(0) if at_events else scored
+
+    counts = {"samples": len(labelled), "not_of_these_samples": len(names - labelled.keys())}
+    return {"counts": counts, "flow": {"dense": flow_scores(flows(False)), "at events": flow_scores(flows(True))}}, found
+
+
 def table(title: str, rows: Mapping[str, Mapping[str, float | str]], columns: Mapping[str, str],
           digits: int = 3) -> str:
     """A line of headings (`title`, then those of `columns`), then one for each row; NaN is "-"."""
@@ -369,6 +423,16 @@ def pose_tables(result: Mapping[str, Any]) -> str:
                                    "pckh_mpii": "PCKh@0.5, MPII's"})
 
 
+def flow_tables(result: Mapping[str, Any]) -> str:
+    """The result of `evaluate_flows` as text."""
+    counts = result["counts"]
+    first = f"{counts['samples']} samples"
+    if counts["not_of_these_samples"]:
+        first += f"; {counts['not_of_these_samples']} predictions are of other samples"
+    return first + "\n\n" + table("", result["flow"], {"pixels": "pixels", "aee": "AEE, px", "npe_1": "above 1 px",
+                                                       "npe_3": "above 3 px", "angular": "angle, degrees"})
+
+
 def draw_detections(folder: str, samples: Samples, result: Mapping[str, Any], found: Detections,
                     truth: GroundTruth) -> None:
     """Writes images of the result of `evaluate_detections`: precision over recall of all detections, and some of the
@@ -412,6 +476,21 @@ def draw_poses(folder: str, samples: Samples, result: Mapping[str, Any], found: 
         drawing.write(folder, samples.shards.column("sample_id")[i], canvas)
 
 
+def draw_flows(folder: str, samples: Samples, found: Mapping[str, np.ndarray]) -> None:
+    """Writes images of some of the samples, evenly spread: found flow as blue arrows, the true one where it is valid
+    in green. Needs OpenCV.
+    """
+    from . import drawing
+
+    for i in _some(np.arange(len(samples.shards))):
+        name, sample = samples.shards.column("sample_id")[i], samples.shards.sample(i, {"volume", "flow"})
+        if "flow" in sample and sample["flow_valid"].any():
+            canvas = drawing.of_events(sample["volume"])
+            drawing.draw_flow(canvas, np.where(sample["flow_valid"], sample["flow"], np.nan), drawing.TRUE)
+            drawing.draw_flow(canvas, found[name], drawing.FOUND)
+            drawing.write(folder, name, canvas)
+
+
 def _some(values: np.ndarray) -> list[int]:
     return values[np.unique(np.linspace(0, len(values) - 1, min(IMAGES, len(values))).round().astype(int))].tolist()
 
@@ -426,9 +505,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """The command line."""
     parser = argparse.ArgumentParser(prog="python3 -m eventgan.evaluate",
                                      description="Scores the predictions of a network against the labels of shards.")
-    parser.add_argument("what", choices=["detections", "poses"])
+    parser.add_argument("what", choices=["detections", "poses", "flows"])
     parser.add_argument("predictions", help="JSON list of objects with image_id, category_id, bbox, score; or with "
-                        "image_id, person, joints")
+                        "image_id, person, joints; .npz of flows by sample id")
     parser.add_argument("--truth", required=True, metavar="OUT", help="folder of shards, or one shard")
     parser.add_argument("--split", help="score only samples of this split")
     parser.add_argument("--dataset", help="score only samples of this kind of source, such as kitti_object")
@@ -455,6 +534,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
                                                  args.iou)
             text, draw = detection_tables(result), functools.partial(draw_detections, args.images, samples, result,
                                                                      *boxes)
+        elif args.what == "flows":
+            result, flows = evaluate_flows(args.predictions, samples)
+            text, draw = flow_tables(result), functools.partial(draw_flows, args.images, samples, flows)
         else:
             result, *joints = evaluate_poses(args.predictions, samples, args.hidden)
             text, draw = pose_tables(result), functools.partial(draw_poses, args.images, samples, result, *joints)

@@ -19,7 +19,8 @@ from eventgan import Shards
 from eventgan.detection_scores import (COCO_IOUS, KITTI_CLASSES, KITTI_LEVELS, Detections, GroundTruth,
                                        average_precisions, detection_scores, kitti_average_precision, match_as_coco,
                                        match_as_voc, non_maximum_suppression)
-from eventgan.evaluate import Samples, evaluate_detections, evaluate_poses
+from eventgan.evaluate import Samples, evaluate_detections, evaluate_flows, evaluate_poses
+from eventgan.flow_scores import flow_errors, flow_scores
 from eventgan.pose_scores import Persons, head_lengths, pose_scores
 
 TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
@@ -678,6 +679,47 @@ def evaluate(*arguments, expect=0):
     return done.stdout + done.stderr
 
 
+def test_flow_scores_worked_out_by_hand():
+    true = np.zeros((2, 1, 5), np.float16)
+    found = np.array([[[0, 1, 3, 4, np.nan]], [[0, 0, 4, 0, 0]]], np.float32)
+    scored = np.array([[True, True, True, True, False]])
+    scores = flow_scores([(found, true, scored)])
+    # distances 0, 1, 5 and 4, angles of (x, y, 1) to (0, 0, 1): the arc tangent of these
+    assert scores["pixels"] == 4 and scores["aee"] == 10 / 4 and scores["npe_1"] == scores["npe_3"] == 2 / 4
+    assert scores["angular"] == pytest.approx(np.degrees(np.arctan([0, 1, 5, 4])).mean())
+    both = flow_scores([(found, true, scored), (found, true, np.array([[True, False, False, False, False]]))])
+    assert both["pixels"] == 5 and both["aee"] == 10 / 5
+    nothing = flow_scores([(found, true, np.zeros((1, 5), bool))])
+    assert nothing["pixels"] == 0 and all(math.isnan(nothing[key]) for key in ("aee", "npe_1", "npe_3", "angular"))
+    # opposite flows of a pixel: twice 45 degrees; a small angle keeps its digits
+    distance, angle = flow_errors(np.array([[1, 1e-9], [0, 0]]), np.array([[-1, 0], [0, 0]]))
+    assert distance.tolist() == [2, 1e-9] and angle == pytest.approx([90, np.degrees(1e-9)])
+
+
+def test_flows_of_a_folder(folder, tmp_path):
+    # the last sample's flow is (0.5, -0.25) at 7 x 5 pixels
+    still = np.tile(np.array([0.5, -0.25])[:, None, None], (1, 6, 8))
+    there = (Shards(folder)[-1]["volume"] != 0).any(0) & (Shards(folder)[-1]["flow_valid"] != 0)
+
+    def evaluated(**flows):
+        np.savez(tmp_path / "found.npz", **flows)
+        return evaluate_flows(tmp_path / "found.npz", Samples(folder, None, None, None))[0]
+
+    result = evaluated(**{"000004": still + [[[0.3]], [[0.4]]], "000000": still})
+    assert result["counts"] == {"samples": 1, "not_of_these_samples": 1}
+    dense, at_events = result["flow"]["dense"], result["flow"]["at events"]
+    assert dense["pixels"] == 35 and at_events["pixels"] == there.sum()
+    assert dense["aee"] == pytest.approx(0.5) and dense["npe_1"] == 0
+    for flows, message in [({"000000": still}, "expected a flow of each of 1 samples, got none of 1"),
+                           ({"000004": still[:1]}, r"shape \(2, 6, 8\), got float64 of shape \(1, 6, 8\)"),
+                           ({"000004": still * np.nan}, "expected finite numbers")]:
+        with pytest.raises(ValueError, match=message + r".*found\.npz \(sample 000004\)"):
+            evaluated(**flows)
+    write(tmp_path / "found.npz", [])
+    with pytest.raises(ValueError, match="expected an .npz of arrays, got another file, in .*found.npz"):
+        evaluate_flows(tmp_path / "found.npz", Samples(folder, None, None, None))
+
+
 def test_the_command_prints_tables_json_and_images(folder, tmp_path):
     found = write(tmp_path / "found.json",
                   [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000000", "Car", [-1e30, 0, 2e30, 1], 0.1)])
@@ -709,3 +751,8 @@ def test_the_command_prints_tables_json_and_images(folder, tmp_path):
     evaluate("poses", poses, "--truth", folder, "--images", tmp_path / "joints")
     assert {path.name for path in (tmp_path / "boxes").iterdir()} >= {"precision_recall.png", "000000.png"}
     assert len(list((tmp_path / "joints").glob("*.png"))) == 2
+    np.savez(tmp_path / "found.npz", **{"000004": np.zeros((2, 6, 8), np.float32)})
+    said = evaluate("flows", tmp_path / "found.npz", "--truth", folder, "--images", tmp_path / "flows")
+    # the flow is (0.5, -0.25): 0.559 px off
+    assert said.splitlines()[3].split() == ["dense", "35", "0.559", "0.000", "0.000", "29.206"]
+    assert [path.name for path in (tmp_path / "flows").iterdir()] == ["000004.png"]
