@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "manifests/values/counter_random.h"
 #include "manifests/values/still_motion.h"
 #include "stages/frames/decoding/prepared_frame.h"
+#include "tests/stages/frames/decoding/still_image.h"
 
 namespace eventgan {
 namespace {
@@ -19,18 +19,11 @@ namespace {
 
 constexpr double kStep_px = 1.0 / 128;
 
-/// Noise, by which one place is known from another; `blur` makes it smooth enough to be sampled
-/// between pixels.
-cv::Mat noise(ImageSize size, double blur = 0) {
-  const CounterRandom random = CounterRandom(4).keyed("noise");
-  cv::Mat image(size.height, size.width, CV_8UC1);
-  for (int i = 0; i < size.height * size.width; ++i) {
-    image.data[i] = static_cast<std::uint8_t>(random.below(static_cast<std::uint64_t>(i), 256));
-  }
-  if (blur > 0) {
-    cv::GaussianBlur(image, image, {}, blur);
-    cv::normalize(image, image, 0, 255, cv::NORM_MINMAX);
-  }
+/// Smooth enough to be sampled between pixels.
+cv::Mat smooth_noise(ImageSize size, double blur) {
+  cv::Mat image = noise(size);
+  cv::GaussianBlur(image, image, {}, blur);
+  cv::normalize(image, image, 0, 255, cv::NORM_MINMAX);
   return image;
 }
 
@@ -113,21 +106,6 @@ FramePair pair_of(const ImageMotion& motion, double label_position) {
   return pair;
 }
 
-Box object_at(const Rectangle& box) {
-  return {.class_id = 0,
-          .xyxy = box,
-          .outline = {{{{box.left, box.top},
-                        {box.right, box.top},
-                        {box.right, box.bottom},
-                        {box.left, box.bottom}}}}};
-}
-
-/// Whether the pixel lies in the box, made larger on all sides.
-bool inside(const Rectangle& box, int x, int y, double larger = 0) {
-  return x + 0.5 > box.left - larger && x + 0.5 < box.right + larger &&
-         y + 0.5 > box.top - larger && y + 0.5 < box.bottom + larger;
-}
-
 TEST(StillFlow, OfAShiftIsTheShift) {
   const cv::Mat image = noise({30, 40});
   ImageSpec spec;
@@ -165,7 +143,7 @@ struct Fit {
 
 TEST(StillFlow, LeadsToTheSamePlaceOfTheOtherFrameWhateverThePlacement) {
   const ImageSize size{120, 160};
-  const cv::Mat image = noise(size, 3);
+  const cv::Mat image = smooth_noise(size, 3);
   const ImageMotion motion{3.3, -5.7, 1.8, 1.02};
   for (const Fit& each : {Fit{ImageFit::kStretch, {130, 150}},
                           {ImageFit::kLetterbox, {200, 200}},
@@ -226,7 +204,7 @@ TEST(StillFlow, OfObjectsIsTheirOwnAndEndsWhereTheyCover) {
 
 TEST(StillFlow, OfObjectsInAMovingImageLeadsToTheSamePlaces) {
   const ImageSize size{120, 160};
-  const cv::Mat image = noise(size, 2);
+  const cv::Mat image = smooth_noise(size, 2);
   ImageSpec spec;
   spec.size = ImageSize{90, 120};
   for (const double position : {0.0, 1.0}) {
@@ -241,7 +219,7 @@ TEST(StillFlow, OfObjectsInAMovingImageLeadsToTheSamePlaces) {
 }
 
 TEST(StillFlow, OfAClipIsFromOnePoseToTheOther) {
-  const cv::Mat image = noise({96, 128}, 2);  // the window begins at row 12, column 16
+  const cv::Mat image = smooth_noise({96, 128}, 2);  // the window begins at row 12, column 16
   const StillPose from{{}, {ImageMotion{4, 0, 0, 1}}};
   const StillPose to{{-1, 0.5, 0, 1}, {ImageMotion{6, 1, 0, 1}}};
   for (const double position : {0.0, 1.0}) {

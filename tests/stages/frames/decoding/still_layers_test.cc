@@ -9,6 +9,7 @@
 
 #include "manifests/values/counter_random.h"
 #include "stages/frames/decoding/prepared_frame.h"
+#include "tests/stages/frames/decoding/still_image.h"
 
 namespace eventgan {
 namespace {
@@ -18,23 +19,6 @@ namespace {
 
 /// Room for an object's soft edge, and for what is filled around where it was.
 constexpr int kEdge = 2, kFilled = 4;
-
-Outline outline_around(const Rectangle& box) {
-  return {{{{box.left, box.top},
-            {box.right, box.top},
-            {box.right, box.bottom},
-            {box.left, box.bottom}}}};
-}
-
-Box object_at(const Rectangle& box) {
-  return {.class_id = 0, .xyxy = box, .outline = outline_around(box)};
-}
-
-/// Whether the pixel's centre lies in the box, made larger on all sides.
-bool inside(const Rectangle& box, double x, double y, double larger = 0) {
-  return x + 0.5 > box.left - larger && x + 0.5 < box.right + larger &&
-         y + 0.5 > box.top - larger && y + 0.5 < box.bottom + larger;
-}
 
 Rectangle shifted(const Rectangle& box, double x, double y) {
   return {box.left + x, box.top + y, box.right + x, box.bottom + y};

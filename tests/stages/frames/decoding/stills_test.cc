@@ -2,10 +2,10 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "manifests/values/counter_random.h"
 #include "stages/frames/decoding/pair_reader.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/labels/label_mapping.h"
+#include "tests/stages/frames/decoding/still_image.h"
 #include "tests/stages/frames/decoding/test_video.h"
 #include "tests/stages/frames/frames_fixture.h"
 
@@ -19,15 +19,6 @@ FramePair still_of(const FrameRef& image, const ImageMotion& motion, double labe
   pair.label_position = label_position;
   pair.motion = motion;
   return pair;
-}
-
-cv::Mat noise(ImageSize size) {
-  const CounterRandom random = CounterRandom(3).keyed("noise");
-  cv::Mat image(size.height, size.width, CV_8UC1);
-  for (int i = 0; i < size.height * size.width; ++i) {
-    image.data[i] = static_cast<std::uint8_t>(random.below(static_cast<std::uint64_t>(i), 256));
-  }
-  return image;
 }
 
 class Stills : public ::testing::Test {
