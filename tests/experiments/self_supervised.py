@@ -20,7 +20,6 @@ by networks that have not seen it. The same command resumes: what networks of a 
 from __future__ import annotations
 
 import argparse
-import collections
 import csv
 import functools
 import io
@@ -39,11 +38,11 @@ import torch
 import training
 from torch import nn
 from torch.nn import functional
+from train_flow import UNet, begin_at_rest, error_at_events, in_colour, moved, normalized
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
 
-LEVELS, RESIDUAL_BLOCKS, WIDTH = 4, 2, 8
 SMOOTHNESS = 0.5  # of `eventgan train`
 SIDE, BATCH, RATE = 96, 4, 2e-3
 AGAIN = 40  # batches for the batch norms' means
@@ -57,71 +56,8 @@ ROWS = [*recordings.METHODS, REAL]
 DRAWN = ["EventGAN 16", "difference, fitted", REAL]
 
 
-# The networks
+# The losses, with the published oddities, of which stages/training/losses.cc tells
 # ----------------------------------------------------------------------------------------------------------------------
-
-
-def layer(inputs: int, outputs: int, kernel: int = 3, stride: int = 1, norm: bool = True,
-          activation: nn.Module | None = None) -> nn.Sequential:
-    parts: dict[str, nn.Module] = {"conv2d": nn.Conv2d(inputs, outputs, kernel, stride, kernel // 2, bias=not norm)}
-    if norm:
-        parts["norm_layer"] = nn.BatchNorm2d(outputs, momentum=0.01)
-    return nn.Sequential(collections.OrderedDict(parts, activation=activation or nn.LeakyReLU(0.01)))
-
-
-class ResidualBlock(nn.Module):
-    def __init__(self, channels: int) -> None:
-        super().__init__()
-        self.conv1, self.conv2 = (nn.Conv2d(channels, channels, 3, padding=1, bias=False) for _ in range(2))
-        self.bn1, self.bn2 = nn.BatchNorm2d(channels), nn.BatchNorm2d(channels)
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        return torch.relu(x + self.bn2(self.conv2(torch.relu(self.bn1(self.conv1(x))))))
-
-
-class UNet(nn.Module):
-    """The flow network (18 channels to 2) or the reconstruction network (2 to 1) of the EventGAN paper.
-
-    Parameters
-    ----------
-    inputs, outputs : int
-        Channels.
-    width : int
-        Channels of the first layer; each of the four levels below has twice as many as the one above it.
-    """
-
-    def __init__(self, inputs: int, outputs: int, width: int = WIDTH) -> None:
-        super().__init__()
-        widths = [width << level for level in range(LEVELS + 1)]
-        self.head = layer(inputs, width, norm=False)
-        self.encoders = nn.ModuleList(layer(above, below, stride=2) for above, below in zip(widths, widths[1:]))
-        self.resblocks = nn.Sequential(*(ResidualBlock(widths[-1]) for _ in range(RESIDUAL_BLOCKS)))
-        # Each but the lowest takes the prediction of the level below, too.
-        self.decoders = nn.ModuleList(layer(3 * each + (outputs if i else 0), each)
-                                      for i, each in enumerate(widths[-2::-1]))
-        self.pred_layers = nn.ModuleList(layer(each, outputs, 1, norm=False, activation=nn.Tanh())
-                                         for each in widths[-2::-1])
-        for parameter in self.parameters():
-            if parameter.dim() == 4:
-                nn.init.kaiming_normal_(parameter, a=10)  # as published
-
-    def forward(self, x: torch.Tensor) -> list[torch.Tensor]:
-        """float32 [B, inputs, H, W] -> four predictions in -1..1, [B, outputs, h, w], coarse to fine,
-        the last one of H x W."""
-        x, skips, predictions = self.head(x), [], []
-        for encoder in self.encoders:
-            skips.append(x)
-            x = encoder(x)
-        x = self.resblocks(x)
-        for decoder, predict, skip in zip(self.decoders, self.pred_layers, reversed(skips)):
-            x = functional.interpolate(torch.cat([x, *predictions[-1:]], 1), skip.shape[2:])
-            x = decoder(torch.cat([x, skip], 1))
-            predictions.append(predict(x))
-        return predictions
-
-
-# Their losses, with the published oddities, of which stages/training/losses.cc tells
-# -------------------------------------------------------------
 
 
 def charbonnier(error: torch.Tensor) -> torch.Tensor:
@@ -207,18 +143,6 @@ def reduced(images: np.ndarray, factor: int) -> np.ndarray:
     return parts.sum((-3, -1), dtype=np.float32)
 
 
-def normalized(volume: np.ndarray) -> np.ndarray:
-    """Divided by its 98th percentile (of what is not 0) and clipped: "normalize": "eta98".
-
-    The network's volumes have no other scale, since it learned from such, and a camera's or a model's counts depend on
-    its threshold and on the interval. This takes the unit away, each volume on its own, so nothing of the tested camera
-    needs to be known. Where events are, how many at each pixel relative to others, and when, stays the method's own:
-    that is what is tested.
-    """
-    values = volume[volume > 0]
-    return np.minimum(volume / np.percentile(values, 98), 1) if len(values) else volume
-
-
 def kept(args: argparse.Namespace, row: str, path: pathlib.Path, compute: Callable[[], dict[str, np.ndarray]]) -> Any:
     """What OUT keeps of a row's events of a recording, computed if it is not there yet."""
     file = args.out / "volumes" / f"{row} {path.stem}.npz".replace(",", "").replace(" ", "-")
@@ -296,10 +220,8 @@ def learn(what: str, pairs: Sequence[Pair], seed: int, steps: int) -> UNet:
     """The "flow" or the "reconstruction" network, in its evaluation mode."""
     torch.manual_seed(seed)
     network, predictions_of = (UNet(2 * recordings.BINS, 2), flow_of) if what == "flow" else (UNet(2, 1), images_of)
-    for prediction in network.pred_layers if what == "flow" else ():
-        # as published, flows begin at random, a dozen pixels long: hundreds of steps go by to forget them
-        nn.init.zeros_(prediction.conv2d.weight)
-        nn.init.zeros_(prediction.conv2d.bias)
+    if what == "flow":
+        begin_at_rest(network)  # as published, flows begin at random, a dozen pixels long
     optimizer = torch.optim.Adam(network.parameters())
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, RATE, total_steps=steps)
     for _, (previous, following, volumes) in zip(range(steps), batches(pairs, seed)):
@@ -324,15 +246,6 @@ def learn(what: str, pairs: Sequence[Pair], seed: int, steps: int) -> UNet:
     return network.eval()
 
 
-def moved(previous: torch.Tensor, flow: torch.Tensor) -> torch.Tensor:
-    """Previous frames [B, 1, H, W], moved by flows [B, 2, H, W] in pixels; beyond the edge their outermost pixels.
-    Zero flow moves nothing, unlike in the loss."""
-    height, width = flow.shape[2:]
-    y, x = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
-    places = (torch.stack([x, y], 2) + flow.permute(0, 2, 3, 1)) / torch.tensor([width - 1, height - 1])
-    return functional.grid_sample(previous, 2 * places - 1, padding_mode="border", align_corners=True)
-
-
 @torch.no_grad()
 def predict(networks: dict[str, UNet], pair: Pair) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Of a whole frame the flow in pixels [1, 2, H, W], the previous frame moved by it,
@@ -346,10 +259,9 @@ def scores_of(pair: Pair, image: torch.Tensor, reconstruction: torch.Tensor) -> 
     """How far a moved frame is from the next one, in grey levels, at pixels with events;
     and SSIM of a reconstruction with it."""
     _, following, volume = tensors([pair])
-    there = volume.sum(1, keepdim=True) > 0
     similarity = ssim(reconstruction, following)
-    return {"error": 127.5 * float((image - following)[there].abs().mean()), "ssim": float(similarity.mean()),
-            "ssim_at_events": float(similarity[there].mean())}
+    return {"error": 127.5 * error_at_events(image, following, volume), "ssim": float(similarity.mean()),
+            "ssim_at_events": float(similarity[volume.sum(1, keepdim=True) > 0].mean())}
 
 
 def mean_scores(pairs: Sequence[Pair], images: Callable[[Pair], tuple[torch.Tensor, torch.Tensor]]) -> dict[str, float]:
@@ -466,15 +378,6 @@ def table_of(scores: dict[str, dict[str, list[dict[str, float]]]],
             for score, recording, of_seeds, places in (*lines, (of_mean, "mean", means, 3)):
                 yield [score, row, recording, f"{of_seeds.mean():.{places}f}",
                        f"{of_seeds.std():.{places}f}" if len(of_seeds) > 1 else ""]
-
-
-def in_colour(flow: np.ndarray, longest: float) -> np.ndarray:
-    """[2, H, W] -> uint8 [H, W, 3], red, green, blue: hue is the direction,
-    saturation the length as a share of `longest`, so no flow is white."""
-    x, y = flow
-    hue = np.degrees(np.arctan2(y, x)) % 360 / 2
-    saturation = 255 * np.minimum(np.hypot(x, y) / longest, 1)
-    return cv2.cvtColor(np.stack([hue, saturation, np.full_like(hue, 255)], 2).astype(np.uint8), cv2.COLOR_HSV2RGB)
 
 
 def draw(file: pathlib.Path, pair: Pair, networks: dict[str, dict[str, UNet]]) -> None:

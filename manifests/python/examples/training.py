@@ -400,7 +400,7 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
             continue
         state["seconds"] += time.monotonic() - began
         report(float(np.mean(losses)))
-        _replace(out / "checkpoint.pt",
+        replace(out / "checkpoint.pt",
                  lambda path: torch.save({**state, "model": model.state_dict(), "optimizer": optimizer.state_dict()},
                                          path))
         began = time.monotonic()
@@ -408,13 +408,13 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
     untrained, last = state["history"][0][metric], state["history"][-1][metric]
     summary = {"metric": metric, "untrained": untrained, metric: last, "minutes": round(state["seconds"] / 60, 2),
                **state["settings"], "history": state["history"]}
-    _replace(out / "weights.pt", lambda path: torch.save(model.state_dict(), path))
-    _replace(out / "metrics.json", lambda path: path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8"))
+    replace(out / "weights.pt", lambda path: torch.save(model.state_dict(), path))
+    replace(out / "metrics.json", lambda path: path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8"))
     print(f"{metric} {last} after {summary['minutes']} minutes, untrained {untrained}; {out}: weights.pt, "
           "metrics.json, images/, predictions.json")
 
 
-def _replace(path: pathlib.Path, write: Callable[[pathlib.Path], Any]) -> None:
+def replace(path: pathlib.Path, write: Callable[[pathlib.Path], Any]) -> None:
     new = path.with_name(path.name + ".new")
     write(new)
     os.replace(new, path)
@@ -446,21 +446,27 @@ def box_predictions(item: dict, found: tuple[torch.Tensor, torch.Tensor, torch.T
             for box, label, score in zip(boxes.tolist(), labels, scores.tolist())]
 
 
-def write_predictions(args: argparse.Namespace, shards: Shards, entries: Iterable[dict],
-                      what: str = "detections") -> None:
-    """predictions.json of the samples, ids.txt, which names these, and the line that scores them."""
-    with torch.no_grad():
-        text = json.dumps(list(entries)) + "\n"
-    ids = "".join(f"{name}\n" for name in shards.column("sample_id"))
-    for name, content in (("predictions.json", text), ("ids.txt", ids)):
-        _replace(pathlib.Path(args.out, name), lambda path, content=content: path.write_text(content, encoding="utf-8"))
+def write_predictions(args: argparse.Namespace, shards: Shards, entries: Iterable, what: str = "detections") -> None:
+    """predictions.json of the samples, ids.txt, which names these, and the line that scores them. `entries`: objects;
+    of "flows" the samples' ids with flow [2, H, W], for predictions.npz."""
+    def write(path: pathlib.Path) -> None:
+        with torch.no_grad(), open(path, "wb") as file:
+            if what == "flows":
+                np.savez_compressed(file, **dict(entries))
+            else:
+                file.write((json.dumps(list(entries)) + "\n").encode())
+
+    name = "predictions.npz" if what == "flows" else "predictions.json"
+    ids = "".join(f"{each}\n" for each in shards.column("sample_id"))
+    replace(pathlib.Path(args.out, name), write)
+    replace(pathlib.Path(args.out, "ids.txt"), lambda path: path.write_text(ids, encoding="utf-8"))
     place = pathlib.Path(eventgan.__file__).parents[1]
     path = "" if place.name.endswith("-packages") else f"PYTHONPATH={shlex.quote(str(place))} "
     options = {"--truth": args.test or args.data, "--ids": f"{args.out}/ids.txt"}
     options |= zip(("--split", "--dataset"), _part_tested(args))
     if getattr(args, "classes", None):
         options["--classes"] = ",".join(name for name in args.classes.split(",") if name in shards.known_classes())
-    line = [sys.executable, "-m", "eventgan.evaluate", what, f"{args.out}/predictions.json",
+    line = [sys.executable, "-m", "eventgan.evaluate", what, f"{args.out}/{name}",
             *(word for option in options.items() if option[1] for word in option)]
     print(f"to score what was found in {args.test or 'the validation samples'}: {path}"
           f"{shlex.join(line + (['--hidden'] if what == 'poses' else []))}")

@@ -157,6 +157,102 @@ def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
     assert whole == killed
 
 
+def convert(folder, **job):
+    """The folder of the shards of a source whose manifest is `job`."""
+    (folder / f"{job['name']}.json").write_text(json.dumps({"format": "eventgan-manifest", "version": 1,
+                                                           "output": {"directory": job["name"]}, **job}))
+    subprocess.run([PROGRAM, "convert", folder / f"{job['name']}.json", "--progress", "none"], check=True,
+                   capture_output=True)
+    return folder / job["name"]
+
+
+def test_flow_network_learns_and_goes_on(tmp_path):
+    """Of moved photographs, tested on these and on a recording of a pattern that goes to the right by a pixel."""
+    h5py = pytest.importorskip("h5py")
+    pattern = np.kron(np.random.default_rng(0).integers(0, 256, (12, 20)), np.ones((8, 8))).astype(np.uint8)
+    (tmp_path / "photos").mkdir()
+    for i in range(5):
+        cv2.imwrite(str(tmp_path / "photos" / f"{i}.png"), np.roll(pattern, 9 * i, 1))
+    source = {"dataset": "frames", "root": "photos", "flow": True,
+              "pairs": {"from": "stills", "motion": {"translation_px": [2, 4]}}}
+    options = {"name": "out", "image": {"width": 96, "height": 64, "fit": "crop"}, "generator": {"kind": "esim"}}
+    data = convert(tmp_path, sources=[source], **options)
+    frames = np.stack([pattern[:, 10 - shift:][:, :128] for shift in range(3)])
+    rows, columns = np.nonzero(frames[0] != frames[1])
+    events = np.concatenate([np.stack([columns, rows, np.full(len(rows), time), np.ones(len(rows))], 1)
+                             for time in (0.01, 0.02, 0.05, 0.06)])
+    with h5py.File(tmp_path / "scene.hdf5", "w") as file:
+        camera = file.create_group("davis/left")
+        camera["events"], camera["image_raw"], camera["image_raw_ts"] = events, frames, [0, 0.04, 0.08]
+        camera["image_raw_event_inds"] = [0, 2 * len(rows), 4 * len(rows) - 1]
+    test = convert(tmp_path, name="scene", image={}, generator={"kind": "events"},
+                   sources=[{"dataset": "recording", "root": str(tmp_path / "scene.hdf5"), "split": "test"}])
+
+    said = train("train_flow", data, tmp_path / "parts", "--steps", "1", "--images", "1", "--every", "9")
+    assert "4 samples for training, 1 for validation, of other images" in said and "(untrained)" in said
+    said = train("train_flow", data, tmp_path / "parts", "--steps", "2", "--images", "1", "--every", "9")
+    assert "resuming after epoch 1" in said
+    assert_trained(tmp_path / "parts", [0, 1, 2], images=1)
+    dense = json.loads((tmp_path / "parts" / "scores.json").read_text())["dense"]
+    assert scores(said)["flow"]["dense"] == pytest.approx(dense) and dense["aee"] < 10
+    assert history(tmp_path / "parts")[-1]["AEE"] == pytest.approx(dense["aee"], abs=1e-4)
+
+    said = train("train_flow", data, tmp_path / "parts", "--steps", "2", "--every", "9", "--test", test)
+    left = json.loads((tmp_path / "parts" / "scores.json").read_text())
+    assert set(left) == {"error of the moved frame"} and set(left["error of the moved frame"]) == {"scene", "mean"}
+    assert "error of the moved frame: scene " in said
+    after = convert(tmp_path, sources=[source, {**source, "pairs": {**source["pairs"], "side": "after"}}],
+                    **{**options, "name": "both"})
+    said = train("train_flow", after, tmp_path / "both", "--steps", "1", expect=1)
+    assert f"expected flow at the pixels of the next image, or of the previous one (side), got both, in {after}" in said
+
+
+def test_the_slopes_of_an_edge_are_those_of_its_times(monkeypatch):
+    """It goes to the right by a pixel a bin, a quarter of the time's unit: events at pixel x in bin x - 1."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import train_flow
+
+    volume = torch.zeros(1, 18, 12, 12)
+    for b in range(9):
+        volume[0, b, :, b + 1] = 1
+    slope = 0.25 / 1.02
+    expected = torch.zeros(8)
+    expected[0], expected[4] = slope / 1.1, 0.1 * slope / 1.1 / (slope**2 + 0.01)
+    found = train_flow.slopes(volume)[0, :, 3:9, 3:8]  # where a neighbour's neighbour has an event, too
+    torch.testing.assert_close(found, expected[:, None, None].expand_as(found))
+    turned = train_flow.slopes(volume.flip(3).transpose(2, 3))[0, :, 4:9, 3:9]
+    expected = torch.zeros(8)
+    expected[2], expected[6] = -slope / 1.1, -0.1 * slope / 1.1 / (slope**2 + 0.01)
+    torch.testing.assert_close(turned, expected[:, None, None].expand_as(turned))
+
+
+def test_flow_is_true_of_its_crop_and_moves_the_frames(monkeypatch):
+    """A square of events is at a place that the flow names: so it is in every mirrored and turned crop."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import train_flow
+
+    monkeypatch.setattr(train_flow, "AUGMENTATION", train_flow.EventAugmentation(flip=0))
+    here = torch.stack(torch.meshgrid(torch.arange(120.0), torch.arange(100.0), indexing="ij")[::-1])
+    item = {"volume": torch.zeros(2, 120, 100), "flow": torch.tensor([40.0, 60.0])[:, None, None] - here,
+            "valid": torch.ones(120, 100, dtype=torch.bool)}
+    item["volume"][0, 60, 40] = 1
+    seen = set()
+    for _ in range(40):
+        volume, flow, valid = train_flow.Crops([item])[0]
+        assert volume.shape == (2, 96, 96) and valid.shape == (1, 96, 96)
+        (y,), (x,) = np.nonzero(volume[0].numpy())
+        assert flow[:, y, x].tolist() == [0, 0] and flow[:, y - 2, x - 1].tolist() == [1, 2]
+        seen.add((y < 48, x < 48))
+    assert len(seen) > 1
+
+    previous, volume = torch.rand(1, 1, 20, 30), torch.zeros(1, 18, 20, 30)
+    following, volume[0, 3, 5:15, 5:25] = previous.roll((2, -3), (2, 3)), 1
+    flow = torch.tensor([-3.0, 2.0])[:, None, None].expand(2, 20, 30)
+    for position in (0, 1):
+        after, before = train_flow.errors_of_frames(flow, position, previous, following, volume)
+        assert after < 1e-5 and before > 0.1
+
+
 def test_yolov3_learns(data, tmp_path):
     trainer = shutil.copytree(need_trainer("yolov3", "matplotlib", "tqdm"), tmp_path / "trainer")  # nothing beside it
     said = train("train_yolov3", data, tmp_path / "out", "--trainer", trainer, "--dataset", "kitti_object", "--steps",
