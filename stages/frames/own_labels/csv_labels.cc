@@ -45,14 +45,18 @@ constexpr std::array<CsvColumn, kColumnCount> kColumns = {{
     {"track", {"track", "trackid", "objectid", "tracknumber", "instanceid"}},
 }};
 /// Of a detector's results, which are no labels.
-constexpr std::array<std::string_view, 5> kScores = {"score", "confidence", "conf", "probability",
-                                                     "prob"};
+constexpr std::array<std::string_view, 6> kScores = {"score", "scores",      "confidence",
+                                                     "conf",  "probability", "prob"};
 using Row = std::array<std::string_view, kColumnCount>;
 
 std::string plain_name(std::string_view header) {
   std::string name = in_small_letters(std::string(header));
   std::erase_if(name, [](char c) { return c == '_' || c == '-' || c == ' ' || c == '.'; });
   return name;
+}
+
+bool is_score(std::string_view header) {
+  return std::ranges::find(kScores, plain_name(header)) != kScores.end();
 }
 
 /// The place of a header's field among the names of a column; their number if it is none of them.
@@ -88,8 +92,7 @@ Outcome<CsvColumns> columns_of(const CsvRecord& header) {
   };
   for (std::size_t i = 0; i < header.fields.size(); ++i) {
     const std::string name(header.fields[i]);
-    const bool is_score = std::ranges::find(kScores, plain_name(name)) != kScores.end();
-    if (is_score) return refuse(name);
+    if (is_score(name)) return refuse(name);
     std::size_t column = 0;
     while (column < kColumnCount && !is_column(column, name)) ++column;
     if (column == kColumnCount) {
@@ -346,6 +349,12 @@ std::optional<std::filesystem::path> find_csv(const FoundFrames& frames,
 }
 
 }  // namespace
+
+bool has_score_column(std::string_view text) {
+  CsvReader reader(text, separator_of(text));
+  const std::optional<CsvRecord> header = reader.next();
+  return header && std::ranges::any_of(header->fields, is_score);
+}
 
 constinit const LabelReader kCsvReader{LabelFormat::kCsv, open_labels<CsvLabels>, find_csv};
 

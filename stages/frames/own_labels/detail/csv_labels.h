@@ -32,4 +32,7 @@ namespace eventgan {
 std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view text,
                                                              const std::string& path);
 
+/// Whether the table's header has a column of scores.
+bool has_score_column(std::string_view text);
+
 }  // namespace eventgan
