@@ -36,11 +36,6 @@ AffineMap inverse(const AffineMap& map) {
   return {a, b, -a * map[2] - b * map[5], c, d, -c * map[2] - d * map[5]};
 }
 
-Point mapped(const AffineMap& map, Point point) {
-  return {map[0] * point.x + map[1] * point.y + map[2],
-          map[3] * point.x + map[4] * point.y + map[5]};
-}
-
 Point mapped_edge(const AffineMap& map, Point edge) {
   const Point at = mapped(map, {edge.x - 0.5, edge.y - 0.5});
   return {at.x + 0.5, at.y + 0.5};

@@ -27,7 +27,10 @@ AffineMap compose(const AffineMap& second, const AffineMap& first);
 /// Throws std::invalid_argument if it has none.
 AffineMap inverse(const AffineMap& map);
 
-Point mapped(const AffineMap& map, Point point);
+inline Point mapped(const AffineMap& map, Point point) {
+  return {map[0] * point.x + map[1] * point.y + map[2],
+          map[3] * point.x + map[4] * point.y + map[5]};
+}
 
 /// Of a place as edges are counted, which lie half a pixel before the centre of the pixel with
 /// their number.

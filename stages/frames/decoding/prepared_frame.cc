@@ -262,7 +262,7 @@ PixelFlow flow_of(const Moving& moving, const Placement& placement) {
     return seen.at<std::uint16_t>(nearest(source.y, seen.rows), nearest(source.x, seen.cols));
   };
   std::vector<std::optional<AffineMap>> steps;  // from the labelled frame, in the volume
-  const auto step_of = [&](std::size_t number) -> const AffineMap& {
+  const auto step_of = [&](std::size_t number) {
     if (steps.size() <= number) steps.resize(number + 1);
     auto& step = steps[number];
     if (!step) step = compose(compose(to_volume, moving.step(number)), to_source);
@@ -271,17 +271,20 @@ PixelFlow flow_of(const Moving& moving, const Placement& placement) {
   const std::size_t pixels = placement.volume.pixel_count();
   PixelFlow flow{std::vector<float>(2 * pixels), std::vector<std::uint8_t>(pixels)};
   const int right = part.volume_x + part.size.width, bottom = part.volume_y + part.size.height;
+  const double sign = moved_end == 1 ? 1 : -1;  // of time
+  std::size_t last = 0;
+  AffineMap step = step_of(last);
   for (int y = part.volume_y; y < bottom; ++y) {
     const std::size_t row = static_cast<std::size_t>(y) * placement.volume.width;
     for (int x = part.volume_x; x < right; ++x) {
       const Point at{double(x), double(y)};
       const std::size_t number = shown(here, at);
-      const Point moved = mapped(step_of(number), at);
+      if (number != last) step = step_of(last = number);
+      const Point moved = mapped(step, at);
       const double dx = stepped(moved.x - x), dy = stepped(moved.y - y);
       const Point target{x + dx, y + dy};
       const bool is_inside = target.x >= part.volume_x && target.x <= right - 1 &&
                              target.y >= part.volume_y && target.y <= bottom - 1;
-      const double sign = moved_end == 1 ? 1 : -1;  // of time
       const std::size_t pixel = row + static_cast<std::size_t>(x);
       flow.px[pixel] = static_cast<float>(sign * dx + 0.0);  // no -0
       flow.px[pixels + pixel] = static_cast<float>(sign * dy + 0.0);

@@ -273,7 +273,7 @@ cv::Mat StillLayers::seen(const std::vector<AffineMap>& objects) const {
     if (area.empty()) continue;
     constexpr int kHalf = 128;
     seen(area).setTo(static_cast<double>(layer.box + 1),
-                     sampled(layer.cover, layer.area.tl(), map, area, cv::INTER_LINEAR) >= kHalf);
+                     sampled(layer.cover, layer.area.tl(), map, area, cv::INTER_NEAREST) >= kHalf);
   }
   return seen;
 }

@@ -14,6 +14,7 @@
 
 #include "stages/base/images/image_file.h"
 #include "stages/frames/decoding/pair_reader.h"
+#include "stages/frames/decoding/prepared_frame.h"
 #include "tests/testing/temporary_folder.h"
 
 namespace eventgan {
@@ -120,6 +121,31 @@ void prepare(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations());
 }
 
+/// A still's pair of 320x192 with three objects, without and with its optical flow. Items are
+/// pairs.
+void still_pair(benchmark::State& state) {
+  const cv::Mat image = street(0);
+  ImageSpec spec;
+  spec.size = ImageSize{192, 320};
+  FramePair pair;
+  pair.motion = {.x_px = 3, .y_px = -1, .angle_deg = 1, .scale = 1.01};
+  std::vector<Box> boxes;
+  for (const double left : {100.0, 500.0, 900.0}) {
+    const double top = 120, right = left + 200, bottom = 330;
+    boxes.push_back({.class_id = 0,
+                     .xyxy = {left, top, right, bottom},
+                     .outline = {{{{left, top}, {right, top}, {right, bottom}, {left, bottom}}}}});
+    pair.objects.push_back(ImageMotion{.x_px = left / 100});
+  }
+  for (auto _ : state) {
+    PixelFlow flow;
+    benchmark::DoNotOptimize(prepare_still({{image.rows, image.cols}, image.data}, pair, spec,
+                                           boxes, state.range(0) ? &flow : nullptr));
+    benchmark::DoNotOptimize(flow);
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+
 void grey_to_input(benchmark::State& state) {
   const PreparedFrame frame = [] {
     const cv::Mat image = street(0);
@@ -158,6 +184,7 @@ BENCHMARK(decode_png_image)->Unit(benchmark::kMillisecond);
 BENCHMARK(opencv_decodes_png)->Unit(benchmark::kMillisecond);
 BENCHMARK(decode_jpeg_image)->Unit(benchmark::kMillisecond);
 BENCHMARK(prepare)->ArgName("grey_last")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(still_pair)->ArgName("flow")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 BENCHMARK(grey_to_input)->Unit(benchmark::kMillisecond);
 BENCHMARK(read_png_pairs)->ArgName("sharing")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 BENCHMARK(read_jpeg_pairs)->ArgName("sharing")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
