@@ -74,8 +74,7 @@ IntervalFrames frames_of(const Recording& recording, const FrameInterval& interv
           recording.frame(interval.first),
           recording.frame(interval.last),
           std::ssize(events),
-          std::ranges::count(events, true, &Event::positive),
-          {}};
+          std::ranges::count(events, true, &Event::positive)};
 }
 
 namespace {

@@ -31,7 +31,6 @@ struct IntervalFrames {
   GreyImage next;
   std::int64_t event_count = 0;
   std::int64_t positive_count = 0;  ///< of these
-  std::vector<GreyImage> before;    ///< frames before `previous`, oldest first; empty: not read
 };
 
 /// An interval with what the camera saw in it.

@@ -6,21 +6,22 @@
 #include <cmath>
 #include <functional>
 #include <initializer_list>
+#include <map>
 #include <numeric>
 #include <utility>
 
 #include "pipeline/planning/spread.h"
 #include "pipeline/realism/real_interval.h"
 #include "pipeline/realism/volume_method.h"
+#include "pipeline/runtime/threads.h"
+#include "stages/events/simulation/sensor.h"
 
 namespace eventgan {
 namespace {
 
 constexpr std::size_t kMostPairs = 64;
 
-/// Of so many frames before a pair the model looks at, too: a level that is drawn in place of them
-/// (uniform in the band between the thresholds, or triangular) is far off in scenes that are slow
-/// or of little contrast.
+/// So many frames before a pair are of its video, too.
 constexpr std::int64_t kFramesBefore = 8;
 
 constexpr std::uint64_t kSeed = 0;
@@ -87,9 +88,64 @@ void read_pairs(const FitPart& part, std::span<const FrameInterval> pairs,
       });
     }
     frames.push_back(frames_of(recording, pair, events));
-    for (std::int64_t i = std::max(part.first_frame, pair.first - kFramesBefore); i < pair.first;
-         ++i) {
-      frames.back().before.push_back(recording.frame(i));
+  }
+}
+
+/// The frames of one part's pairs and those before them, as one video, cut where others lie
+/// between. A level that is drawn, or that begins anew before each pair, is far off in scenes that
+/// are slow or of little contrast: a pixel's level goes back to its last event, however long ago.
+struct Video {
+  std::vector<GreyImage> frames;
+  std::vector<std::array<std::size_t, 2>> pairs;  ///< places of their first and last frames
+};
+
+Video read_video(const FitPart& part, std::span<const FrameInterval> pairs) {
+  std::map<std::int64_t, std::size_t> places;
+  for (const FrameInterval& pair : pairs) {
+    const std::int64_t first = std::max(part.first_frame, pair.first - kFramesBefore);
+    for (std::int64_t i = first; i <= pair.last; ++i) places[i] = 0;
+  }
+  Video video;
+  for (auto& [frame, place] : places) {
+    place = video.frames.size();
+    video.frames.push_back(part.recording->frame(frame));
+  }
+  for (const FrameInterval& pair : pairs) {
+    video.pairs.push_back({places.at(pair.first), places.at(pair.last)});
+  }
+  return video;
+}
+
+/// Adds for each pair of a video the events of `sensor`, which begins at level 0 with its first
+/// frame. `goes_back_first`: it has seen the video before that, from its end to its beginning.
+void add_video_events(const Video& video, const SensorSpec& sensor, bool goes_back_first,
+                      int threads, std::vector<PolarityCounts>& counts) {
+  const std::size_t steps = video.frames.size() - 1;
+  const std::size_t steps_before = goes_back_first ? steps : 0;
+  const ImageSize size = video.frames.front().size;
+  const auto width = static_cast<std::size_t>(size.width);
+  std::vector<double> times;
+  for (std::size_t i = 0; i <= steps_before + steps; ++i) times.push_back(static_cast<double>(i));
+  std::vector<std::vector<PolarityCounts>> rows(static_cast<std::size_t>(size.height));
+  for_each_index(rows.size(), threads, [&](std::size_t y) {
+    const auto intensity = [&](std::size_t image, int, std::span<float> row) {
+      const std::size_t frame = image < steps_before ? steps_before - image : image - steps_before;
+      std::ranges::transform(std::span(video.frames[frame].pixels).subspan(y * width, width),
+                             row.begin(),
+                             [](std::uint8_t u) { return static_cast<float>(u) / 255.0f; });
+    };
+    rows[y].resize(steps_before + steps);
+    for (const Event& event : pixel_events(sensor, {1, size.width}, intensity, times,
+                                           CounterRandom(kSeed).keyed(std::to_string(y)))) {
+      ++rows[y][static_cast<std::size_t>(std::ceil(event.t_s)) - 1][event.positive ? 0 : 1];
+    }
+  });
+  for (const auto& [first, last] : video.pairs) {
+    PolarityCounts& of_pair = counts.emplace_back();
+    for (const std::vector<PolarityCounts>& row : rows) {
+      for (std::size_t step = steps_before + first; step < steps_before + last; ++step) {
+        for (const std::size_t p : {0, 1}) of_pair[p] += row[step][p];
+      }
     }
   }
 }
@@ -148,9 +204,18 @@ class Sensitivity {
   std::vector<std::vector<PolarityCounts>> counts_;  // by factor, then pair
 };
 
+/// Beyond this share of the threshold another past of the scene is worth a warning.
+constexpr double kMostOfThePast = 0.1;
+
 bool is_at_end(double threshold, const ThresholdRange& range) {
   constexpr double kNear = 1.01;
   return threshold <= range.lowest * kNear || threshold >= range.highest / kNear;
+}
+
+double event_sum(const std::vector<PolarityCounts>& counts) {
+  double sum = 0;
+  for (const auto& [positive, negative] : counts) sum += positive + negative;
+  return sum;
 }
 
 class Fitter {
@@ -158,23 +223,53 @@ class Fitter {
   Fitter(std::span<const IntervalFrames> frames, int threads, SensorFit& fit)
       : frames_(frames), threads_(threads), fit_(fit) {}
 
-  std::optional<FittedThreshold> difference() const {
+  /// `videos`: those of the pairs.
+  std::optional<FittedThreshold> difference(std::span<const Video> videos) const {
+    const auto made = [&](const SensorSpec& sensor, bool goes_back_first = false) {
+      std::vector<PolarityCounts> counts;
+      for (const Video& video : videos) {
+        add_video_events(video, sensor, goes_back_first, threads_, counts);
+      }
+      return counts;
+    };
+    const auto sensor_of = [](double threshold) {
+      return realism_sensor({threshold}, kFrameLogEpsilon);
+    };
+    std::vector<std::size_t> all(frames_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    const double camera = event_sum({wanted(all)});
     const double threshold =
-        fitted_threshold(running_difference_scene(), frames_, kFrameLogEpsilon, kSeed, threads_);
+        fitted_threshold(camera, [&](double tried) { return event_sum(made(sensor_of(tried))); });
     if (is_at_end(threshold, {kLeastFittedThreshold, kMostFittedThreshold})) {
       warn(fmt::format("no threshold of difference in {}..{} makes as many events as the camera",
                        kLeastFittedThreshold, kMostFittedThreshold));
       return std::nullopt;
     }
-    const Sensitivity sensitivity([&](double factor) {
-      return made_events(running_difference_scene(), frames_,
-                         realism_sensor({factor * threshold}, kFrameLogEpsilon), kSeed, threads_);
-    });
+    const Sensitivity sensitivity(
+        [&](double factor) { return made(sensor_of(factor * threshold)); });
     FittedThreshold fitted{{threshold}, {}, {}};
     fitted.mean = bootstrap_bounds(frames_.size(), [&](std::span<const std::size_t> draw) {
-      const auto [positive, negative] = wanted(draw);
-      return threshold * sensitivity.factor(draw, positive + negative, {0, 1});
+      return threshold * sensitivity.factor(draw, event_sum({wanted(draw)}), {0, 1});
     });
+    // Not known are what the pixels saw before the first frame, and how much they differ.
+    const double count = event_sum(made(sensor_of(threshold)));
+    const auto refitted = [&](const std::vector<PolarityCounts>& counts) {
+      return threshold * sensitivity.factor(all, camera * count / event_sum(counts), {0, 1});
+    };
+    SensorSpec alike = sensor_of(threshold);
+    alike.threshold_spread = 0;
+    const double of_another_past = refitted(made(sensor_of(threshold), true));
+    const double unknown =
+        std::abs(of_another_past - threshold) + std::abs(refitted(made(alike)) - threshold);
+    fitted.mean.low -= unknown;
+    fitted.mean.high += unknown;
+    if (std::abs(of_another_past - threshold) > kMostOfThePast * threshold) {
+      warn(
+          fmt::format("the threshold of difference is {:.3g} if pixels saw nothing before the "
+                      "first frame, {:.3g} if they saw the frames backwards: {:.2g} events a pixel "
+                      "and pair are too few to decide; record longer, or more motion",
+                      threshold, of_another_past, camera / pixels()));
+    }
     return fitted;
   }
 
@@ -234,18 +329,20 @@ class Fitter {
     return counts;
   }
 
+  double pixels() const {
+    double pixels = 0;
+    for (const IntervalFrames& frames : frames_) {
+      pixels += static_cast<double>(frames.previous.size.pixel_count());
+    }
+    return pixels;
+  }
+
   void warn(std::string text) const { fit_.warnings.push_back(std::move(text)); }
 
   std::span<const IntervalFrames> frames_;
   int threads_;
   SensorFit& fit_;
 };
-
-double event_sum(const std::vector<PolarityCounts>& counts) {
-  double sum = 0;
-  for (const auto& [positive, negative] : counts) sum += positive + negative;
-  return sum;
-}
 
 /// The camera's events of the kept pairs beside those that are made of them, a pixel.
 std::vector<EventRow> compare(const std::vector<IntervalFrames>& kept, const Generator* network,
@@ -321,11 +418,13 @@ SensorFit fit_sensor(std::span<const FitPart> parts, const Generator* network,
   }
   fit.noise = checked_noise(fit_noise(still), fit.warnings);
   std::vector<IntervalFrames> fitted, kept;
+  std::vector<Video> videos;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const std::span<const std::uint8_t> hot = fit.noise
                                                   ? std::span<const std::uint8_t>(fit.noise->hot[i])
                                                   : std::span<const std::uint8_t>();
     read_pairs(parts[i], pairs[i].fitted, hot, fitted);
+    videos.push_back(read_video(parts[i], pairs[i].fitted));
     read_pairs(parts[i], pairs[i].kept, hot, kept);
   }
   fit.fitted_pairs = fitted.size();
@@ -338,7 +437,7 @@ SensorFit fit_sensor(std::span<const FitPart> parts, const Generator* network,
       fitted, [](const IntervalFrames& frames) { return frames.event_count > 0; });
   if (has_events) {
     const Fitter fitter(fitted, threads, fit);
-    fit.difference = fitter.difference();
+    fit.difference = fitter.difference(videos);
     if (fit.difference) fit.difference_anew = fitter.difference_anew();
     if (network) fit.network = fitter.network(*network);
     if (fitted.size() < 3) {

@@ -27,7 +27,7 @@ struct FitPart {
 /// A threshold with which as many events are made as the camera saw, less its noise.
 struct FittedThreshold {
   ContrastThreshold threshold;
-  Bounds mean;   ///< of the threshold (bootstrap_bounds)
+  Bounds mean;   ///< of the threshold (bootstrap_bounds), wider for `difference` (fit_sensor)
   Bounds ratio;  ///< of its ratio; not told of `difference`, whose ratio is 1
 };
 
@@ -65,8 +65,10 @@ struct SensorFit {
 /// intensity, kFrameLogEpsilon). A pixel has an event where d = L(t) - L(its last event) reaches
 /// C₊ or -C₋. A camera's pixels keep d from pair to pair; from d = 0 at each pair's start small
 /// changes would never add up to an event, and too low a threshold be found (by 0 to 60 %). So the
-/// model `difference` looks at the 8 frames before a pair, too (running_difference_scene), as far
-/// as the part has them, and the first 8 frames (at most a quarter) begin no pair. Which threshold
+/// model `difference` keeps d over all pairs of a part and the 8 frames before each, as if they
+/// were one video, and the first 8 frames (at most a quarter) begin no pair. The threshold's bounds
+/// take in what else d could be at the first frame (the video seen backwards before), with a
+/// warning where that is more than a tenth, and pixels that are all alike. Which threshold
 /// makes as many events from d = 0 is told beside it: of a camera that begins anew with each frame,
 /// and of convert's `difference`, which sees pairs alone.
 ///

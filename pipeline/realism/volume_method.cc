@@ -17,7 +17,6 @@
 #include "pipeline/runtime/threads.h"
 #include "stages/events/drawn_events.h"
 #include "stages/events/event_volume.h"
-#include "stages/events/simulation/simulate_pair.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/generator/shipped_weights.h"
 #include "stages/generator/weights_file.h"
@@ -160,23 +159,6 @@ SimulatedScene simulated_scene(GeneratorKind kind, double displacement_px, int d
           row.moves_one_frame ? draws : 1};
 }
 
-SimulatedScene running_difference_scene() {
-  return {"difference",
-          [](const IntervalFrames& frames, const SensorSpec& sensor, CounterRandom random) {
-            std::vector<GreyImage> images = frames.before;
-            images.push_back(frames.previous);
-            images.push_back(frames.next);
-            const auto steps = static_cast<double>(images.size() - 1);
-            std::vector<Event> events =
-                simulate_images(images, sensor, steps, random, EventOrder::kPixel);
-            const double begin = steps * ((steps - 1) / steps);  // as simulate_images has it
-            std::erase_if(events, [&](const Event& event) { return event.t_s <= begin; });
-            for (Event& event : events) event.t_s = (event.t_s - begin) * frames.duration_s;
-            return events;
-          },
-          1};
-}
-
 SensorSpec realism_sensor(const ContrastThreshold& threshold, double log_epsilon) {
   return ThresholdSpec().applied({.log_epsilon = log_epsilon}, threshold);
 }
@@ -260,17 +242,23 @@ PolarityCounts sum_of(const std::vector<PolarityCounts>& counts) {
 
 }  // namespace
 
-double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFrames> frames,
-                        double log_epsilon, std::uint64_t seed, int threads) {
-  Bisection bisection(event_count(frames, &IntervalFrames::event_count),
-                      {kLeastFittedThreshold, kMostFittedThreshold});
+double fitted_threshold(double wanted, const std::function<double(double threshold)>& made) {
+  Bisection bisection(wanted, {kLeastFittedThreshold, kMostFittedThreshold});
   for (int step = 0; step < kMostSteps; ++step) {
-    const SensorSpec sensor = realism_sensor({bisection.threshold()}, log_epsilon);
-    const auto [positive, negative] = sum_of(made_events(scene, frames, sensor, seed, threads));
-    if (bisection.is_near(positive + negative)) break;
-    bisection.take(positive + negative);
+    const double count = made(bisection.threshold());
+    if (bisection.is_near(count)) break;
+    bisection.take(count);
   }
   return bisection.threshold();
+}
+
+double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFrames> frames,
+                        double log_epsilon, std::uint64_t seed, int threads) {
+  return fitted_threshold(event_count(frames, &IntervalFrames::event_count), [&](double threshold) {
+    const SensorSpec sensor = realism_sensor({threshold}, log_epsilon);
+    const auto [positive, negative] = sum_of(made_events(scene, frames, sensor, seed, threads));
+    return positive + negative;
+  });
 }
 
 ContrastThreshold fitted_threshold(const Generator& generator,

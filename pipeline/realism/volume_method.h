@@ -61,12 +61,6 @@ struct SimulatedScene {
 /// `displacement_px` a frame, and draws `draws` times.
 SimulatedScene simulated_scene(GeneratorKind kind, double displacement_px = 0, int draws = 1);
 
-/// The difference of two frames, of a camera that was on before: a pixel is at level 0 at the first
-/// of IntervalFrames::before, and at `previous` where the frames in between have led it,
-///   d(previous) = L(previous) - L(its last event),
-/// since a camera that records on does not begin each pair anew. Events of the pair alone.
-SimulatedScene running_difference_scene();
-
 /// The sensor of a threshold; its spread over the pixels is 15 % of the lower polarity's, as in
 /// SensorSpec's defaults; no refractory time and no noise.
 SensorSpec realism_sensor(const ContrastThreshold& threshold, double log_epsilon);
@@ -91,9 +85,12 @@ std::vector<PolarityCounts> made_events(const Generator& generator,
 inline constexpr double kLeastFittedThreshold = 0.01;
 inline constexpr double kMostFittedThreshold = 5;
 
-/// The threshold in 0.01..5 with which the model makes as many events as the camera did, over all
-/// of `frames` and the mean of the draws, within 0.5 % or as near as it gets: by bisection, since
-/// a higher threshold makes fewer events. The result does not depend on `threads`.
+/// The threshold in 0.01..5 with which made(threshold) events are as many as wanted, within 0.5 %
+/// or as near as it gets: by bisection, since a higher threshold makes fewer events.
+double fitted_threshold(double wanted, const std::function<double(double threshold)>& made);
+
+/// That with which the model makes as many events as the camera did, over all of `frames` and the
+/// mean of the draws. The result does not depend on `threads`.
 double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFrames> frames,
                         double log_epsilon, std::uint64_t seed, int threads);
 

@@ -73,7 +73,7 @@ TEST(ReadInterval, HasTheIntervalsFramesEventsAndFlow) {
 }
 
 TEST(NetworkInput, IsBothFramesInMinusOneToOne) {
-  const IntervalFrames frames{{0, 1}, 0.1, {{1, 2}, {0, 255}}, {{1, 2}, {51, 204}}, 0, 0, {}};
+  const IntervalFrames frames{{0, 1}, 0.1, {{1, 2}, {0, 255}}, {{1, 2}, {51, 204}}, 0, 0};
   EXPECT_THAT(network_input(frames),
               ElementsAre(-1.0f, 1.0f, ::testing::FloatEq(-0.6f), ::testing::FloatEq(0.6f)));
 }

@@ -128,15 +128,17 @@ FakeRecording scene_recording(const Scene& scene) {
   return recording_of(frames, std::move(events));
 }
 
-/// Soft waves before a camera that pans slowly; the first `earlier` frames are before frame 0.
-std::vector<GreyImage> panned_frames(int count, int earlier) {
+/// Soft waves before a camera that pans; the first `earlier` frames are before frame 0.
+std::vector<GreyImage> panned_frames(int count, int earlier, double speed) {
   std::vector<GreyImage> frames;
   for (int i = -earlier; i < count; ++i) {
     GreyImage& frame =
         frames.emplace_back(kSceneSize, std::vector<std::uint8_t>(kSceneSize.pixel_count()));
     for (int y = 0; y < kSceneSize.height; ++y) {
       for (int x = 0; x < kSceneSize.width; ++x) {
-        const double u = x + 14 * std::sin(0.13 * i), v = y + 9 * std::sin(0.21 * i + 1) + 0.3 * i;
+        const double at = speed * i;
+        const double u = x + 14 * std::sin(0.13 * at);
+        const double v = y + 9 * std::sin(0.21 * at + 1) + 0.3 * at;
         const double waves = std::sin(0.21 * u + 0.05 * v) + std::sin(0.17 * v - 0.11 * u) +
                              std::sin(0.31 * u + 0.29 * v);
         frame.pixels[static_cast<std::size_t>(y * kSceneSize.width + x)] =
@@ -199,18 +201,37 @@ TEST(FitSensor, FindsTheThresholdAndTheNoiseOfACamera) {
 }
 
 TEST(FitSensor, FindsTheThresholdOfACameraThatKeepsItsLevels) {
-  constexpr int kEarlier = 20;  // the camera was on before
-  for (const double threshold : {0.15, 0.2, 0.4}) {
+  struct Case {
+    double threshold;
+    double spread;
+    int earlier;  ///< frames before those that are read
+    double speed;
+    double error;  ///< at most, as a share
+    bool warns;    ///< of what the pixels saw before
+  };
+  const Case cases[] = {{0.15, 0.15, 20, 1, 0.05, false}, {0.2, 0.15, 20, 1, 0.05, false},
+                        {0.4, 0.15, 20, 1, 0.05, false},  {0.5, 0.02, 0, 0.3, 0.05, true},
+                        {0.7, 0.02, 0, 1, 0.05, false},   {0.7, 0.02, 40, 0.1, 0.5, true}};
+  for (const auto& [threshold, spread, earlier, speed, error, warns] : cases) {
+    SCOPED_TRACE(threshold);
+    const double earlier_s = earlier * kInterval_s;
     const Scene scene{
-        .positive_threshold = threshold, .negative_threshold = threshold, .spread = 0.15};
-    std::vector<GreyImage> frames = panned_frames(25, kEarlier);
+        .positive_threshold = threshold, .negative_threshold = threshold, .spread = spread};
+    std::vector<GreyImage> frames = panned_frames(44, earlier, speed);
     std::vector<Event> events = camera_events(frames, scene, /*anew=*/false);
-    std::erase_if(events, [](const Event& event) { return event.t_s <= kEarlier * kInterval_s; });
-    for (Event& event : events) event.t_s -= kEarlier * kInterval_s;
-    frames.erase(frames.begin(), frames.begin() + kEarlier);
+    std::erase_if(events, [&](const Event& event) { return event.t_s <= earlier_s; });
+    for (Event& event : events) event.t_s -= earlier_s;
+    frames.erase(frames.begin(), frames.begin() + earlier);
     const SensorFit fit = fit_camera(recording_of(frames, events));
     ASSERT_TRUE(fit.difference && fit.difference_anew);
-    EXPECT_NEAR(fit.difference->threshold.mean, threshold, 0.1 * threshold);
+    EXPECT_LT(fit.difference->mean.low, threshold);
+    EXPECT_GT(fit.difference->mean.high, threshold);
+    EXPECT_NEAR(fit.difference->threshold.mean, threshold, error * threshold);
+    EXPECT_EQ(std::ranges::count_if(fit.warnings,
+                                    [](const std::string& warning) {
+                                      return warning.find("frames backwards") != std::string::npos;
+                                    }),
+              warns);
     EXPECT_LT(*fit.difference_anew, 0.85 * threshold);  // pairs alone lack what came before
     const auto told = fit.sensor("n", "").threshold;    // for convert, whose pairs begin anew
     ASSERT_EQ(told.has_value(), fit.is_better("difference").value());

@@ -24,7 +24,7 @@ TEST(NetworkMethod, GivesTheFramesToTheGenerator) {
   const auto method = make_network_method(std::make_unique<testing::FakeGenerator>(1), "w.st",
                                           std::nullopt, false, 0);
   // The fake's volume of one bin is max(next - previous, 0) and max(previous - next, 0).
-  const IntervalFrames frames{{0, 1}, 0.1, {{1, 2}, {0, 255}}, {{1, 2}, {255, 204}}, 0, 0, {}};
+  const IntervalFrames frames{{0, 1}, 0.1, {{1, 2}, {0, 255}}, {{1, 2}, {255, 204}}, 0, 0};
   EXPECT_THAT(method->volume(frames, 0), ElementsAre(2.0f, 0.0f, 0.0f, FloatEq(0.4f)));
   EXPECT_EQ(method->name(), "network");
   EXPECT_EQ(method->draws(), 1);
@@ -54,7 +54,7 @@ TEST(NetworkMethod, DrawsEventsOfTheSensorItIsTold) {
       Not(HasSubstr("fitted")));
   // A rise of 0.1 at each of 64 pixels, of C+ = 0.4 / sqrt(0.25) = 0.8: rates 0.1 (b + 1)/3 / 0.8
   // in the three bins, a quarter of an event in all.
-  IntervalFrames frames{{0, 1}, 0.1, {{8, 8}, std::vector<std::uint8_t>(64, 100)}, {}, 0, 0, {}};
+  IntervalFrames frames{{0, 1}, 0.1, {{8, 8}, std::vector<std::uint8_t>(64, 100)}, {}, 0, 0};
   frames.next = {{8, 8}, std::vector<std::uint8_t>(64, 113)};  // 26/255 = 0.102
   const std::vector<float> first = method->volume(frames, 0);
   EXPECT_EQ(method->volume(frames, 0), first);
@@ -99,7 +99,7 @@ SimulatedScene inverse_scene(double scale, int draws = 1) {
 std::vector<IntervalFrames> intervals_of(const std::vector<std::int64_t>& event_counts) {
   std::vector<IntervalFrames> frames;
   for (const std::int64_t count : event_counts) {
-    frames.push_back({{0, 1}, 0.1, {{1, 1}, {0}}, {{1, 1}, {0}}, count, 0, {}});
+    frames.push_back({{0, 1}, 0.1, {{1, 1}, {0}}, {{1, 1}, {0}}, count, 0});
   }
   return frames;
 }
@@ -117,7 +117,7 @@ TEST(FittedThreshold, MakesAsManyEventsAsTheCameraWithinItsRange) {
 
 /// One pixel that rises by 2 and one that falls by 0.4, with the camera's events of them.
 IntervalFrames rise_and_fall(std::int64_t positive, std::int64_t negative) {
-  return {{0, 1}, 0.1, {{1, 2}, {0, 255}}, {{1, 2}, {255, 204}}, positive + negative, positive, {}};
+  return {{0, 1}, 0.1, {{1, 2}, {0, 255}}, {{1, 2}, {255, 204}}, positive + negative, positive};
 }
 
 TEST(FittedThreshold, OfANetworkIsThatOfEachPolarity) {
@@ -171,22 +171,6 @@ TEST(DifferenceScene, HasEventsWhereTheFramesDiffer) {
     EXPECT_EQ(positive > 0, frames.next.pixels[i] > frames.previous.pixels[i]) << i;
   }
   EXPECT_THAT(method->settings(), HasSubstr("0.2 (fitted)"));
-}
-
-TEST(RunningDifferenceScene, HasWhatAddsUpFromFramesBefore) {
-  // Of ln(u/255 + 0.02) the levels 120, 140 and 160 are 0.174, 0.323 and 0.452 above 100. So with
-  // 0.2 the level moves on once before the pair; in it 0.4 is reached.
-  const auto grey = [](std::uint8_t u) { return GreyImage{{1, 1}, {u}}; };
-  SensorSpec sensor = realism_sensor({0.2}, 0.02);
-  sensor.threshold_spread = 0;
-  IntervalFrames frames{{2, 3}, 0.5, grey(140), grey(160), 0, 0, {grey(100), grey(120)}};
-  const std::vector<Event> events =
-      running_difference_scene().events(frames, sensor, CounterRandom(0));
-  ASSERT_EQ(events.size(), 1u);
-  EXPECT_TRUE(events[0].positive);
-  EXPECT_NEAR(events[0].t_s, 0.5 * (0.4 - 0.323) / (0.452 - 0.323), 0.005);
-  frames.before.clear();
-  EXPECT_TRUE(running_difference_scene().events(frames, sensor, CounterRandom(0)).empty());
 }
 
 TEST(EsimScene, DrawsDifferAndComeBack) {
