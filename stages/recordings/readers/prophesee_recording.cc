@@ -142,7 +142,7 @@ struct WordCounts {
   std::int64_t left_out = 0;    ///< events before their time and place were told
   std::int64_t outside = 0;     ///< events beside the sensor
   std::int64_t reserved = 0;    ///< words of types that mean nothing
-  std::int64_t steps_back = 0;  ///< events before an earlier one
+  std::int64_t steps_back = 0;  ///< events before an earlier one, by too much to be lifted
 };
 
 /// What a word's meaning depends on: all that the words before it have said.
@@ -155,7 +155,7 @@ struct WordState {
   std::optional<int> vector_x;           ///< EVT 3.0: of the next vector's first pixel
   bool vector_on = false;
   bool is_second_camera = false;
-  std::int64_t last_us = 0;  ///< of the last event
+  std::int64_t last_us = 0;  ///< of the last event that was not lifted
   WordCounts counts;
 };
 
@@ -181,8 +181,10 @@ std::int64_t counted(const WordState& state, int bits) {
 }
 
 StoredEvent event_at(WordState& state, std::int64_t time_us, int x, int y, std::uint32_t on) {
-  if (time_us < state.last_us) ++state.counts.steps_back;
-  state.last_us = time_us;
+  constexpr auto kMostLift_us = static_cast<std::int64_t>(kMostLift_s * 1e6) + 1;
+  const bool is_back = time_us <= state.last_us - kMostLift_us;
+  if (is_back) ++state.counts.steps_back;
+  if (is_back || time_us > state.last_us) state.last_us = time_us;
   return {static_cast<double>(x), static_cast<double>(y),
           static_cast<double>(time_us - state.shift_us) / 1e6, static_cast<double>(on)};
 }
@@ -334,7 +336,7 @@ class PropheseeEvents final : public EventParts {
   /// `index_key`: of the file, made before it was opened (event_index_key); empty: none.
   PropheseeEvents(std::unique_ptr<const RecordingFile> file, std::string index_key,
                   PropheseeEncoding encoding, std::int64_t first_byte, ImageSize size, bool shifts)
-      : EventParts(file->name()),
+      : EventParts(file->name(), recent_events(), kMostLift_s),
         file_(std::move(file)),
         encoding_(encoding),
         size_(size),

@@ -82,7 +82,7 @@ TEST_F(PropheseeTest, GoesOnWhereDatWraps) {
   EXPECT_THAT(
       events_of(kDatHeader + words<std::uint64_t>({dat(0xffffffff, 1, 1, 1), dat(0, 1, 1, 1)})),
       ElementsAre(Event{1, 1, 4294.967295, true}, Event{1, 1, 4294.967296, true}));
-  expect_refused(kDatHeader + words<std::uint64_t>({dat(10, 1, 1, 1), dat(9, 1, 1, 1)}),
+  expect_refused(kDatHeader + words<std::uint64_t>({dat(2010, 1, 1, 1), dat(10, 1, 1, 1)}),
                  "in " + path_.string() + " (event 1)");
 }
 
@@ -104,11 +104,11 @@ TEST_F(PropheseeTest, GoesOnWhereEvt2Wraps) {
   // A step back: the windows that touch it are refused, the others are not.
   const auto stepped =
       open(kEvt2Header +
-           words<std::uint32_t>({evt2_high(8), evt2(0, 1, 1, 1), evt2_high(9), evt2(3, 1, 1, 1),
-                                 evt2(2, 1, 1, 1), evt2_high(20), evt2(0, 2, 1, 1)}));
+           words<std::uint32_t>({evt2_high(8), evt2(0, 1, 1, 1), evt2_high(49), evt2(3, 1, 1, 1),
+                                 evt2_high(9), evt2(3, 1, 1, 1), evt2_high(60), evt2(0, 2, 1, 1)}));
   EXPECT_THROWS(stepped->events_in(0, 1), InputError, "expected times that never decrease");
   EXPECT_EQ(stepped->events_in(0, 577e-6).size(), 1u);
-  EXPECT_EQ(stepped->events_in(579e-6, 1).size(), 1u);
+  EXPECT_EQ(stepped->events_in(3139e-6, 1).size(), 1u);
   EXPECT_THAT(stepped->notes(), ElementsAre(HasSubstr("before an earlier one, and their windows at "
                                                       "fault: 1, in ")));
 }
@@ -216,8 +216,8 @@ TEST_F(PropheseeTest, GoesOnWhereEvt3Wraps) {
       EXPECT_THAT([&] { fell->events_in(0, 16); }, ::testing::Throws<InputError>());
     }
   }
-  expect_refused(kEvt3Header + words<std::uint16_t>({evt3(kHigh, 1), evt3(kLow, 9), evt3(kY, 0),
-                                                     evt3(kX, 1), evt3(kLow, 8), evt3(kX, 1)}),
+  expect_refused(kEvt3Header + words<std::uint16_t>({evt3(kHigh, 1), evt3(kLow, 3009), evt3(kY, 0),
+                                                     evt3(kX, 1), evt3(kLow, 9), evt3(kX, 1)}),
                  "expected times that never decrease");
 }
 
@@ -233,14 +233,16 @@ TEST_F(PropheseeTest, StepsBackOverAWrap) {
   };
   for (const std::uint32_t back : {1, 2, 1000}) {
     SCOPED_TRACE(back);
-    expect_last_at(kDatHeader + words<std::uint64_t>({dat(0xffffffff, 1, 1, 1), dat(0, 1, 1, 1),
-                                                      dat(0 - back, 1, 1, 1), dat(99, 1, 1, 1)}),
-                   4294.967296, (4294967296 + 99) / 1e6);
+    expect_last_at(
+        kDatHeader + words<std::uint64_t>({dat(0xffffffff, 1, 1, 1), dat(0, 1, 1, 1),
+                                           dat(0 - 2000 * back, 1, 1, 1), dat(99, 1, 1, 1)}),
+        4294.967296, (4294967296 + 99) / 1e6);
     const auto high = [](std::uint32_t value) { return evt2_high(value & 0xfffffff); };
-    expect_last_at(kEvt2Header + words<std::uint32_t>(
-                                     {high(0xfffffff), evt2(0, 1, 1, 1), high(0), evt2(0, 1, 1, 1),
-                                      high(0 - back), evt2(0, 1, 1, 1), high(1), evt2(0, 1, 1, 1)}),
-                   17179.869184, (17179869184 + 64) / 1e6);
+    expect_last_at(
+        kEvt2Header + words<std::uint32_t>({high(0xfffffff), evt2(0, 1, 1, 1), high(0),
+                                            evt2(0, 1, 1, 1), high(0 - 32 * back), evt2(0, 1, 1, 1),
+                                            high(1), evt2(0, 1, 1, 1)}),
+        17179.869184, (17179869184 + 64) / 1e6);
     const int late = 4096 - static_cast<int>(back);
     expect_last_at(
         kEvt3Header + words<std::uint16_t>({evt3(kY, 0), evt3(kHigh, 4095), evt3(kX, 1),
