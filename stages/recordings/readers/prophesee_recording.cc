@@ -29,7 +29,10 @@ struct PropheseeHeader {
   std::string version;                        ///< DAT
   std::optional<int> width;
   std::optional<int> height;
-  bool is_legacy = false;  ///< EVT 2.1: the halves of a word are exchanged
+  std::optional<bool> is_legacy;  ///< EVT 2.1: the halves of a word are exchanged
+  /// Who made it, by the lines' keys; empty: not told.
+  std::string integrator, camera_integrator, plugin_integrator;
+  int system_id = 0;  ///< of the camera; 0: not told
   std::int64_t end_byte = 0;
 };
 
@@ -102,7 +105,28 @@ void read_header_line(std::string_view key, std::string_view value, PropheseeHea
     tell(header.height, pixels_of(value, key), key);
   } else if (key == "endianness") {
     read_endianness(value, header);
+  } else if (key == "integrator_name") {
+    header.integrator = value;
+  } else if (key == "camera_integrator_name") {
+    header.camera_integrator = value;
+  } else if (key == "plugin_integrator_name") {
+    header.plugin_integrator = value;
+  } else if (key == "system_ID") {
+    std::from_chars(value.data(), value.data() + value.size(), header.system_id);
   }
+}
+
+/// Whether words of EVT 2.1 have their halves exchanged. Prophesee's cameras before the EVK2 Saphir
+/// wrote them so without a word, which OpenEB knows by these lines (psee_raw_file_header.cpp).
+bool has_exchanged_halves(const PropheseeHeader& header) {
+  constexpr std::string_view kProphesee = "Prophesee";
+  constexpr int kEvk2Saphir = 55;
+  if (header.is_legacy) return *header.is_legacy;
+  const bool is_told = !header.camera_integrator.empty() || !header.plugin_integrator.empty();
+  const bool is_prophesees =
+      is_told ? header.camera_integrator == kProphesee && header.plugin_integrator == kProphesee
+              : header.integrator.empty() || header.integrator == kProphesee;
+  return is_prophesees && header.system_id > 0 && header.system_id < kEvk2Saphir;
 }
 
 [[noreturn]] void refuse_at(const std::string& fault, const std::string& name, std::int64_t byte) {
@@ -344,7 +368,10 @@ class PropheseeEvents final : public EventParts {
         end_byte_(file_->end_byte() - (file_->end_byte() - first_byte) % word_bytes()) {
     EventIndexes* const indexes = EventIndexes::current();
     std::string key = std::move(index_key);
-    if (!key.empty()) key += fmt::format(" {} {} {}", to_string(size), first_byte, shifts);
+    if (!key.empty()) {
+      key += fmt::format(" {} {} {} {}", to_string(size), static_cast<int>(encoding), first_byte,
+                         shifts);
+    }
     if (indexes != nullptr && !key.empty() && restore(indexes->find(key).value_or(""))) return;
     DecodingStart start{first_byte, {}};
     while (start.byte < end_byte_) {
@@ -358,8 +385,22 @@ class PropheseeEvents final : public EventParts {
     if (indexes != nullptr && !key.empty()) indexes->keep(key, to_bytes());
   }
 
-  /// What a user should know goes into `parts`, which has its name.
+  /// The share of what makes no sense among all that was read.
+  double nonsense() const {
+    const auto odd = static_cast<double>(counts_.left_out + counts_.outside + counts_.reserved +
+                                         counts_.steps_back);
+    return odd == 0 ? 0 : odd / (odd + static_cast<double>(count()));
+  }
+
+  /// What a user should know goes into `parts`, which has its name. Throws InputError where all
+  /// events are left out.
   void tell(StoredParts& parts) const {
+    if (count() == 0 && counts_.left_out + counts_.outside > 0) {
+      throw InputError(fmt::format(
+          "expected events on the sensor of {}, got none: {} beside it, {} before the first time "
+          "and place, words of reserved types: {}, in {}",
+          to_string(size_), counts_.outside, counts_.left_out, counts_.reserved, parts.name));
+    }
     const auto note = [&](std::int64_t number, std::string_view what) {
       if (number > 0) parts.notes.push_back(fmt::format("{}: {}, in {}", what, number, parts.name));
     };
@@ -524,20 +565,35 @@ StoredParts open_prophesee(const std::filesystem::path& path, const RecordingOpt
     }
     header.end_byte = end;
   }
-  if (header.is_legacy) {
-    if (header.encoding != PropheseeEncoding::kEvt21) {
-      refuse_at("expected little-endian words, got others", file->name(), 0);
-    }
-    header.encoding = PropheseeEncoding::kEvt21Legacy;
+  if (header.encoding == PropheseeEncoding::kEvt21) {
+    if (has_exchanged_halves(header)) header.encoding = PropheseeEncoding::kEvt21Legacy;
+  } else if (header.is_legacy.value_or(false)) {
+    refuse_at("expected little-endian words, got others", file->name(), 0);
   }
   StoredParts parts{file->name(), {}, nullptr};
   const bool is_told = header.width && header.height;
   parts.size =
       sensor_size(is_told ? std::optional(ImageSize{*header.height, *header.width}) : std::nullopt,
                   options.sensor, parts);
-  auto events =
-      std::make_unique<PropheseeEvents>(std::move(file), std::move(index_key), *header.encoding,
-                                        header.end_byte, parts.size, options.time_shift);
+  const auto read = [&](PropheseeEncoding encoding) {
+    return std::make_unique<PropheseeEvents>(std::make_unique<const RecordingFile>(path), index_key,
+                                             encoding, header.end_byte, parts.size,
+                                             options.time_shift);
+  };
+  auto events = read(*header.encoding);
+  const bool is_legacy = header.encoding == PropheseeEncoding::kEvt21Legacy;
+  constexpr double kGarbage = 0.2, kSense = 0.01;
+  if ((is_legacy || header.encoding == PropheseeEncoding::kEvt21) &&
+      events->nonsense() > kGarbage) {
+    auto exchanged = read(is_legacy ? PropheseeEncoding::kEvt21 : PropheseeEncoding::kEvt21Legacy);
+    if (exchanged->count() > 0 && exchanged->nonsense() < kSense) {
+      parts.warnings.push_back(fmt::format(
+          "words of EVT 2.1 are read as \"endianness={}\": the header has them in the other order, "
+          "in which {:.0f} % of what is read makes no sense, in {}",
+          is_legacy ? "little" : "legacy", 100 * events->nonsense(), parts.name));
+      events = std::move(exchanged);
+    }
+  }
   events->tell(parts);
   parts.events = std::move(events);
   return parts;
