@@ -395,7 +395,7 @@ class PropheseeEvents final : public EventParts {
   /// What a user should know goes into `parts`, which has its name. Throws InputError where all
   /// events are left out.
   void tell(StoredParts& parts) const {
-    if (count() == 0 && counts_.left_out + counts_.outside > 0) {
+    if (count() == 0 && counts_.left_out + counts_.outside + counts_.reserved > 0) {
       throw InputError(fmt::format(
           "expected events on the sensor of {}, got none: {} beside it, {} before the first time "
           "and place, words of reserved types: {}, in {}",

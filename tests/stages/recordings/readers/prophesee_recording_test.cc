@@ -317,8 +317,10 @@ TEST_F(PropheseeTest, PassesOverWordsThatMeanNothing) {
   EXPECT_THAT(evt3_file->notes(),
               ElementsAre(HasSubstr("reserved types are passed over: 3, in "),
                           HasSubstr("behind the last word are passed over: 1")));
-  EXPECT_THAT(open(kEvt2Header + words<std::uint32_t>({evt2_high(1), 0x20000000}) + "123")->notes(),
-              ElementsAre(HasSubstr("passed over: 1, in "), HasSubstr("passed over: 3, in ")));
+  EXPECT_THAT(
+      open(kEvt2Header + words<std::uint32_t>({evt2_high(1), evt2(0, 1, 1, 1), 0x20000000}) + "123")
+          ->notes(),
+      ElementsAre(HasSubstr("passed over: 1, in "), HasSubstr("passed over: 3, in ")));
   EXPECT_THAT(open(kDatHeader + "12345678901")->notes(), ElementsAre(HasSubstr("over: 3, in ")));
 }
 
