@@ -388,27 +388,33 @@ class WithoutFrames(program.InFolder):
 
     def test_prophesees_boxes(self):
         write_columns(self.folder / "drive_td.h5", self.events, size=(HEIGHT, WIDTH), compression="gzip")
-        boxes = np.zeros(3, BBOX)
+        boxes = np.zeros(6, BBOX)
         boxes[:] = [(20_100_000, 2, 3, 10.5, 7, 0, 5, 1), (20_100_000, 4, 4, 4, 4, 2, 6, 0.5),
-                    (20_300_000, 0, 0, 32, 24, 2, 6, 1)]
+                    (20_300_000, 0, 0, 32, 24, 2, 6, 1), (20_100_000, WIDTH, 3, 9, 9, 1, 7, 1),
+                    (20_200_000, -5, 20, 9, 9, 2, 8, 1), (20_250_000, 3, 3, 0, 9, 2, 8, 1)]
         np.save(self.folder / "drive_bbox.npy", boxes)
         (self.folder / "label_map_dictionary.json").write_text('{"0": "pedestrian", "1": "two wheeler", "2": "car"}')
-        self.convert("drive_td.h5")
+        for told in self.convert("drive_td.h5"):
+            self.assertIn("1 file with boxes beyond the sensor: 1 cut to it, 2 left out", told)
         samples = rows(self.out)
-        self.assertEqual(list(samples), ["drive_td/0000000020.100000", "drive_td/0000000020.300000"])
-        for sample, end in zip(samples.values(), (20.1, 20.3)):
+        self.assertEqual([(name[-9:], sample["xyxy"].tolist()) for name, sample in samples.items()],
+                         [("20.100000", [[2, 3, 12.5, 10], [4, 4, 8, 8]]), ("20.200000", [[0, 20, 4, HEIGHT]]),
+                          ("20.250000", []), ("20.300000", [[0, 0, WIDTH, HEIGHT]])])
+        for sample, end in zip(samples.values(), (20.1, 20.2, 20.25, 20.3)):
             window = self.events[(self.events[:, 2] > end - 0.05) & (self.events[:, 2] <= end)]
             np.testing.assert_allclose(sample["volume"], volume_of(window), rtol=0, atol=1e-4)
-        self.assertEqual(samples["drive_td/0000000020.100000"]["xyxy"].tolist(), [[2, 3, 12.5, 10], [4, 4, 8, 8]])
-        with h5py.File(next(self.out.glob("*-of-*.h5"))) as shard:
-            names = [text(name) for name in shard["labels/boxes/class_id"].attrs["class_names"]]
-            self.assertEqual([names[k] for k in shard["labels/boxes/class_id"][:]], ["pedestrian", "car", "car"])
-            self.assertEqual(shard["labels/boxes/track_id"][:].tolist(), [5, 6, 6])
+        boxes_of_shards = []
+        for path in sorted(self.out.glob("*-of-*.h5")):
+            with h5py.File(path) as shard:
+                stored = shard["labels/boxes"]
+                names = [text(name) for name in stored["class_id"].attrs["class_names"]]
+                boxes_of_shards += zip((names[k] for k in stored["class_id"][:]), stored["track_id"][:].tolist())
+        self.assertEqual(sorted(boxes_of_shards), [("car", 6), ("car", 6), ("car", 8), ("pedestrian", 5)])
         boxes["w"][1] = np.nan
         boxes["class_id"][2] = 7
         np.save(self.folder / "drive_bbox.npy", boxes)
         error = self.refused({"root": "drive_td.h5", "window_s": 0.05})
-        self.assertIn("expected w in 0..1e+06, got nan", error)
+        self.assertIn("expected w in -1e+06..1e+06, got nan", error)
         self.assertIn("drive_bbox.npy (row 1)", error)
         self.assertIn("expected a class of label_map_dictionary.json, got class_id 7", error)
 

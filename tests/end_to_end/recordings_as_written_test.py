@@ -113,11 +113,15 @@ class AsWritten(program.InFolder):
                     # From the earlier block's first to the later one's last event, each window is in doubt.
                     self.check_windows(self.events, invalid)
 
-    def test_one_exchanged_pair_is_the_fault_of_its_window(self):
-        k = 1 + int(np.searchsorted(self.events[:, 2], 1.7))
-        events = self.events.copy()
-        events[[k, k + 1]] = events[[k + 1, k]]
-        self.assertLess(events[k + 1, 2], events[k, 2])
+    def test_an_exchanged_pair_is_lifted_or_the_fault_of_its_window(self):
+        times, steps = self.events[1:, 2], np.diff(self.events[:, 2])
+        lifted = int(np.flatnonzero((steps > 0) & (steps < 0.0009) & (times > 3.2))[0])
+        k = int(np.flatnonzero((steps > 0.0021) & (times > 1.7))[0])
+        small, events, expected = self.events.copy(), self.events.copy(), self.events.copy()
+        for exchanged, places in ((small, (lifted,)), (events, (lifted, k)), (expected, (lifted,))):
+            for i in places:
+                exchanged[[i, i + 1]] = exchanged[[i + 1, i]]
+        expected[lifted + 1, 2] = expected[lifted, 2]
         folder = self.folder / "all"
         folder.mkdir()
         write_dat(folder / "a_td.dat", events)
@@ -127,9 +131,11 @@ class AsWritten(program.InFolder):
                                              events[:, 3] > 0)):  # polarity as bool: an enum in HDF5
                 file[f"events/{name}"] = values
             file["events/height"], file["events/width"] = HEIGHT, WIDTH
-        write_dat(folder / "d_td.dat", self.events)
-        self.assertIn("3 quarantined", self.convert("all")[0])
-        self.assertEqual(self.check_windows(self.events, invalid=3), 32)
+        write_dat(folder / "d_td.dat", small)
+        told = self.convert("all")[0]
+        self.assertIn("3 quarantined", told)
+        self.assertIn("1 is lifted to the latest before, in ", told)
+        self.assertEqual(self.check_windows(expected, invalid=3), 32)
         for reason in quarantined(self.out).values():
             self.assertIn("expected times that never decrease", reason)
             self.assertIn(f"(event {k + 1})", reason)
@@ -159,7 +165,7 @@ class AsWritten(program.InFolder):
         with h5py.File(self.folder / "nosize_td.h5", "w") as file:
             for name, values in zip("xytp", (*self.events.T[:2].astype(np.uint16), ticks, self.events[:, 3] > 0)):
                 file[f"events/{name}"] = values
-        for name, why in {"evt21.raw": "words of reserved types are passed over: ",
+        for name, why in {"evt21.raw": "expected events on the sensor of 32x24, got none: ",
                           "disagree.raw": "expected lines that agree, got another \"height\"",
                           "ecf.hdf5": "(metavision_file_to_csv writes a table of it, which is read)",
                           "arr0.npz": "got arrays arr_0.npy", "ts.npy": "got fields ts, x, y, p",
@@ -185,6 +191,20 @@ class AsWritten(program.InFolder):
         error = self.convert("data", errors=LENIENT)[1]
         self.assertIn("truncated file", error)
         self.assertEqual(self.check_windows(self.events), 8)
+
+    def test_a_table_without_events_is_a_still_scene(self):
+        folder = self.folder / "windows"
+        folder.mkdir()
+        for name, events in (("a", self.events), ("b", self.events[:0])):
+            self.table(f"windows/{name}.npy", events)
+            (folder / f"{name}.txt").write_text("0 0.5 0.5 0.25 0.5\n")
+        size = f"{WIDTH}x{HEIGHT}"
+        told, warned = run("convert", folder, "--output", self.out, "--sensor", size)
+        self.assertIn("boxes: 2 0\n", told)
+        for text in (told, warned):
+            self.assertIn("1 recording without events (1 empty event volume): ", text)
+        volumes = [volume for _, valid, _, volume in self.samples() if valid]
+        self.assertEqual([volume.any() for volume in volumes], [True, False])
 
     def test_v2es_texts_begin_with_comments(self):
         (self.folder / "v2e" / "images").mkdir(parents=True)

@@ -21,6 +21,7 @@
 #include "manifests/values/faults.h"
 #include "stages/frames/events/recording_folder.h"
 #include "stages/frames/events/recording_labels.h"
+#include "stages/frames/listing/source_folders.h"
 #include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
@@ -125,6 +126,7 @@ class RecordingDataset final : public Dataset {
       list_times(name, recorded);
       compare_clocks(recorded, std::span(labelled_).subspan(first));
     }
+    tell_counts();
     if (labelled_.empty()) {
       throw InputError("expected labels or frames to make samples of, got none, in " + spec.root);
     }
@@ -281,6 +283,7 @@ class RecordingDataset final : public Dataset {
       try {
         open(entry->second, base);
         if (entry->second.is_window()) read_window(entry->second);
+        fit_boxes(entry->second);
         ++entry;
       } catch (const InputError& error) {
         if (is_one) throw;
@@ -332,14 +335,6 @@ class RecordingDataset final : public Dataset {
   }
 
   void open_without_frames(Recorded& recorded) const {
-    if (!recorded.event_span) {
-      // What was passed over may be why: words of another format than the header's, another sensor.
-      std::vector<std::string> passed_over = recorded.recording->warnings();
-      std::ranges::move(recorded.recording->notes(), std::back_inserter(passed_over));
-      throw InputError(fmt::format(
-          "expected events or frames, got neither, in {}{}", recorded.path,
-          passed_over.empty() ? "" : fmt::format(" ({})", fmt::join(passed_over, "; "))));
-    }
     const bool is_labelled = !recorded.label_file.empty();
     if (!window_.duration_s && !(is_labelled && window_.events) && !recorded.is_window()) {
       throw InputError(
@@ -347,8 +342,13 @@ class RecordingDataset final : public Dataset {
                       is_labelled ? " or window_events" : ", or labels",
                       window_.events ? "window_events alone" : "neither", recorded.path));
     }
-    recorded.span = *recorded.event_span;
-    if (is_labelled) return;
+    // A still scene begins at 0, and nothing tells how long it lasts.
+    recorded.span = recorded.event_span.value_or(std::array{0.0, 0.0});
+    if (is_labelled) {
+      constexpr double kEver = std::numeric_limits<double>::infinity();
+      if (!recorded.event_span && !recorded.is_window()) recorded.span = {-kEver, kEver};
+      return;
+    }
     const double length_s = *window_.duration_s;
     const double begin_s = recorded.span[0] - kJustBefore_s;
     const double count = std::ceil((recorded.span[1] - begin_s) / length_s);
@@ -360,6 +360,48 @@ class RecordingDataset final : public Dataset {
     }
     recorded.windows = {begin_s, static_cast<std::int64_t>(count)};
     recorded.span[1] = begin_s + count * length_s;
+  }
+
+  /// Of Prophesee's boxes, which reach beyond the sensor, those that lie outside or have no size
+  /// are left out; the others are cut where labels are mapped.
+  void fit_boxes(Recorded& recorded) {
+    if (recorded.label_file_on_disk.extension() != ".npy") return;
+    const ImageSize size = recorded.recording->size();
+    const double width = size.width, height = size.height;
+    std::size_t cut = 0, left_out = 0;
+    for (auto& [time_s, annotation] : recorded.labels.annotations) {
+      std::erase_if(annotation.boxes, [&](const Box& box) {
+        const auto& [left, top, right, bottom] = box.xyxy;
+        const bool is_out = std::min(right, width) <= std::max(left, 0.0) ||
+                            std::min(bottom, height) <= std::max(top, 0.0);
+        const bool is_cut = left < 0 || top < 0 || right > width || bottom > height;
+        left_out += is_out ? 1 : 0;
+        cut += !is_out && is_cut ? 1 : 0;
+        return is_out;
+      });
+    }
+    if (cut + left_out == 0) return;
+    cut_boxes_ += cut;
+    left_out_boxes_ += left_out;
+    files_of_fitted_boxes_.push_back(recorded.label_file);
+  }
+
+  /// Of all recordings.
+  void tell_counts() {
+    if (!files_of_fitted_boxes_.empty()) {
+      notes_.push_back(
+          counted(files_of_fitted_boxes_, "file",
+                  fmt::format(" with boxes beyond the sensor: {} cut to it, {} left out since they "
+                              "are outside or without a size (their times stay)",
+                              cut_boxes_, left_out_boxes_)));
+      if (left_out_boxes_ > 0) warnings_.push_back(notes_.back());
+    }
+    if (!without_events_.empty()) {
+      notes_.push_back(counted(without_events_, "recording",
+                               fmt::format(" without events ({} empty event volume{})",
+                                           empty_volumes_, empty_volumes_ == 1 ? "" : "s")));
+      warnings_.push_back(notes_.back());
+    }
   }
 
   /// The classes of texts beside windows, as YOLO's names or numbers order them; none where these
@@ -448,24 +490,35 @@ class RecordingDataset final : public Dataset {
       all.push_back(window.frame.time_s);
       if (!meets_events(recorded, all.back())) outside.push_back(all.back());
     }
+    if (!recorded.event_span) {
+      without_events_.push_back(recorded.path);
+      empty_volumes_ += all.size();
+      return;
+    }
     if (outside.empty()) return;
     const bool is_all = outside.size() == all.size();
-    if (!recorded.event_span) {
-      notes_.push_back(fmt::format("expected events, got none: {} event volumes are empty, in {}",
-                                   all.size(), recorded.path));
-    } else {
-      const auto [first_s, last_s] = *recorded.event_span;
-      notes_.push_back(fmt::format(
-          "expected windows within the times of the events, {} s to {} s, got {} of {} outside "
-          "them, at {} s to {} s{}, in {}",
-          first_s, last_s, outside.size(), all.size(), std::ranges::min(outside),
-          std::ranges::max(outside), is_all ? " (are events, frames and labels on one clock?)" : "",
-          recorded.path));
-    }
+    const auto [first_s, last_s] = *recorded.event_span;
+    notes_.push_back(fmt::format(
+        "expected windows within the times of the events, {} s to {} s, got {} of {} outside "
+        "them, at {} s to {} s{}, in {}",
+        first_s, last_s, outside.size(), all.size(), std::ranges::min(outside),
+        std::ranges::max(outside), is_all ? " (are events, frames and labels on one clock?)" : "",
+        recorded.path));
     if (is_all) warnings_.push_back(notes_.back());
   }
 
+  /// Times within two microseconds of each other are one sample, which is at fault: none of them
+  /// tells what is there.
   void list_time(const std::string& name, const Recorded& recorded, double time_s) {
+    const double before_s = std::exchange(listed_s_, time_s);
+    if (!labelled_.empty() && labelled_.back().sequence == name &&
+        time_s - before_s <= 2 * kSameTime_s) {
+      LabelledFrame& first = labelled_.back();
+      first.fault = fmt::format(
+          "expected times more than two microseconds apart, got {} s and another, in {} ({})",
+          first.frame.time_s, label_place(first.label_key), first.sample_id);
+      return;
+    }
     LabelledFrame frame;
     frame.sample_id = fmt::format("{}/{:017.6f}", name, time_s);
     frame.sequence = name;
@@ -477,12 +530,6 @@ class RecordingDataset final : public Dataset {
           recorded.span[0], recorded.span[1], time_s, label_place(frame.label_key),
           frame.sample_id);
     }
-    if (!labelled_.empty() && labelled_.back().sequence == name &&
-        time_s - labelled_.back().frame.time_s <= 2 * kSameTime_s) {
-      throw InputError(fmt::format(
-          "expected times more than two microseconds apart, got {} s and another, in {}", time_s,
-          label_place(frame.label_key)));
-    }
     labelled_.push_back(std::move(frame));
   }
 
@@ -492,6 +539,9 @@ class RecordingDataset final : public Dataset {
   std::map<std::string, Recorded> recordings_;  ///< by name
   LabelSchema schema_;
   std::vector<LabelledFrame> labelled_;
+  double listed_s_ = 0;  ///< the time of the last one
+  std::size_t cut_boxes_ = 0, left_out_boxes_ = 0, empty_volumes_ = 0;
+  std::vector<std::string> files_of_fitted_boxes_, without_events_;  ///< as FrameRef::path
   std::vector<std::string> annotation_files_;  ///< as FrameRef::path is written
   std::vector<std::string> notes_;
   std::vector<std::string> warnings_;

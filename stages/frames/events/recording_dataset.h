@@ -30,8 +30,11 @@ namespace eventgan {
 ///   events      the last so many events with a time ≤ t.
 /// With t in its middle it is shifted by half of its length, of n events by the later n - n/2. A
 /// label within a microsecond of a frame has the frame's time. A time outside the recording's
-/// frames and events is at fault. Windows before or after all events are noted, and warned of where
-/// all of a recording's are.
+/// frames and events is at fault. Times within two microseconds of each other are one sample, at
+/// fault. Windows before or after all events are noted, and warned of where all of a recording's
+/// are. A recording with neither events nor frames is a still scene: any label is within it, and
+/// without labels it is one window from 0 on; a warning counts them. Of NAME_bbox.npy, boxes that
+/// lie outside the sensor or have no size are left out, with a warning that counts them.
 ///
 /// sample_id is NAME/SECONDS with six decimals, and the same two are in label_key. FrameRef::path
 /// is the recording's event_file, and FrameRef::video_frame the last frame at or

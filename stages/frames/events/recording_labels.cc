@@ -372,8 +372,8 @@ class BboxReader {
       Box box;
       box.xyxy.left = value("x", x, -kFarthest_px, kFarthest_px);
       box.xyxy.top = value("y", y, -kFarthest_px, kFarthest_px);
-      box.xyxy.right = box.xyxy.left + value("w", w, 0, kFarthest_px);
-      box.xyxy.bottom = box.xyxy.top + value("h", h, 0, kFarthest_px);
+      box.xyxy.right = box.xyxy.left + value("w", w, -kFarthest_px, kFarthest_px);
+      box.xyxy.bottom = box.xyxy.top + value("h", h, -kFarthest_px, kFarthest_px);
       constexpr double kMostClasses = 1e6;
       box.class_id = classes.of(class_name(value("class_id", class_id, 0, kMostClasses)));
       if (track_id != nullptr) {

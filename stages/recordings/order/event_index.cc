@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Of a file; another where the same bytes mean something else.
-constexpr std::string_view kFirstLine = "eventgan-event-index 1\n";
+constexpr std::string_view kFirstLine = "eventgan-event-index 2\n";
 constexpr std::size_t kHashDigits = 64;
 
 thread_local EventIndexes* current_indexes = nullptr;

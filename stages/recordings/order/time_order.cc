@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "manifests/values/faults.h"
@@ -12,6 +13,11 @@ namespace eventgan {
 
 void TimeOrder::add_other(double time_s, std::int64_t place) {
   if (!std::isfinite(time_s)) return;
+  const bool is_in_fall = !falls_.empty() && falls_.back().until_s >= latest_s_;
+  if (time_s < latest_s_ && time_s > latest_s_ - most_lift_s_ && !is_in_fall) {
+    ++lifted_;
+    return;
+  }
   const double before_s = latest_s_;
   latest_s_ = std::max(latest_s_, time_s);
   earliest_s_ = std::min(earliest_s_, time_s);
@@ -58,6 +64,12 @@ TimeOrder::Places TimeOrder::block_after(double time_s) const {
   return {begin, block == blocks_.end() ? begin : block->end};
 }
 
+std::pair<std::int64_t, double> TimeOrder::blocks_until(std::int64_t place) const {
+  const auto block = std::ranges::upper_bound(blocks_, place, {}, &Block::end);
+  if (block == blocks_.begin()) return {0, -kInfinity};
+  return {std::prev(block)->end, std::prev(block)->latest_s};
+}
+
 const TimeOrder::Fall* TimeOrder::fall_in(double after_s, double until_s) const {
   const auto fall = std::ranges::upper_bound(falls_, after_s, {}, &Fall::until_s);
   if (fall != falls_.end() && fall->from_s <= until_s) return &*fall;
@@ -87,6 +99,7 @@ std::optional<std::string> TimeOrder::to_bytes() const {
     falls.push_back({fall.from_s, fall.until_s, fall.place, fall.before_s, fall.after_s});
   }
   std::string bytes;
+  pack(bytes, lifted_);
   pack(bytes, any_);
   pack(bytes, earliest_s_);
   pack(bytes, latest_s_);
@@ -98,8 +111,9 @@ std::optional<std::string> TimeOrder::to_bytes() const {
 std::optional<TimeOrder> TimeOrder::take_bytes(std::string_view& bytes) {
   TimeOrder order;
   std::vector<PackedFall> falls;
-  if (!unpack(bytes, order.any_) || !unpack(bytes, order.earliest_s_) ||
-      !unpack(bytes, order.latest_s_) || !unpack(bytes, falls) || !unpack(bytes, order.blocks_)) {
+  if (!unpack(bytes, order.lifted_) || !unpack(bytes, order.any_) ||
+      !unpack(bytes, order.earliest_s_) || !unpack(bytes, order.latest_s_) ||
+      !unpack(bytes, falls) || !unpack(bytes, order.blocks_)) {
     return std::nullopt;
   }
   std::int64_t before = 0;

@@ -29,7 +29,10 @@ struct PropheseeHeader {
   std::string version;                        ///< DAT
   std::optional<int> width;
   std::optional<int> height;
-  bool is_legacy = false;  ///< EVT 2.1: the halves of a word are exchanged
+  std::optional<bool> is_legacy;  ///< EVT 2.1: the halves of a word are exchanged
+  /// Who made it, by the lines' keys; empty: not told.
+  std::string integrator, camera_integrator, plugin_integrator;
+  int system_id = 0;  ///< of the camera; 0: not told
   std::int64_t end_byte = 0;
 };
 
@@ -102,7 +105,28 @@ void read_header_line(std::string_view key, std::string_view value, PropheseeHea
     tell(header.height, pixels_of(value, key), key);
   } else if (key == "endianness") {
     read_endianness(value, header);
+  } else if (key == "integrator_name") {
+    header.integrator = value;
+  } else if (key == "camera_integrator_name") {
+    header.camera_integrator = value;
+  } else if (key == "plugin_integrator_name") {
+    header.plugin_integrator = value;
+  } else if (key == "system_ID") {
+    std::from_chars(value.data(), value.data() + value.size(), header.system_id);
   }
+}
+
+/// Whether words of EVT 2.1 have their halves exchanged. Prophesee's cameras before the EVK2 Saphir
+/// wrote them so without a word, which OpenEB knows by these lines (psee_raw_file_header.cpp).
+bool has_exchanged_halves(const PropheseeHeader& header) {
+  constexpr std::string_view kProphesee = "Prophesee";
+  constexpr int kEvk2Saphir = 55;
+  if (header.is_legacy) return *header.is_legacy;
+  const bool is_told = !header.camera_integrator.empty() || !header.plugin_integrator.empty();
+  const bool is_prophesees =
+      is_told ? header.camera_integrator == kProphesee && header.plugin_integrator == kProphesee
+              : header.integrator.empty() || header.integrator == kProphesee;
+  return is_prophesees && header.system_id > 0 && header.system_id < kEvk2Saphir;
 }
 
 [[noreturn]] void refuse_at(const std::string& fault, const std::string& name, std::int64_t byte) {
@@ -142,7 +166,7 @@ struct WordCounts {
   std::int64_t left_out = 0;    ///< events before their time and place were told
   std::int64_t outside = 0;     ///< events beside the sensor
   std::int64_t reserved = 0;    ///< words of types that mean nothing
-  std::int64_t steps_back = 0;  ///< events before an earlier one
+  std::int64_t steps_back = 0;  ///< events before an earlier one, by too much to be lifted
 };
 
 /// What a word's meaning depends on: all that the words before it have said.
@@ -155,7 +179,7 @@ struct WordState {
   std::optional<int> vector_x;           ///< EVT 3.0: of the next vector's first pixel
   bool vector_on = false;
   bool is_second_camera = false;
-  std::int64_t last_us = 0;  ///< of the last event
+  std::int64_t last_us = 0;  ///< of the last event that was not lifted
   WordCounts counts;
 };
 
@@ -181,8 +205,10 @@ std::int64_t counted(const WordState& state, int bits) {
 }
 
 StoredEvent event_at(WordState& state, std::int64_t time_us, int x, int y, std::uint32_t on) {
-  if (time_us < state.last_us) ++state.counts.steps_back;
-  state.last_us = time_us;
+  constexpr auto kMostLift_us = static_cast<std::int64_t>(kMostLift_s * 1e6) + 1;
+  const bool is_back = time_us <= state.last_us - kMostLift_us;
+  if (is_back) ++state.counts.steps_back;
+  if (is_back || time_us > state.last_us) state.last_us = time_us;
   return {static_cast<double>(x), static_cast<double>(y),
           static_cast<double>(time_us - state.shift_us) / 1e6, static_cast<double>(on)};
 }
@@ -334,7 +360,7 @@ class PropheseeEvents final : public EventParts {
   /// `index_key`: of the file, made before it was opened (event_index_key); empty: none.
   PropheseeEvents(std::unique_ptr<const RecordingFile> file, std::string index_key,
                   PropheseeEncoding encoding, std::int64_t first_byte, ImageSize size, bool shifts)
-      : EventParts(file->name()),
+      : EventParts(file->name(), recent_events(), kMostLift_s),
         file_(std::move(file)),
         encoding_(encoding),
         size_(size),
@@ -342,7 +368,10 @@ class PropheseeEvents final : public EventParts {
         end_byte_(file_->end_byte() - (file_->end_byte() - first_byte) % word_bytes()) {
     EventIndexes* const indexes = EventIndexes::current();
     std::string key = std::move(index_key);
-    if (!key.empty()) key += fmt::format(" {} {} {}", to_string(size), first_byte, shifts);
+    if (!key.empty()) {
+      key += fmt::format(" {} {} {} {}", to_string(size), static_cast<int>(encoding), first_byte,
+                         shifts);
+    }
     if (indexes != nullptr && !key.empty() && restore(indexes->find(key).value_or(""))) return;
     DecodingStart start{first_byte, {}};
     while (start.byte < end_byte_) {
@@ -356,8 +385,22 @@ class PropheseeEvents final : public EventParts {
     if (indexes != nullptr && !key.empty()) indexes->keep(key, to_bytes());
   }
 
-  /// What a user should know goes into `parts`, which has its name.
+  /// The share of what makes no sense among all that was read.
+  double nonsense() const {
+    const auto odd = static_cast<double>(counts_.left_out + counts_.outside + counts_.reserved +
+                                         counts_.steps_back);
+    return odd == 0 ? 0 : odd / (odd + static_cast<double>(count()));
+  }
+
+  /// What a user should know goes into `parts`, which has its name. Throws InputError where all
+  /// events are left out.
   void tell(StoredParts& parts) const {
+    if (count() == 0 && counts_.left_out + counts_.outside + counts_.reserved > 0) {
+      throw InputError(fmt::format(
+          "expected events on the sensor of {}, got none: {} beside it, {} before the first time "
+          "and place, words of reserved types: {}, in {}",
+          to_string(size_), counts_.outside, counts_.left_out, counts_.reserved, parts.name));
+    }
     const auto note = [&](std::int64_t number, std::string_view what) {
       if (number > 0) parts.notes.push_back(fmt::format("{}: {}, in {}", what, number, parts.name));
     };
@@ -522,20 +565,35 @@ StoredParts open_prophesee(const std::filesystem::path& path, const RecordingOpt
     }
     header.end_byte = end;
   }
-  if (header.is_legacy) {
-    if (header.encoding != PropheseeEncoding::kEvt21) {
-      refuse_at("expected little-endian words, got others", file->name(), 0);
-    }
-    header.encoding = PropheseeEncoding::kEvt21Legacy;
+  if (header.encoding == PropheseeEncoding::kEvt21) {
+    if (has_exchanged_halves(header)) header.encoding = PropheseeEncoding::kEvt21Legacy;
+  } else if (header.is_legacy.value_or(false)) {
+    refuse_at("expected little-endian words, got others", file->name(), 0);
   }
   StoredParts parts{file->name(), {}, nullptr};
   const bool is_told = header.width && header.height;
   parts.size =
       sensor_size(is_told ? std::optional(ImageSize{*header.height, *header.width}) : std::nullopt,
                   options.sensor, parts);
-  auto events =
-      std::make_unique<PropheseeEvents>(std::move(file), std::move(index_key), *header.encoding,
-                                        header.end_byte, parts.size, options.time_shift);
+  const auto read = [&](PropheseeEncoding encoding) {
+    return std::make_unique<PropheseeEvents>(std::make_unique<const RecordingFile>(path), index_key,
+                                             encoding, header.end_byte, parts.size,
+                                             options.time_shift);
+  };
+  auto events = read(*header.encoding);
+  const bool is_legacy = header.encoding == PropheseeEncoding::kEvt21Legacy;
+  constexpr double kGarbage = 0.2, kSense = 0.01;
+  if ((is_legacy || header.encoding == PropheseeEncoding::kEvt21) &&
+      events->nonsense() > kGarbage) {
+    auto exchanged = read(is_legacy ? PropheseeEncoding::kEvt21 : PropheseeEncoding::kEvt21Legacy);
+    if (exchanged->count() > 0 && exchanged->nonsense() < kSense) {
+      parts.warnings.push_back(fmt::format(
+          "words of EVT 2.1 are read as \"endianness={}\": the header has them in the other order, "
+          "in which {:.0f} % of what is read makes no sense, in {}",
+          is_legacy ? "little" : "legacy", 100 * events->nonsense(), parts.name));
+      events = std::move(exchanged);
+    }
+  }
   events->tell(parts);
   parts.events = std::move(events);
   return parts;

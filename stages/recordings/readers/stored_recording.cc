@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <iterator>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -29,7 +31,7 @@ constexpr std::int64_t kEventsPerRead = std::int64_t{1} << 17;
 }  // namespace
 
 TimeOrder EventStore::order() const {
-  TimeOrder order;
+  TimeOrder order(kMostLift_s);
   for (std::int64_t first = 0; first < count(); first += kEventsPerRead) {
     const std::int64_t events = std::min(kEventsPerRead, count() - first);
     try {
@@ -77,6 +79,11 @@ class StoredRecording final : public Recording {
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes = parts_.notes;
     if (parts_.frames) std::ranges::move(parts_.frames->notes(), std::back_inserter(notes));
+    if (const std::int64_t lifted = lifted_) {
+      notes.push_back(fmt::format(
+          "times step back by less than two milliseconds: {} {} lifted to the latest before, in {}",
+          lifted, lifted == 1 ? "is" : "are", name()));
+    }
     return notes;
   }
 
@@ -140,6 +147,7 @@ class StoredRecording final : public Recording {
   const TimeOrder& order() const {
     std::call_once(order_once_, [&] {
       order_ = known_order(parts_.index_key, event_count_, [&] { return parts_.events->order(); });
+      lifted_ = order_.lifted();
     });
     return order_;
   }
@@ -159,14 +167,28 @@ class StoredRecording final : public Recording {
     return begin + (later - times.begin());
   }
 
+  /// The latest time of the events before one.
+  double latest_before(std::int64_t event) const {
+    auto [first, latest_s] = order().blocks_until(event);
+    for (const double time_s : parts_.events->times_s(first, event - first)) {
+      if (std::isfinite(time_s)) latest_s = std::max(latest_s, time_s);
+    }
+    return latest_s;
+  }
+
   std::vector<Event> read_events(std::int64_t begin, std::int64_t end, EventCheck check) const {
+    std::optional<double> latest_s;  // none: no time is lifted
+    if (order().lifted() > 0) latest_s = latest_before(begin);
     std::vector<Event> events;
     events.reserve(static_cast<std::size_t>(std::max<std::int64_t>(end - begin, 0)));
     std::int64_t next = begin;
     try {
       while (next < end) {
-        for (const StoredEvent& stored :
-             parts_.events->read(next, std::min(kEventsPerRead, end - next))) {
+        for (StoredEvent stored : parts_.events->read(next, std::min(kEventsPerRead, end - next))) {
+          if (latest_s) {
+            const bool is_lifted = stored.t_s < *latest_s && stored.t_s > *latest_s - kMostLift_s;
+            latest_s = stored.t_s = is_lifted ? *latest_s : stored.t_s;
+          }
           Event event = check.take(stored);
           if (!parts_.move || parts_.move(event)) events.push_back(event);
           ++next;
@@ -188,6 +210,7 @@ class StoredRecording final : public Recording {
   std::vector<double> frame_times_s_;
   mutable std::once_flag order_once_;
   mutable TimeOrder order_;
+  mutable std::atomic<std::int64_t> lifted_ = 0;  ///< once the order is known
 };
 
 }  // namespace

@@ -216,6 +216,7 @@ TableContent read_csv(const fs::path& path, const EventFields& columns) {
   };
   CsvReader reader(rest);
   std::optional<CsvRecord> record = reader.next();
+  if (!record && content.sensor) return content;  // Metavision's, without events
   if (!record) refuse("expected a header line, got none", 1);
   const auto layout = layout_of(*record, columns);
   if (!layout) {
@@ -405,8 +406,9 @@ void require_event_table(const RecordingInput& input, const RecordingOptions& op
     }
     return;
   }
-  take_metavision_header(text);
+  const bool is_metavision = take_metavision_header(text).has_value();
   const auto first = CsvReader(text).next();
+  if (!first && is_metavision) return;
   if (!first || !layout_of(*first, options.columns)) {
     refuse(first ? fmt::format("a first line {}", fmt::join(first->fields, ", ")) : "no line");
   }

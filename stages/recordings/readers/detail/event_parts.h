@@ -65,9 +65,10 @@ class EventParts : public EventStore {
   TimeOrder order() const final { return order_; }
 
  protected:
-  /// `name` is for messages.
-  explicit EventParts(std::string name, RecentEvents& recent = recent_events())
-      : name_(std::move(name)), recent_(recent) {}
+  /// `name` is for messages, `most_lift_s` as TimeOrder's.
+  explicit EventParts(std::string name, RecentEvents& recent = recent_events(),
+                      double most_lift_s = 0)
+      : name_(std::move(name)), recent_(recent), order_(most_lift_s) {}
 
   /// While it is opened: the next part, which has events of times from `begin_s` to `end_s`.
   void add_part(std::int64_t count, double begin_s, double end_s);

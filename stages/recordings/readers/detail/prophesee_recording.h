@@ -16,7 +16,11 @@ namespace eventgan {
 ///
 /// Events before the first that a RAW file gives a time and a place, those beside the sensor, words
 /// of reserved types and bytes behind the last whole word are left out and counted in notes;
-/// triggers and other words are passed over.
+/// triggers and other words are passed over. If none is left of events, that is an InputError.
+///
+/// Of EVT 2.1, words may have their halves exchanged: as `endianness` says, else as OpenEB knows it
+/// by who made the file. If a fifth or more makes no sense, and in the other order hardly anything,
+/// that one counts, with a warning.
 ///
 /// The whole file is read once on opening. Of it, what the words before each 128 KiB have said
 /// stays in memory, and the events as long as recent_events() keeps them. Throws InputError

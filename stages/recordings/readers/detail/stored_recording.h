@@ -30,8 +30,8 @@ class EventStore {
   /// Their times alone, in seconds; throws likewise.
   virtual std::vector<double> times_s(std::int64_t first, std::int64_t count) const;
 
-  /// What all times tell; places are events' positions. Reads them once, which takes as long as the
-  /// file is large; what cannot be read is told by it, not thrown.
+  /// What all times tell, lifted by up to kMostLift_s; places are events' positions. Reads them
+  /// once, which takes as long as the file is large; what cannot be read is told by it, not thrown.
   virtual TimeOrder order() const;
 };
 
@@ -70,10 +70,11 @@ struct StoredParts {
 ImageSize sensor_size(const std::optional<ImageSize>& told, const std::optional<ImageSize>& given,
                       StoredParts& parts);
 
-/// The recording of these parts, with the checks that Recording promises: times that never
-/// decrease, pixels inside the image, finite values. Where the events of a time lie is told by the
-/// order of all times, which is looked at when the first events are asked for; a file's own index
-/// is not used, since its meaning differs among files.
+/// The recording of these parts, with the checks that Recording promises: times that, once they are
+/// lifted as the EventStore's order has it, never decrease, pixels inside the image, finite values.
+/// Where the events of a time lie is told by the order of all times, which is looked at when the
+/// first events are asked for; a file's own index is not used, since its meaning differs among
+/// files.
 std::unique_ptr<Recording> make_stored_recording(StoredParts parts);
 
 }  // namespace eventgan

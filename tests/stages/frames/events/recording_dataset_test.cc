@@ -10,6 +10,7 @@
 #include "manifests/files/input_file.h"
 #include "tests/stages/frames/frames_fixture.h"
 #include "tests/stages/recordings/small_recording.h"
+#include "tests/testing/npy_bytes.h"
 
 namespace eventgan {
 namespace {
@@ -187,7 +188,61 @@ TEST_F(RecordingDatasetTest, WarnsOfARecordingWithoutEvents) {
   datasets["davis/left/events"] = {{0, 4}, std::vector<double>{}};
   testing::write_hdf5(at("drive.h5"), datasets);
   EXPECT_THAT(open()->warnings(),
-              ElementsAre("expected events, got none: 2 event volumes are empty, in drive.h5"));
+              ElementsAre("1 recording without events (2 empty event volumes): drive.h5"));
+}
+
+/// Prophesee's boxes: rows of t in µs, x, y, w, h.
+std::string bboxes(const std::vector<std::array<double, 5>>& rows) {
+  std::string bytes;
+  for (const auto& row : rows) {
+    bytes.append(reinterpret_cast<const char*>(row.data()), sizeof(row));
+    bytes += '\0';
+  }
+  return testing::npy_file(
+      fmt::format("{{'descr': [('t', '<f8'), ('x', '<f8'), ('y', '<f8'), ('w', '<f8'), ('h', "
+                  "'<f8'), ('class_id', '|u1')], 'fortran_order': False, 'shape': ({},), }}",
+                  rows.size()),
+      bytes);
+}
+
+TEST_F(RecordingDatasetTest, PropheseesBoxesOutsideAreLeftOutAndTheirTimesStay) {
+  // Of 4x3 pixels: one within, one beyond each side; two without a size; one partly beyond.
+  write("drive_bbox.npy", bboxes({{1'250'000, 1, 1, 2, 1},
+                                  {1'250'000, 4, 1, 2, 1},
+                                  {1'250'000, -2, 1, 2, 1},
+                                  {1'250'000, 1, -5, 2, 5},
+                                  {1'250'000, 1, 3, 2, 5},
+                                  {1'500'000, 1, 1, 0, 1},
+                                  {1'500'000, 2, 1, 1, -1},
+                                  {1'750'000, -1, 2, 2, 5}}));
+  const auto dataset = open();
+  EXPECT_THAT(faults_of(*dataset), ElementsAre("", "", ""));
+  EXPECT_THAT(annotation_of(*dataset, 0).boxes,
+              ElementsAre(Box{.class_id = 0, .xyxy = {1, 1, 3, 2}}));
+  EXPECT_THAT(annotation_of(*dataset, 1).boxes, IsEmpty());
+  EXPECT_THAT(annotation_of(*dataset, 1).original, HasSubstr("\"h\":-1.0"));
+  EXPECT_THAT(annotation_of(*dataset, 2).boxes,
+              ElementsAre(Box{.class_id = 0, .xyxy = {-1, 2, 1, 7}}));
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("1 file with boxes beyond the sensor: 1 cut to it, 6 left out since they "
+                          "are outside or without a size (their times stay): drive_bbox.npy"));
+  EXPECT_EQ(dataset->warnings(), dataset->notes());
+}
+
+TEST_F(RecordingDatasetTest, TimesTooCloseAreOneSampleAtFault) {
+  label("1.25\n1.5\n1.500001,0,0,1,1,car,\n1.75\n");
+  const auto dataset = open();
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("drive/0000000001.250000", "drive/0000000001.500000",
+                                            "drive/0000000001.750000"));
+  EXPECT_THAT(faults_of(*dataset),
+              ElementsAre("",
+                          "expected times more than two microseconds apart, got 1.5 s and "
+                          "another, in drive.csv (1.500000 s) (drive/0000000001.500000)",
+                          ""));
+  for (const char* rows : {"1.75\n1.7500015\n1.750003\n", "1.4999991\n1.5000009\n"}) {
+    label(rows);
+    EXPECT_THAT(faults_of(*open()), ElementsAre(HasSubstr("two microseconds apart"))) << rows;
+  }
 }
 
 TEST_F(RecordingDatasetTest, CorruptEventsAreTheFaultOfTheirWindow) {
@@ -235,8 +290,6 @@ TEST_F(RecordingDatasetTest, RefusesWhatDoesNotFit) {
   refused("absent.csv");
   spec_.annotations.reset();
   fs::remove(at("drive.json"));
-  label("1.75\n1.750001\n");
-  refused("more than two microseconds apart");
   label("1.75,a,2,3,4,car,\n");
   refused("drive.csv (line 2)");
   write("drive.json", R"({"format": "eventgan-manifest"})");
@@ -338,8 +391,6 @@ TEST_F(WithoutFramesTest, NothingIsGuessed) {
   spec_.window.events.reset();
   spec_.window.duration_s = 1e-7;
   refused("expected events of at most 10000000 windows");
-  write("table.csv", "t,x,y,p\n");
-  refused("expected events or frames");
   spec_.recording.sensor.reset();
   refused("\"sensor\": {");
 }
@@ -442,6 +493,40 @@ TEST_F(RecordingDatasetTest, ATableBesideARecordingIsNoLabels) {
                                                   "another file: all/drive.csv")));
 }
 
+TEST_F(WithoutFramesTest, WithoutEventsItIsAStillScene) {
+  write("all/a.csv", "t,x,y,p\n1,0,0,1\n2,0,0,1\n");
+  write("all/b.csv", "t,x,y,p\n");
+  write("labels/b.csv", kLabelHeader + "5,0,0,2,1,car,\n7.5\n"s);
+  struct Case {
+    const char* root;
+    std::optional<std::string> labels;
+    WindowSpec window;
+    const char* note;
+  };
+  const WindowSpec second{.duration_s = 1, .events = std::nullopt, .label = LabelPlace::kEnd};
+  const WindowSpec events{.duration_s = std::nullopt, .events = 3, .label = LabelPlace::kEnd};
+  for (const Case& each : {Case{"all", {}, second, "(1 empty event volume): all/b.csv"},
+                           {"all/b.csv", {}, second, "(1 empty event volume): all/b.csv"},
+                           {"all", "labels", second, "(2 empty"},
+                           {"all", "labels", events, "(2 empty"}}) {
+    SCOPED_TRACE(each.root);
+    spec_.root = each.root;
+    spec_.annotations = each.labels;
+    spec_.window = each.window;
+    const auto dataset = open();
+    if (each.labels) {
+      EXPECT_THAT(ids_of(*dataset), ElementsAre("b/0000000005.000000", "b/0000000007.500000"));
+    }
+    EXPECT_THAT(faults_of(*dataset), Each(""));
+    const LabelledFrame& still = dataset->labelled_frames().back();
+    EXPECT_EQ(still.sequence, "b");
+    EXPECT_EQ(dataset->sensor_size(still.label_key), (ImageSize{3, 4}));
+    EXPECT_THAT(dataset->events(still.label_key)->events, IsEmpty());
+    EXPECT_THAT(dataset->warnings(), ElementsAre(HasSubstr(each.note)));
+    EXPECT_THAT(dataset->notes(), Contains(HasSubstr(each.note)));
+  }
+}
+
 /// Tables that are a window each.
 class WindowTextsTest : public RecordingDatasetTest {
  protected:
@@ -504,6 +589,22 @@ TEST_F(WindowTextsTest, AreLabelsOnlyIfOneSaysSo) {
   EXPECT_EQ(open()->labelled_frames().size(), 2u);
   EXPECT_THAT(classes(0), IsEmpty());
   EXPECT_THAT(classes(1), ElementsAre(0));
+}
+
+TEST_F(WindowTextsTest, OfATableWithoutEventsAreOfAStillScene) {
+  text("b.csv", "t,x,y,p\n");
+  boxes("a.txt", {0});
+  boxes("b.txt", {1});
+  for (const std::optional<double> duration_s : {std::optional<double>(), {0.1}}) {
+    spec_.window.duration_s = duration_s;
+    const auto dataset = open();
+    EXPECT_THAT(ids_of(*dataset), ElementsAre("a/0000000000.200000", "b/0000000000.000000"));
+    EXPECT_THAT(faults_of(*dataset), Each(""));
+    EXPECT_THAT(events(*dataset, 1), IsEmpty());
+    EXPECT_THAT(classes(1), ElementsAre(1));
+    EXPECT_THAT(dataset->warnings(),
+                ElementsAre("1 recording without events (1 empty event volume): windows/b.csv"));
+  }
 }
 
 TEST_F(WindowTextsTest, AreOfTablesAlone) {

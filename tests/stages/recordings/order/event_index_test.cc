@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "manifests/files/input_file.h"
@@ -26,8 +27,8 @@ namespace fs = std::filesystem;
 
 constexpr int kEvents = 100'000;
 
-/// Event i at i µs, but one fall in the middle.
-std::int64_t time_us(int i) { return i == kEvents / 2 ? i - 10 : i; }
+/// Event i at i µs, but one fall in the middle and a small step back, which is lifted, before it.
+std::int64_t time_us(int i) { return i == kEvents / 2 ? i - 2001 : i == kEvents / 4 ? i - 10 : i; }
 
 class EventIndexesTest : public ::testing::Test {
  protected:
@@ -74,6 +75,11 @@ class EventIndexesTest : public ::testing::Test {
     EXPECT_EQ(recording->events_in(0.09, 1).size(), 9999u) << name;
     EXPECT_THROWS(recording->events_in(0.0499, 0.051), InputError,
                   "expected times that never decrease");
+    if (std::string_view(name) == "ecd") return;
+    EXPECT_EQ(recording->events_in(0.02, 0.03)[4999].t_s, 0.024999) << name;
+    EXPECT_THAT(recording->notes(),
+                ::testing::Contains(::testing::HasSubstr("1 is lifted to the latest")))
+        << name;
   }
 
   /// How many bytes of a file it reads.
@@ -115,7 +121,7 @@ TEST_F(EventIndexesTest, OfAFileThatHasChangedAllIsReadAgain) {
     indexes.save();
   }
   std::string dat = testing::read_file(folder_ / "a.dat");
-  dat[dat.size() - 8 * kEvents] = 7;  // the first event's time
+  dat[dat.size() - 8 * kEvents + 1] = 9;  // the first event's time is 9 * 256 µs
   testing::write_file(folder_ / "a.dat", dat);
   fs::last_write_time(folder_ / "a.dat",
                       fs::last_write_time(folder_ / "a.h5") + std::chrono::seconds(5));

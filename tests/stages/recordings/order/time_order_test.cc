@@ -114,6 +114,30 @@ TEST(TimeOrder, TooManyFallsAreTakenTogether) {
   for (int i = 0; i < kPairs; i += 99) EXPECT_TRUE(touches_fall(order, 3.0 * i, 3.0 * i + 0.5));
 }
 
+TEST(TimeOrder, LiftsWhatStepsBackByLessThanTwoMilliseconds) {
+  struct Case {
+    std::vector<double> times_ms;
+    std::int64_t lifted;
+    std::size_t falls;
+  };
+  for (const Case& each : {Case{{2, 4, 3, 4}, 1, 0},
+                           {{2, 4, 2.001, 6}, 1, 0},
+                           {{2, 4, 2, 6}, 0, 1},
+                           {{10, 8.8, 7.6, 12}, 1, 1},      // each of the latest before it
+                           {{2, 18, 10, 17, 20}, 0, 1},     // the fall lasts until 18
+                           {{2, 18, 10, 19, 18.2}, 1, 1}})  // there it has ended
+  {
+    SCOPED_TRACE(::testing::PrintToString(each.times_ms));
+    TimeOrder order(kMostLift_s);
+    std::vector<double> times_s;
+    for (const double time_ms : each.times_ms) times_s.push_back(time_ms / 1000);
+    order.add_all(times_s, 0);
+    EXPECT_EQ(order.lifted(), each.lifted);
+    EXPECT_EQ(order.falls().size(), each.falls);
+    EXPECT_EQ(order_of(times_s).lifted(), 0) << "unless it is asked for";
+  }
+}
+
 /// Events as they are.
 class Listed final : public EventStore {
  public:
@@ -130,6 +154,37 @@ class Listed final : public EventStore {
  private:
   std::vector<double> times_s_;
 };
+
+// Whatever is asked for, a time that is lifted is the latest up to it, which the file's order
+// tells.
+TEST(TimeOrder, EachWindowHasTheLiftedTimes) {
+  std::mt19937 random(3);
+  std::vector<double> times, latest;
+  for (int i = 0; i < 30'000; ++i) {
+    times.push_back((50.0 * i + static_cast<double>(random() % 1900)) / 1e6);
+    latest.push_back(i == 0 ? times[0] : std::max(latest.back(), times.back()));
+  }
+  const auto recording = make_stored_recording(
+      {.name = "FILE", .size = {1, 1}, .events = std::make_unique<Listed>(times)});
+  const auto expect = [&](const std::vector<Event>& events, std::ptrdiff_t begin,
+                          std::ptrdiff_t end) {
+    std::vector<double> found(events.size());
+    std::ranges::transform(events, found.begin(), &Event::t_s);
+    EXPECT_EQ(found, std::vector(latest.begin() + begin, latest.begin() + end)) << begin;
+  };
+  for (double after_s = -0.01; after_s < 1.6; after_s += 0.0417) {
+    const auto begin = std::ranges::upper_bound(latest, after_s) - latest.begin();
+    const auto end = std::ranges::upper_bound(latest, after_s + 0.05) - latest.begin();
+    expect(recording->events_in(after_s, after_s + 0.05), begin, end);
+    expect(recording->events_around(after_s, 100, 50), std::max<std::ptrdiff_t>(begin - 100, 0),
+           std::min<std::ptrdiff_t>(begin + 50, std::ssize(latest)));
+  }
+  EXPECT_EQ(recording->event_span(), (std::array{latest.front(), latest.back()}));
+  std::size_t lifted = 0;
+  for (std::size_t i = 0; i < times.size(); ++i) lifted += times[i] < latest[i] ? 1 : 0;
+  EXPECT_THAT(recording->notes(),
+              ::testing::ElementsAre(HasSubstr(std::to_string(lifted) + " are lifted")));
+}
 
 // Whatever is exchanged: a window has all events of its time, or it is refused; and those that
 // touch no exchanged time are not.

@@ -82,7 +82,7 @@ TEST_F(PropheseeTest, GoesOnWhereDatWraps) {
   EXPECT_THAT(
       events_of(kDatHeader + words<std::uint64_t>({dat(0xffffffff, 1, 1, 1), dat(0, 1, 1, 1)})),
       ElementsAre(Event{1, 1, 4294.967295, true}, Event{1, 1, 4294.967296, true}));
-  expect_refused(kDatHeader + words<std::uint64_t>({dat(10, 1, 1, 1), dat(9, 1, 1, 1)}),
+  expect_refused(kDatHeader + words<std::uint64_t>({dat(2010, 1, 1, 1), dat(10, 1, 1, 1)}),
                  "in " + path_.string() + " (event 1)");
 }
 
@@ -104,11 +104,11 @@ TEST_F(PropheseeTest, GoesOnWhereEvt2Wraps) {
   // A step back: the windows that touch it are refused, the others are not.
   const auto stepped =
       open(kEvt2Header +
-           words<std::uint32_t>({evt2_high(8), evt2(0, 1, 1, 1), evt2_high(9), evt2(3, 1, 1, 1),
-                                 evt2(2, 1, 1, 1), evt2_high(20), evt2(0, 2, 1, 1)}));
+           words<std::uint32_t>({evt2_high(8), evt2(0, 1, 1, 1), evt2_high(49), evt2(3, 1, 1, 1),
+                                 evt2_high(9), evt2(3, 1, 1, 1), evt2_high(60), evt2(0, 2, 1, 1)}));
   EXPECT_THROWS(stepped->events_in(0, 1), InputError, "expected times that never decrease");
   EXPECT_EQ(stepped->events_in(0, 577e-6).size(), 1u);
-  EXPECT_EQ(stepped->events_in(579e-6, 1).size(), 1u);
+  EXPECT_EQ(stepped->events_in(3139e-6, 1).size(), 1u);
   EXPECT_THAT(stepped->notes(), ElementsAre(HasSubstr("before an earlier one, and their windows at "
                                                       "fault: 1, in ")));
 }
@@ -164,6 +164,62 @@ TEST_F(PropheseeTest, ReadsEvt21) {
   expect_read(header + ";endianness=legacy\n% end\n" + words(stored));
 }
 
+// As OpenEB knows it by the header; where that is wrong the words tell.
+TEST_F(PropheseeTest, KnowsExchangedHalvesOfEvt21) {
+  const std::string made = "% integrator_name Prophesee\n";
+  const std::string by_two = "% camera_integrator_name Prophesee\n% plugin_integrator_name ";
+  const std::string evk4 = "% system_ID 49\n";
+  struct Case {
+    std::string lines;
+    bool is_exchanged;
+    std::string warning = {};
+  };
+  for (const Case& each : {Case{evk4, true},
+                           {evk4 + made, true},
+                           {"% system_ID 54\n" + by_two + "Prophesee\n", true},
+                           {"% system_ID 55\n" + by_two + "Prophesee\n", false},
+                           {evk4 + by_two + "Another\n", false},
+                           {evk4 + "% integrator_name Another\n", false},
+                           {evk4 + "% endianness little\n", false},
+                           {made, false},
+                           {evk4, false, R"("endianness=little")"},
+                           {made, true, R"("endianness=legacy")"},
+                           {"% endianness little\n", true, R"("endianness=legacy")"}}) {
+    SCOPED_TRACE(each.lines);
+    std::vector<std::uint64_t> stored;
+    for (std::uint64_t i = 0; i < 20; ++i) {  // of the upper part i: pixels 4 and 6 of row 2
+      stored.push_back((std::uint64_t{8} << 28 | i) << 32);
+      stored.push_back((std::uint64_t{1} << 28 | 4 << 11 | 2) << 32 | 5);
+    }
+    for (std::uint64_t& word : stored) {
+      if (each.is_exchanged) word = word << 32 | word >> 32;
+    }
+    const auto recording =
+        open("% evt 2.1\n% geometry 40x6\n" + each.lines + "% end\n" + words(stored));
+    const std::vector<Event> events = recording->events_in(-1, 1);
+    ASSERT_EQ(events.size(), 40u);
+    EXPECT_EQ(events[39], (Event{6, 2, 1216e-6, true}));
+    EXPECT_THAT(recording->notes(), IsEmpty());
+    if (each.warning.empty()) {
+      EXPECT_THAT(recording->warnings(), IsEmpty());
+    } else {
+      EXPECT_THAT(recording->warnings(), ElementsAre(HasSubstr(each.warning)));
+    }
+  }
+}
+
+TEST_F(PropheseeTest, LiftsTimesThatStepBackALittle) {
+  const auto recording =
+      open(kDatHeader + words<std::uint64_t>({dat(30, 1, 1, 1), dat(0, 2, 1, 1), dat(4000, 3, 1, 1),
+                                              dat(2001, 4, 1, 1), dat(4001, 5, 1, 1)}));
+  EXPECT_THAT(
+      recording->events_in(0, 1),
+      ElementsAre(Event{1, 1, 30e-6, true}, Event{2, 1, 30e-6, true}, Event{3, 1, 4000e-6, true},
+                  Event{4, 1, 4000e-6, true}, Event{5, 1, 4001e-6, true}));
+  EXPECT_THAT(recording->notes(),
+              ElementsAre(HasSubstr("2 are lifted to the latest before, in " + path_.string())));
+}
+
 TEST_F(PropheseeTest, CountsEventsBeforeTheFirstTime) {
   const auto evt2_file =
       open(kEvt2Header + words<std::uint32_t>({evt2(5, 7, 5, 1), evt2_high(3), evt2(5, 7, 5, 1)}));
@@ -216,8 +272,8 @@ TEST_F(PropheseeTest, GoesOnWhereEvt3Wraps) {
       EXPECT_THAT([&] { fell->events_in(0, 16); }, ::testing::Throws<InputError>());
     }
   }
-  expect_refused(kEvt3Header + words<std::uint16_t>({evt3(kHigh, 1), evt3(kLow, 9), evt3(kY, 0),
-                                                     evt3(kX, 1), evt3(kLow, 8), evt3(kX, 1)}),
+  expect_refused(kEvt3Header + words<std::uint16_t>({evt3(kHigh, 1), evt3(kLow, 3009), evt3(kY, 0),
+                                                     evt3(kX, 1), evt3(kLow, 9), evt3(kX, 1)}),
                  "expected times that never decrease");
 }
 
@@ -233,14 +289,16 @@ TEST_F(PropheseeTest, StepsBackOverAWrap) {
   };
   for (const std::uint32_t back : {1, 2, 1000}) {
     SCOPED_TRACE(back);
-    expect_last_at(kDatHeader + words<std::uint64_t>({dat(0xffffffff, 1, 1, 1), dat(0, 1, 1, 1),
-                                                      dat(0 - back, 1, 1, 1), dat(99, 1, 1, 1)}),
-                   4294.967296, (4294967296 + 99) / 1e6);
+    expect_last_at(
+        kDatHeader + words<std::uint64_t>({dat(0xffffffff, 1, 1, 1), dat(0, 1, 1, 1),
+                                           dat(0 - 2000 * back, 1, 1, 1), dat(99, 1, 1, 1)}),
+        4294.967296, (4294967296 + 99) / 1e6);
     const auto high = [](std::uint32_t value) { return evt2_high(value & 0xfffffff); };
-    expect_last_at(kEvt2Header + words<std::uint32_t>(
-                                     {high(0xfffffff), evt2(0, 1, 1, 1), high(0), evt2(0, 1, 1, 1),
-                                      high(0 - back), evt2(0, 1, 1, 1), high(1), evt2(0, 1, 1, 1)}),
-                   17179.869184, (17179869184 + 64) / 1e6);
+    expect_last_at(
+        kEvt2Header + words<std::uint32_t>({high(0xfffffff), evt2(0, 1, 1, 1), high(0),
+                                            evt2(0, 1, 1, 1), high(0 - 32 * back), evt2(0, 1, 1, 1),
+                                            high(1), evt2(0, 1, 1, 1)}),
+        17179.869184, (17179869184 + 64) / 1e6);
     const int late = 4096 - static_cast<int>(back);
     expect_last_at(
         kEvt3Header + words<std::uint16_t>({evt3(kY, 0), evt3(kHigh, 4095), evt3(kX, 1),
@@ -259,8 +317,10 @@ TEST_F(PropheseeTest, PassesOverWordsThatMeanNothing) {
   EXPECT_THAT(evt3_file->notes(),
               ElementsAre(HasSubstr("reserved types are passed over: 3, in "),
                           HasSubstr("behind the last word are passed over: 1")));
-  EXPECT_THAT(open(kEvt2Header + words<std::uint32_t>({evt2_high(1), 0x20000000}) + "123")->notes(),
-              ElementsAre(HasSubstr("passed over: 1, in "), HasSubstr("passed over: 3, in ")));
+  EXPECT_THAT(
+      open(kEvt2Header + words<std::uint32_t>({evt2_high(1), evt2(0, 1, 1, 1), 0x20000000}) + "123")
+          ->notes(),
+      ElementsAre(HasSubstr("passed over: 1, in "), HasSubstr("passed over: 3, in ")));
   EXPECT_THAT(open(kDatHeader + "12345678901")->notes(), ElementsAre(HasSubstr("over: 3, in ")));
 }
 
@@ -272,13 +332,16 @@ TEST_F(PropheseeTest, LeavesOutEventsBesideTheSensor) {
   EXPECT_THAT(recording->notes(),
               ElementsAre(HasSubstr("beside the sensor of 8x6 are left out: 1, in ")));
   // Many speak of another size: the manifest's counts, but that is worth a warning.
+  stored.push_back(dat(0, 4, 5, 1));
   const auto small = open(kDatHeader + words(stored), ImageSize{6, 5});
   EXPECT_EQ(small->size(), (ImageSize{6, 5}));
-  EXPECT_TRUE(small->events_in(-1, 1).empty());
+  EXPECT_EQ(small->events_in(-1, 1).size(), 1u);
   EXPECT_THAT(
       small->warnings(),
       ElementsAre(HasSubstr("the file tells a sensor of 8x6, the manifest's \"sensor\" is 5x6"),
                   HasSubstr("left out: 201, in ")));
+  EXPECT_THROWS(open(kDatHeader + words(stored), ImageSize{4, 5}), InputError,
+                "expected events on the sensor of 5x4, got none: 202 beside it");
 }
 
 TEST_F(PropheseeTest, RefusesWhatIsNoEvent) {
@@ -298,7 +361,9 @@ TEST_F(PropheseeTest, ReadsHeaders) {
   testing::write_file(path_, "% text\n");
   EXPECT_EQ(find_recording_format(path_), std::nullopt);
   // The end of the header is what the words begin behind, also if they begin as a line would.
-  EXPECT_THAT(open("% evt 3.0\n% geometry 40x6\n% end\n% ")->notes(),
+  EXPECT_THAT(open("% evt 3.0\n% geometry 40x6\n% end\n% " +
+                   words<std::uint16_t>({evt3(kHigh, 1), evt3(kY, 1), evt3(kX, 1)}))
+                  ->notes(),
               ElementsAre(HasSubstr("left out: 1")));
 }
 

@@ -191,6 +191,10 @@ TEST_F(TableRecordingTest, MetavisionsCsvHasNoHeader) {
   holds_the_events("b.csv");
   testing::write_file(folder_ / "c.csv", "%geometry:4,3\n0,2,1,5\n3,x,0,7\n");
   EXPECT_THROWS(open("c.csv"), InputError, "(line 3)");
+  options_.sensor.reset();
+  testing::write_file(folder_ / "d.csv", "%geometry:4,3\n");
+  EXPECT_EQ(find_recording_format(folder_ / "d.csv"), RecordingFormat::kTable);
+  EXPECT_EQ(open("d.csv")->event_span(), std::nullopt);
 }
 
 TEST_F(TableRecordingTest, TellsWhatItsTimesCount) {
