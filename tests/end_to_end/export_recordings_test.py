@@ -439,7 +439,7 @@ class Recordings(Export):
         for sample_id, sample in again.items():
             with h5py.File(out / "events" / "train" / f"{sample_id.split('/')[0]}.hdf5") as file:
                 x, y, t, p = file["davis/left/events"][:].T
-            self.assertEqual(check_events((t, x.astype(int), y.astype(int), p), 0, 0.1, sample), len(t))
+            self.assertEqual(check_events((t, x.astype(int), y.astype(int), p), 0, 1, sample), len(t))
 
     def test_raw_says_at_once_that_its_pixels_have_eleven_bits(self):
         manifest = small_job.small_job(self.out.parent / "wide", cars=2, people=0, errors=small_job.LENIENT,
