@@ -375,8 +375,8 @@ StoredParts open_event_columns(const fs::path& path, const ColumnLayout& layout,
     });
   } catch (const InputError& error) {
     if (!options.sensor) throw;
-    parts.warnings.push_back(fmt::format("the manifest's \"sensor\" is {}, which counts: {}",
-                                         to_string(*options.sensor), error.what()));
+    parts.warnings.push_back(std::string("the file's size of the sensor is not used: ") +
+                             error.what());
   }
   auto events = read_hdf5(parts.name, [&] { return std::make_unique<ColumnStore>(path, layout); });
   if (!told && !options.sensor && is_dsec) told = assumed_size(*events, parts);

@@ -195,8 +195,9 @@ std::vector<double> read_attribute(hid_t object, const char* name, hssize_t most
   const hssize_t count = checked(H5Sget_simple_extent_npoints(space), "read", name);
   const H5T_class_t kind = H5Tget_class(type);
   if ((kind != H5T_INTEGER && kind != H5T_FLOAT) || count < 1 || count > most) {
-    throw InputError(fmt::format("expected numbers, at most {}, got {} of {}, in {} (attribute {})",
-                                 most, count, describe_type(type), place, name));
+    throw InputError(fmt::format("expected {}, got {} [{}], in {} (attribute {})",
+                                 most == 1 ? "a number" : "numbers", describe_type(type), count,
+                                 place, name));
   }
   std::vector<double> numbers(static_cast<std::size_t>(count));
   checked(H5Aread(attribute, H5T_NATIVE_DOUBLE, numbers.data()), "read", name);

@@ -165,9 +165,12 @@ TEST_F(DsecTest, TakesTheSizeOfAttributes) {
             "1 to 8192 pixels a side, got 5xnan"},
            {"events", {{}, Numbers{-5}}, three, "1 to 8192 pixels a side, got -5x3"},
            {"", {{}, Numbers{std::int64_t{1} << 62}}, three, "1 to 8192 pixels a side"},
-           {"", {{}, std::vector<std::string>{"5"}}, three, "numbers, at most 1, got 1 of text"},
-           {"events", five, {{}, std::vector<std::string>{"3"}, 1}, "got 1 of text"},
-           {"", {{2}, Numbers{5, 5}}, three, "numbers, at most 1, got 2 of int64"}}) {
+           {"", {{}, std::vector<std::string>{"5"}}, three, "expected a number, got text [1]"},
+           {"events",
+            five,
+            {{}, std::vector<std::string>{"3"}, 1},
+            "expected a number, got text [1]"},
+           {"", {{2}, Numbers{5, 5}}, three, "expected a number, got int64 [2]"}}) {
     SCOPED_TRACE(std::string(owner) + fault);
     datasets_ = datasets;
     datasets_[std::string(owner) + "@width"] = width;
