@@ -197,11 +197,12 @@ RecordedSample RecordingsExporter::recorded(const OutgoingSample& sample,
       drawn_events(sample, options_, static_cast<double>(length_us) / kMicroseconds);
   result.events.reserve(events.size());
   for (const Event& event : events) {
-    // What lies at the end belongs to this window, and a window's end to the next one.
+    // At neither end of the window, since some readers count the begin to it and others the end.
     const auto t_us = static_cast<std::int64_t>(event.t_s * kMicroseconds);
-    result.events.push_back({window.begin_us + std::min(t_us, length_us - 1),
-                             static_cast<std::uint16_t>(event.x),
-                             static_cast<std::uint16_t>(event.y), event.positive});
+    const std::int64_t last_us = length_us - 1;
+    result.events.push_back(
+        {window.begin_us + std::clamp(t_us, std::min<std::int64_t>(1, last_us), last_us),
+         static_cast<std::uint16_t>(event.x), static_cast<std::uint16_t>(event.y), event.positive});
   }
   if (sample.source.has_boxes()) {
     const auto take = [&](const ClassNumbers::Entry& entry, const VolumeBox& box) {

@@ -419,7 +419,7 @@ class WithoutFrames(program.InFolder):
         self.assertIn("expected a class of label_map_dictionary.json, got class_id 7", error)
 
     def test_what_needs_frames_says_so(self):
-        write_columns(self.folder / "seq/events/left/events.h5", self.events, offset=0)
+        write_columns(self.folder / "seq/events/left/events.h5", self.events, size=(HEIGHT, WIDTH))
         expected = "expected a recording with frames, got one without"
         self.assertIn(expected, run("realism", self.folder / "seq", "--with", "difference", expect=66)[1])
         frames = {"dataset": "frames", "root": "clip", "pairs": program.pairs([1])}

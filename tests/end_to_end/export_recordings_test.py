@@ -14,6 +14,7 @@ import aedat4
 import exported_demo as demo
 import program
 import small_job
+from camera_files import volume_of
 from exported_demo import Export, of, read_samples
 from program import run
 from rvt_sequence import RvtSequence
@@ -43,6 +44,13 @@ def slice_dsec(file, begin_us, end_us):
     t = file["events/t"][first:last].astype(np.int64)
     inside = slice(first + np.searchsorted(t, begin_us), first + np.searchsorted(t, end_us))
     return [file[f"events/{name}"][inside].astype(np.int64) + (offset if name == "t" else 0) for name in "txyp"]
+
+
+def read_columns(path):
+    """t, x, y, p of DSEC's and Prophesee's HDF5."""
+    with h5py.File(path) as file:
+        t, *others = (file[f"events/{column}"][:].astype("int64") for column in "txyp")
+        return t + (file["t_offset"][()] if "t_offset" in file else 0), *others
 
 
 def decode_evt3(data):
@@ -375,6 +383,63 @@ class Recordings(Export):
         self.assertEqual(len(found), 4)
         _, err = self.export("aedat4", "--frames", self.out.parent, source=frames, expect=64)
         self.assertIn("got another export", err)
+
+    def test_convert_reads_each_export_again(self):
+        source = self.converted({"dataset": "kitti_tracking", "root": str(self.drive)}, errors=small_job.LENIENT)
+        known = {key[2]: sample for key, sample in read_samples(source).items()}
+
+        def read_again(folder, **keys):
+            self.assertIn(f'run eventgan convert "{folder}"', run("init", folder.parents[1], expect=66)[1])
+            self.assertIn("recording of an event camera", run("init", folder, "--out", folder.parent / "init.json")[0])
+            manifest = folder.parent / "manifest.json"
+            manifest.write_text(json.dumps(program.manifest(
+                [{"dataset": "recording", "root": str(folder), **keys}], image={}, generator={"kind": "events"},
+                output={"directory": "again", "dtype": "float32"})))
+            run("convert", manifest, "--progress", "none")
+            return {key[2]: sample for key, sample in read_samples(manifest.parent / "again").items()}
+
+        def check_events(events, begin, end, sample):
+            """As `convert` counts a window: without its begin, with its end."""
+            t, x, y, p = events
+            inside = (t > begin) & (t <= end)
+            rows = np.stack([x, y, t, p], 1)[inside]
+            np.testing.assert_allclose(sample["volume"], volume_of(rows, len(sample["volume"]) // 2,
+                                                                   *sample["volume"].shape[1:]), atol=1e-4)
+            return len(rows)
+
+        for to, file, windows, read in (
+                ("rvt", "raw/train/0000_td.h5", "raw/train/0000_windows.txt", read_columns),
+                ("dsec", "dsec/train/0000/events/left/events.h5", "dsec/train/0000/windows.txt", read_columns),
+                ("raw", "raw/train/0000.raw", "raw/train/0000_windows.txt", lambda at: decode_evt3(at.read_bytes())[1]),
+                ("aedat4", "aedat4/train/0000.aedat4", "aedat4/train/0000_windows.txt", lambda at: aedat4.read(at)[1])):
+            with self.subTest(to):
+                out = self.out / to
+                self.export(to, "--counts", "rounded", source=source, out=out)
+                again = read_again(out / file.split("/")[0] / "train", window_s=0.1)
+                again = {sample_id.split("/")[1]: sample for sample_id, sample in again.items()}
+                events = read(out / file)
+                for begin, end, label, count, sample_id in read_windows(out / windows):
+                    boxes = known[sample_id]["boxes"]
+                    kept = np.flatnonzero(boxes["ignore"] == 0)
+                    if not len(kept):
+                        continue  # no box has its time
+                    sample = again.pop(f"{label / 1e6:017.6f}")
+                    self.assertEqual(check_events(events, begin, end, sample), count)
+                    self.assertEqual([round(sample["pairs"][key] * 1e6) for key in ("prev_time_s", "next_time_s")],
+                                     [begin, end])
+                    np.testing.assert_allclose(sample["boxes"]["xyxy"], boxes["xyxy"][kept], atol=1e-4)
+                    self.assertEqual(list(sample["boxes"]["track_id"]), list(boxes["track_id"][kept]))
+                    self.assertEqual([sample["classes"][k] for k in sample["boxes"]["class_id"]],
+                                     [known[sample_id]["classes"][k] for k in boxes["class_id"][kept]])
+                self.assertEqual(again, {})
+        out = self.out / "events"
+        self.export("events", "--layout", "mvsec", "--counts", "rounded", source=source, out=out)
+        again = read_again(out / "events" / "train")
+        self.assertEqual(len(again), len(known))
+        for sample_id, sample in again.items():
+            with h5py.File(out / "events" / "train" / f"{sample_id.split('/')[0]}.hdf5") as file:
+                x, y, t, p = file["davis/left/events"][:].T
+            self.assertEqual(check_events((t, x.astype(int), y.astype(int), p), 0, 1, sample), len(t))
 
     def test_raw_says_at_once_that_its_pixels_have_eleven_bits(self):
         manifest = small_job.small_job(self.out.parent / "wide", cars=2, people=0, errors=small_job.LENIENT,

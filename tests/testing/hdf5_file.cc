@@ -45,7 +45,10 @@ void write_values(hid_t id, hid_t type, const Hdf5Dataset& dataset) {
     data =
         std::visit([](const auto& values) -> const void* { return values.data(); }, dataset.values);
   }
-  need(H5Dwrite(id, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), "values");
+  const bool is_attribute = H5Iget_type(id) == H5I_ATTR;
+  need(is_attribute ? H5Awrite(id, type, data)
+                    : H5Dwrite(id, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data),
+       "values");
 }
 
 }  // namespace
@@ -61,10 +64,16 @@ void write_hdf5(const std::filesystem::path& path,
     const std::vector<hsize_t> dims(dataset.shape.begin(), dataset.shape.end());
     const hid_t space = H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr);
     const hid_t type = new_type(dataset);
-    const hid_t id = need(
-        H5Dcreate2(file, name.c_str(), type, space, with_groups, H5P_DEFAULT, H5P_DEFAULT), name);
-    write_values(id, type, dataset);
-    H5Dclose(id);
+    hid_t id;
+    if (const std::size_t at = name.find('@'); at != name.npos) {
+      const std::string owner = "/" + name.substr(0, at);
+      id = H5Acreate_by_name(file, owner.c_str(), name.c_str() + at + 1, type, space, H5P_DEFAULT,
+                             H5P_DEFAULT, H5P_DEFAULT);
+    } else {
+      id = H5Dcreate2(file, name.c_str(), type, space, with_groups, H5P_DEFAULT, H5P_DEFAULT);
+    }
+    write_values(need(id, name), type, dataset);
+    H5Idec_ref(id);
     H5Tclose(type);
     H5Sclose(space);
   }

@@ -20,7 +20,9 @@ struct Hdf5Dataset {
   std::size_t text_width = 0;
 };
 
-/// Writes an HDF5 file of these datasets, with the groups that their names ("pose/2d") need.
+/// Writes an HDF5 file of these datasets, with the groups that their names ("pose/2d") need. What
+/// has an @ in its name ("pose@unit", "@unit") is an attribute of what is before it, or of the
+/// file.
 void write_hdf5(const std::filesystem::path& path,
                 const std::map<std::string, Hdf5Dataset>& datasets);
 

@@ -22,8 +22,8 @@ std::vector<Event> drawn_events(const OutgoingSample& sample, const ExportOption
 /// Seconds from a pair's previous frame to its next one; 1 where that is not known.
 double known_gap_s(const FramePair& pair);
 
-/// A sample as a part of a recording: its events lie in [begin_us, end_us). The label's time is
-/// that of the labelled frame. Times are on the recording's clock, >= 0.
+/// A sample as a part of a recording: its events lie between begin_us and end_us. The label's time
+/// is that of the labelled frame. Times are on the recording's clock, >= 0.
 struct SampleWindow {
   const ExportShard* shard = nullptr;
   int slot = 0;

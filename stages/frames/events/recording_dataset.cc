@@ -524,7 +524,10 @@ class RecordingDataset final : public Dataset {
     frame.sequence = name;
     frame.frame = recorded.ref(time_s);
     frame.label_key = fmt::format("{}/{}", name, time_s);  // exactly, as short as can be
-    if (time_s < recorded.span[0] || time_s > recorded.span[1]) {
+    // Without frames nothing tells how long it lasts behind its last event: a window may end there.
+    const bool is_late = time_s > recorded.span[1] &&
+                         (!recorded.frame_times_s.empty() || !meets_events(recorded, time_s));
+    if (time_s < recorded.span[0] || is_late) {
       frame.fault = fmt::format(
           "expected a time between {} s and {} s, which the recording lasts, got {} s, in {} ({})",
           recorded.span[0], recorded.span[1], time_s, label_place(frame.label_key),

@@ -194,6 +194,11 @@ class FolderSearch {
         }
         return is_other;
       });
+      if (files.empty() && recorded.format == RecordingFormat::kDsec) {
+        if (const fs::path tracks = find_tracks(name, own, spec, folder); !tracks.empty()) {
+          files.push_back(tracks);
+        }
+      }
       if (files.size() > 1) {
         throw InputError("expected labels in one file, got two, in " + files[0].string() + " and " +
                          files[1].string());
@@ -220,6 +225,24 @@ class FolderSearch {
     note_names_of_windows();
   }
 
+  /// DSEC-Det's boxes, in a folder of its sequences or with the events; empty if there are none, or
+  /// they are of other pixels.
+  fs::path find_tracks(const std::string& name, const fs::path& events_file, const SourceSpec& spec,
+                       const fs::path& folder) {
+    const fs::path events = events_file.parent_path().parent_path();  // of SEQUENCE/events/left
+    if (!spec.annotations && events.filename() != "events") return {};
+    const fs::path sequence = spec.annotations ? folder / name : events.parent_path();
+    fs::path tracks = sequence / "object_detections" / options_.camera / "tracks.npy";
+    if (!fs::is_regular_file(tracks)) return {};
+    const bool has_pixels = events_file.filename() == "events.h5" && !options_.rectify;
+    if (spec.annotations || has_pixels) return tracks;
+    found_.notes.push_back(
+        "no labels, since they are of the pixels of events.h5, not rectified (\"annotations\" "
+        "takes them): " +
+        tracks.string());
+    return {};
+  }
+
   /// Of windows' texts, which have numbers for classes.
   void note_names_of_windows() {
     const auto window = std::ranges::find_if(found_.recordings, [](const auto& entry) {
@@ -235,7 +258,10 @@ class FolderSearch {
 
   /// Relative to the manifest where the root is.
   static std::string written(const fs::path& file, const SourceSpec& spec, const fs::path& base) {
-    if (spec.annotations) return (fs::path(*spec.annotations) / file.filename()).generic_string();
+    if (spec.annotations) {
+      return (fs::path(*spec.annotations) / file.lexically_relative(base / *spec.annotations))
+          .generic_string();
+    }
     if (fs::path(spec.root).is_absolute()) return file.generic_string();
     return file.lexically_normal()
         .lexically_relative(fs::absolute(base).lexically_normal())

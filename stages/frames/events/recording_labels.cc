@@ -314,8 +314,19 @@ RecordingLabels read_json(std::string_view text, const std::string& file) {
 
 // ---- NumPy
 
+/// Beside the file; of an export of this program, which has one of all its recordings, where its
+/// export.json is.
 std::filesystem::path class_map_of(const std::filesystem::path& file) {
-  return file.parent_path() / "label_map_dictionary.json";
+  constexpr char kName[] = "label_map_dictionary.json";
+  constexpr int kMostFolders = 6;  // dsec/SPLIT/RECORDING/object_detections/left
+  std::filesystem::path beside = file.parent_path() / kName;
+  if (std::filesystem::exists(beside)) return beside;
+  std::filesystem::path folder = std::filesystem::absolute(file);
+  for (int i = 0; i < kMostFolders; ++i) {
+    folder = folder.parent_path();
+    if (std::filesystem::exists(folder / "export.json")) return folder / kName;
+  }
+  return beside;
 }
 
 /// Names of classes by their numbers; none: there is no such file.

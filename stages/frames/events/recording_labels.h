@@ -29,8 +29,9 @@ struct RecordingLabels {
 ///
 /// NAME.npy: Prophesee's boxes, a structured array with t (or ts, µs), x, y (the top left corner),
 /// w, h, class_id, and perhaps track_id; DSEC-Det's tracks are the same. A class is called as
-/// label_map_dictionary.json beside it has it ({"0": "car"}); where there is no such file, "class
-/// 0". The original of a time is its rows, a line of JSON each, with all of their fields.
+/// label_map_dictionary.json beside it, or of the export that it lies in, has it ({"0": "car"});
+/// where there is no such file, "class 0". The original of a time is its rows, a line of JSON each,
+/// with all of their fields.
 ///
 /// Category: easy is difficulty 0; hard is 2, which the scores count as hard, as 1 would be;
 /// dont_care is to be ignored; none is difficulty -1, not known.

@@ -185,8 +185,9 @@ std::optional<FileKind> kind_of_file(std::string_view text) {
   return kind_of_text(text);
 }
 
-/// Of images that lie deeper than they are looked for: where the first are, and the folder to give.
-std::string deeper_images(const fs::path& root) {
+/// Of images or recordings that lie deeper than they are looked for: where the first are, and the
+/// folder to give.
+std::string deeper_data(const fs::path& root) {
   constexpr std::size_t kMostFolders = 10'000;
   std::vector<fs::path> folders = {root};  // breadth first, as names are ordered
   for (std::size_t i = 0; i < folders.size() && i < kMostFolders; ++i) {
@@ -194,7 +195,10 @@ std::string deeper_images(const fs::path& root) {
     const bool has_images = std::ranges::any_of(listing.files, [](const fs::path& name) {
       return std::ranges::find(kImageExtensions, lower_extension(name)) != kImageExtensions.end();
     });
-    if (!has_images) {
+    const auto may_be_recording = dataset_reader(DatasetKind::kRecording).may_be_file;
+    const bool has_recordings = std::ranges::any_of(listing.files, may_be_recording) &&
+                                look_at(folders[i], DatasetKind::kRecording, /*own_too=*/false);
+    if (!has_images && !has_recordings) {
       for (const std::string& name : listing.folders) {
         if (!name.starts_with('.')) folders.push_back(folders[i] / name);
       }
@@ -213,8 +217,8 @@ std::string deeper_images(const fs::path& root) {
                ": run eventgan convert \"" + whole->root.string() + "\"";
       }
     }
-    return "; images lie in " + below.generic_string() + ": run eventgan convert \"" +
-           give.string() + "\"";
+    return (has_images ? "; images lie in " : "; recordings lie in ") + below.generic_string() +
+           ": run eventgan convert \"" + give.string() + "\"";
   }
   return "";
 }
@@ -252,7 +256,7 @@ std::vector<FoundSource> find_sources(const fs::path& path, std::optional<Datase
     const auto other = dataset ? look_around(root, std::nullopt) : std::nullopt;
     throw InputError("expected " + (dataset ? std::string(to_string(*dataset)) : known_titles()) +
                      ", got " + std::string(other ? other->word() : "none of these") + ", in " +
-                     path.string() + (other || dataset ? "" : deeper_images(root)));
+                     path.string() + (other || dataset ? "" : deeper_data(root)));
   }
   FoundSource found;
   found.dataset = place->dataset;

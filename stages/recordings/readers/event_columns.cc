@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <sstream>
@@ -89,9 +90,39 @@ class ColumnStore final : public EventStore {
       }
       offset_us_ = offset[0];
     }
-    if (!layout.ms_index.empty() && has_object(file, layout.ms_index)) {
-      check_index(columns->t, open_numbers(file, layout.ms_index, name_));
+  }
+
+  /// What the index of milliseconds has of other events than these; empty if it fits, or there is
+  /// none. Nothing is looked up in it.
+  std::string index_fault(const std::string& index) const try {
+    const Hdf5Lock lock;
+    const auto columns = columns_.get();
+    if (!index.empty() && has_object(columns->file, index)) {
+      check_index(columns->t, open_numbers(columns->file, index, name_));
     }
+    return "";
+  } catch (const InputError& error) {
+    return error.what();
+  }
+
+  /// The largest x and y of all events, or of a million that lie all over a larger file; -1 where
+  /// none is there or can be read.
+  std::array<std::int64_t, 2> reach() const {
+    constexpr std::int64_t kBlock = std::int64_t{1} << 16;
+    std::array<std::int64_t, 2> most{-1, -1};
+    const std::int64_t length = std::min(kBlock, count_);
+    const std::int64_t blocks = std::min<std::int64_t>((count_ + kBlock - 1) / kBlock, 16);
+    const Hdf5Lock lock;
+    const auto columns = columns_.get();
+    for (std::int64_t block = 0; block < blocks; ++block) {
+      const std::int64_t first = block * (count_ - length) / std::max<std::int64_t>(blocks - 1, 1);
+      try {
+        most[0] = std::max(most[0], std::ranges::max(numbers(columns->x, first, length)));
+        most[1] = std::max(most[1], std::ranges::max(numbers(columns->y, first, length)));
+      } catch (const InputError&) {  // the fault of its windows
+      }
+    }
+    return most;
   }
 
   std::int64_t count() const override { return count_; }
@@ -142,7 +173,7 @@ class ColumnStore final : public EventStore {
     return values;
   }
 
-  /// Some entries are looked up: an index of other events would say that the times are others.
+  /// Throws InputError where one of some entries leads to another event.
   void check_index(const Hdf5Table& t, const Hdf5Table& index) const {
     const auto entries = static_cast<std::int64_t>(index.dims()[0]);
     const std::int64_t checks = std::min<std::int64_t>(entries, 16);
@@ -168,9 +199,9 @@ class ColumnStore final : public EventStore {
   std::int64_t offset_us_ = 0;
 };
 
-/// What the file says of the sensor; none if it does not.
-std::optional<ImageSize> read_size(hid_t file, const ColumnLayout& layout,
-                                   const std::string& name) {
+/// What datasets say of the sensor; none if there are none.
+std::optional<ImageSize> dataset_size(hid_t file, const ColumnLayout& layout,
+                                      const std::string& name) {
   std::vector<std::int64_t> sides;  // height, width
   for (const std::string& path : layout.size) {
     if (!has_object(file, path)) return std::nullopt;
@@ -187,13 +218,25 @@ std::optional<ImageSize> read_size(hid_t file, const ColumnLayout& layout,
   return ImageSize{static_cast<int>(sides[0]), static_cast<int>(sides[1])};
 }
 
-/// DSEC's own files do not tell their size; those of others that have its columns alone do, or
-/// nobody knows it.
-std::optional<ImageSize> dsec_size(hid_t file, const ColumnLayout& layout) {
-  constexpr ImageSize kDsecSize{480, 640};
-  const bool is_dsec = !layout.t_offset.empty() && has_object(file, layout.t_offset) &&
-                       has_object(file, layout.ms_index);
-  return is_dsec ? std::optional(kDsecSize) : std::nullopt;
+/// DSEC's own files do not tell their size, and other cameras' have their layout: taken by what the
+/// events reach, with a note; none where that may be several sizes.
+std::optional<ImageSize> assumed_size(const ColumnStore& events, StoredParts& parts) {
+  constexpr ImageSize kDsec{480, 640}, kDavis{260, 346};
+  // DAGr halves DSEC's; M3ED's are copied into its layout.
+  constexpr std::array kOthers{ImageSize{240, 320}, kDavis, ImageSize{720, 1280}};
+  const auto [x, y] = events.reach();
+  const bool is_larger = x >= kDavis.width || y >= kDavis.height;
+  std::optional<ImageSize> size;
+  if (x < kDsec.width && y < kDsec.height && (is_larger || x < 0)) size = kDsec;
+  for (const ImageSize other : kOthers) {
+    if (x + 1 == other.width && y + 1 == other.height) size = other;
+  }
+  if (!size) return std::nullopt;
+  parts.notes.push_back(fmt::format(
+      "the file has no size of the sensor: {} is assumed, since its events reach x = {}, y = {} "
+      "(else set \"sensor\" or --sensor), in {}",
+      to_string(*size), x, y, parts.name));
+  return size;
 }
 
 /// timestamps.txt: a line with µs for each frame.
@@ -318,13 +361,30 @@ StoredParts open_event_columns(const fs::path& path, const ColumnLayout& layout,
   StoredParts parts;
   parts.name = path.string();
   parts.index_key = hdf5_index_key(path, layout.column("t"));
-  std::optional<ImageSize> told = read_hdf5(parts.name, [&] {
-    const Hdf5Handle file = open_recording_file(path);
-    const auto size = read_size(file, layout, parts.name);
-    return size || options.sensor ? size : dsec_size(file, layout);
-  });
+  std::optional<ImageSize> told;
+  bool is_dsec = false;
+  try {
+    read_hdf5(parts.name, [&] {
+      const Hdf5Handle file = open_recording_file(path);
+      is_dsec = !layout.t_offset.empty() && has_object(file, layout.t_offset) &&
+                has_object(file, layout.ms_index);
+      told = dataset_size(file, layout, parts.name);
+      if (!told && has_object(file, layout.events)) {
+        told = attribute_size(file, layout.events, parts.name);
+      }
+    });
+  } catch (const InputError& error) {
+    if (!options.sensor) throw;
+    parts.warnings.push_back(std::string("the file's size of the sensor is not used: ") +
+                             error.what());
+  }
+  auto events = read_hdf5(parts.name, [&] { return std::make_unique<ColumnStore>(path, layout); });
+  if (!told && !options.sensor && is_dsec) told = assumed_size(*events, parts);
   parts.size = sensor_size(told, options.sensor, parts);
-  parts.events = read_hdf5(parts.name, [&] { return std::make_unique<ColumnStore>(path, layout); });
+  if (const std::string fault = events->index_fault(layout.ms_index); !fault.empty()) {
+    parts.notes.push_back(layout.ms_index + " does not fit the events and is not used: " + fault);
+  }
+  parts.events = std::move(events);
   return parts;
 }
 

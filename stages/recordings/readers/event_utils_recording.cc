@@ -35,30 +35,10 @@ const ColumnLayout& layout() {
   return kLayout;
 }
 
-/// The numbers of an attribute; none if it is absent. Throws Hdf5Error.
-std::vector<double> read_numbers(hid_t object, const char* name) {
-  if (checked(H5Aexists(object, name), "look for", name) == 0) return {};
-  const Hdf5Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose, "open", name);
-  const Hdf5Handle space(H5Aget_space(attribute), H5Sclose, "read", name);
-  constexpr hssize_t kMost = 16;
-  const hssize_t count = checked(H5Sget_simple_extent_npoints(space), "read", name);
-  if (count > kMost) throw Hdf5Error(fmt::format("expected up to {} numbers in {}", kMost, name));
-  std::vector<double> numbers(static_cast<std::size_t>(count));
-  checked(H5Aread(attribute, H5T_NATIVE_DOUBLE, numbers.data()), "read", name);
-  return numbers;
-}
-
 std::optional<ImageSize> told_size(hid_t file, const std::string& name) {
-  const std::vector<double> sides = read_numbers(file, "sensor_resolution");
+  const std::vector<double> sides = read_attribute(file, "sensor_resolution", 16, name);
   if (sides.size() < 2) return std::nullopt;
-  const auto is_side = [](double side) { return side >= 1 && side <= kMostSensorSide; };
-  if (!is_side(sides[0]) || !is_side(sides[1])) {
-    throw InputError(
-        fmt::format("expected a sensor of 1 to {} pixels a side, got {}x{}, in {} (attribute "
-                    "sensor_resolution)",
-                    kMostSensorSide, sides[1], sides[0], name));
-  }
-  return ImageSize{static_cast<int>(sides[0]), static_cast<int>(sides[1])};
+  return told_sensor(sides[0], sides[1], name + " (attribute sensor_resolution)");
 }
 
 /// The images' names in their order, which is that of their numbers of nine digits.
@@ -87,8 +67,9 @@ class ImageDatasets final : public FrameStore {
     images_ = image_names(*file);
     for (const std::string& image : images_) {
       const Hdf5Handle dataset = open_object(*file, image);
-      const std::vector<double> time_s = read_numbers(dataset, "timestamp");
-      if (time_s.size() != 1) {
+      const std::vector<double> time_s =
+          read_attribute(dataset, "timestamp", 1, fmt::format("{} ({})", name_, image));
+      if (time_s.empty()) {
         throw InputError(fmt::format("expected a time, got none, in {} ({}, attribute timestamp)",
                                      name_, image));
       }

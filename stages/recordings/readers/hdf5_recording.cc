@@ -234,7 +234,13 @@ std::unique_ptr<Recording> open_hdf5_recording(const std::filesystem::path& path
   const auto file = std::make_shared<const Hdf5RecordingFile>(path, layout);
   StoredParts parts{
       .name = path.string(), .size = {}, .events = std::make_unique<Hdf5Events>(file)};
-  parts.size = sensor_size(file->size(), sensor, parts);
+  std::optional<ImageSize> told = file->size();
+  if (!told && !sensor) {
+    told = read_hdf5(parts.name, [&] {
+      return attribute_size(file->tables()->file, layout.events, parts.name);
+    });
+  }
+  parts.size = sensor_size(told, sensor, parts);
   parts.index_key = std::move(index_key);
   if (file->size() == parts.size) parts.frames = std::make_unique<Frames>(file);
   return make_stored_recording(std::move(parts));

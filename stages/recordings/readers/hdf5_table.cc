@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "stages/recordings/order/event_index.h"
+#include "stages/recordings/readers/detail/stored_recording.h"
 
 namespace eventgan {
 namespace {
@@ -183,6 +184,49 @@ std::string hdf5_index_key(const std::filesystem::path& path, const std::string&
   } catch (const std::exception&) {  // told when it is opened
     return "";
   }
+}
+
+std::vector<double> read_attribute(hid_t object, const char* name, hssize_t most,
+                                   const std::string& place) {
+  if (checked(H5Aexists(object, name), "look for", name) == 0) return {};
+  const Hdf5Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose, "open", name);
+  const Hdf5Handle type(H5Aget_type(attribute), H5Tclose, "read", name);
+  const Hdf5Handle space(H5Aget_space(attribute), H5Sclose, "read", name);
+  const hssize_t count = checked(H5Sget_simple_extent_npoints(space), "read", name);
+  const H5T_class_t kind = H5Tget_class(type);
+  if ((kind != H5T_INTEGER && kind != H5T_FLOAT) || count < 1 || count > most) {
+    throw InputError(fmt::format("expected {}, got {} [{}], in {} (attribute {})",
+                                 most == 1 ? "a number" : "numbers", describe_type(type), count,
+                                 place, name));
+  }
+  std::vector<double> numbers(static_cast<std::size_t>(count));
+  checked(H5Aread(attribute, H5T_NATIVE_DOUBLE, numbers.data()), "read", name);
+  return numbers;
+}
+
+ImageSize told_sensor(double height, double width, const std::string& place) {
+  const auto is_side = [](double side) {
+    return side >= 1 && side <= kMostSensorSide && side == std::floor(side);
+  };
+  if (!is_side(height) || !is_side(width)) {
+    throw InputError(fmt::format("expected a sensor of 1 to {} pixels a side, got {}x{}, in {}",
+                                 kMostSensorSide, width, height, place));
+  }
+  return {static_cast<int>(height), static_cast<int>(width)};
+}
+
+std::optional<ImageSize> attribute_size(hid_t file, const std::string& path,
+                                        const std::string& file_name) {
+  for (const std::string& owner : {path, std::string("/")}) {
+    const Hdf5Handle object = open_object(file, owner);
+    const std::string place = fmt::format("{} ({})", file_name, owner);
+    const std::vector<double> width = read_attribute(object, "width", 1, place);
+    const std::vector<double> height = read_attribute(object, "height", 1, place);
+    if (!width.empty() && !height.empty()) {
+      return told_sensor(height[0], width[0], place + " (attributes width, height)");
+    }
+  }
+  return std::nullopt;
 }
 
 Hdf5Table::Hdf5Table(hid_t file, const std::string& path, const std::string& file_name)

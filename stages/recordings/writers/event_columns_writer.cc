@@ -66,6 +66,8 @@ struct EventColumnsWriter::File {
       t_after_offset = column<std::uint32_t>(hdf5.id(), names.column("t"));
       ms_to_idx = column<std::uint64_t>(hdf5.id(), names.ms_index);
       write_number(hdf5.id(), names.t_offset, offset_us);
+      write_attribute(hdf5.id(), "height", size.height);
+      write_attribute(hdf5.id(), "width", size.width);
     } else {
       t = column<std::int64_t>(hdf5.id(), names.column("t"));
       write_number(hdf5.id(), names.size.at(0), size.height);

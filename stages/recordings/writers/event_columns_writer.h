@@ -26,7 +26,8 @@ void require_recordable(std::span<const StampedEvent> events, ImageSize size,
 /// 1), t in microseconds.
 enum class ColumnFile {
   /// DSEC's events.h5: t uint32, counted from `t_offset` (int64, a number by itself), and
-  /// `ms_to_idx` uint64: entry m is the index of the first event with t >= 1000 m.
+  /// `ms_to_idx` uint64: entry m is the index of the first event with t >= 1000 m. DSEC's has no
+  /// size, which are the file's attributes `height` and `width` here, int32.
   kDsec,
   /// Prophesee's as RVT reads them (*_td.h5): t int64, and the numbers `events/height` and
   /// `events/width`, int64.

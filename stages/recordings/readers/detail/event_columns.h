@@ -14,7 +14,9 @@ StoredParts open_event_columns(const std::filesystem::path& path, const ColumnLa
                                const RecordingOptions& options);
 
 /// `path` is a sequence's folder, or its events.h5. The sensor is the options', else what the file
-/// says, else, of a file with ms_to_idx and t_offset, 640x480.
+/// says (events/height and events/width, or attributes), else, of a file with ms_to_idx and
+/// t_offset, one that its events reach, which a note says. `ms_to_idx` is not needed: a note says
+/// if it does not fit.
 ///
 /// Frames are the PNGs of SEQUENCE/images/left/distorted, as DSEC-Det has them, with the times of
 /// SEQUENCE/images/timestamps.txt; with `rectify` those of images/left/rectified. DSEC's own images

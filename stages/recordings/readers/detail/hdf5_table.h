@@ -2,9 +2,12 @@
 
 #include <exception>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/frames.h"
 #include "stages/base/hdf5/hdf5.h"
 
 namespace eventgan {
@@ -28,6 +31,20 @@ auto read_hdf5(const std::string& place, Read read) {
     std::throw_with_nested(InputError("expected readable values, got damage, in " + place));
   }
 }
+
+/// The numbers of an attribute; none if it is absent. Throws InputError, which names `place`, if it
+/// has other values or more than `most`; Hdf5Error.
+std::vector<double> read_attribute(hid_t object, const char* name, hssize_t most,
+                                   const std::string& place);
+
+/// A sensor's size by what a file says of its sides. Throws InputError unless these are whole
+/// numbers of 1 to kMostSensorSide.
+ImageSize told_sensor(double height, double width, const std::string& place);
+
+/// The size that the attributes `width` and `height` of the object at `path`, or else of the file,
+/// tell; none if neither has both. Throws as read_attribute and told_sensor.
+std::optional<ImageSize> attribute_size(hid_t file, const std::string& path,
+                                        const std::string& file_name);
 
 /// An open dataset of numbers, of which parts are read.
 class Hdf5Table {

@@ -280,6 +280,68 @@ TEST_F(RecordingDatasetTest, AFolderHoldsRecordingsOfAnyLayout) {
   EXPECT_THAT(dataset->notes(), Contains("1 recording without labels left out in all: a"));
 }
 
+/// A box of DSEC-Det's at 1 s, and its events.
+class TracksTest : public RecordingDatasetTest {
+ protected:
+  TracksTest() {
+    using Numbers = std::vector<std::int64_t>;
+    for (const char* name : {"events.h5", "events_2x.h5"}) {
+      testing::write_hdf5(at("train/seq/events/left/"s + name),
+                          {{"events/x", {{2}, Numbers{0, 1}}},
+                           {"events/y", {{2}, Numbers{0, 1}}},
+                           {"events/t", {{2}, Numbers{0, 1'000'000}}},
+                           {"events/p", {{2}, Numbers{0, 1}}}});
+    }
+    write(kTracks, testing::npy_file(
+                       "{'descr': [('t', '<f8'), ('x', '<f8'), ('y', '<f8'), ('h', '<f8'), ('w', "
+                       "'<f8'), ('class_id', '<f8'), ('track_id', '<f8')], 'fortran_order': False, "
+                       "'shape': (1,), }",
+                       numbers({1e6, 0, 1, 2, 3, 4, 7})));
+    spec_.recording.sensor = ImageSize{3, 4};
+    spec_.window.duration_s = 0.5;
+  }
+
+  static std::string numbers(const std::vector<double>& values) {
+    return {reinterpret_cast<const char*>(values.data()), 8 * values.size()};
+  }
+
+  static constexpr char kTracks[] = "train/seq/object_detections/left/tracks.npy";
+};
+
+TEST_F(TracksTest, OfDsecDetAreFoundInTheirPlace) {
+  for (const char* root : {"train", "train/seq", "train/seq/events/left/events.h5"}) {
+    SCOPED_TRACE(root);
+    spec_.root = root;
+    const auto dataset = open();
+    EXPECT_THAT(annotation_of(*dataset).boxes,
+                ElementsAre(Box{.class_id = 0, .xyxy = {0, 1, 3, 3}, .track_id = 7}));
+    EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("class 4"));
+    EXPECT_THAT(dataset->annotation_files(), Contains(kTracks));
+  }
+  fs::create_directories(at("det/seq"));
+  fs::rename(at("train/seq/object_detections"), at("det/seq/object_detections"));
+  spec_.root = "train";
+  EXPECT_THAT(open()->annotation_files(), IsEmpty());
+  spec_.annotations = "det";
+  EXPECT_THAT(open()->annotation_files(), Contains("det/seq/object_detections/left/tracks.npy"));
+}
+
+TEST_F(TracksTest, HaveTheNamesOfTheExportThatTheyLieIn) {
+  write("label_map_dictionary.json", R"({"4": "car"})");  // of another dataset, perhaps
+  spec_.root = "train";
+  EXPECT_THAT(open()->label_schema().class_names, ElementsAre("class 4"));
+  write("export.json", "{}");
+  EXPECT_THAT(open()->label_schema().class_names, ElementsAre("car"));
+  EXPECT_THAT(open()->annotation_files(), Contains("label_map_dictionary.json"));
+}
+
+TEST_F(TracksTest, AreOfThePixelsOfTheEventsAsRecorded) {
+  spec_.root = "train/seq/events/left/events_2x.h5";
+  EXPECT_THAT(open()->annotation_files(), IsEmpty());
+  EXPECT_THAT(open()->notes(),
+              ElementsAre(HasSubstr("no labels, since they are of the pixels of")));
+}
+
 TEST_F(RecordingDatasetTest, RefusesWhatDoesNotFit) {
   label("1.5\n");
   write("drive.json", R"({"format": "eventgan-labels", "version": 1, "samples": []})");
@@ -382,6 +444,15 @@ TEST_F(WithoutFramesTest, LabelsMakeWindowsOfTimeOrOfEvents) {
   EXPECT_THAT(events(*open(), 0), ElementsAre(all_[2], all_[3]));
   spec_.window.duration_s.reset();
   refused("expected window_s or window_events, since the recording has no frames, got neither");
+}
+
+TEST_F(WithoutFramesTest, ALabelMayLieBehindTheLastEventAsFarAsItsWindowReaches) {
+  write("labels.csv", kLabelHeader + "2.74,0,0,2,1,car,\n2.75,0,0,2,1,car,\n"s);
+  spec_.annotations = "labels.csv";
+  spec_.window.duration_s = 0.25;
+  EXPECT_THAT(faults_of(*open()),
+              ElementsAre("", HasSubstr("which the recording lasts, got 2.75")));
+  EXPECT_THAT(events(*open(), 0), ElementsAre(all_[6]));
 }
 
 TEST_F(WithoutFramesTest, NothingIsGuessed) {

@@ -5,7 +5,9 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "manifests/values/faults.h"
 #include "stages/base/images/image_file.h"
@@ -17,6 +19,7 @@
 namespace eventgan {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -105,13 +108,84 @@ TEST_F(DsecTest, DoesWithoutIndexAndOffsetAndTakesTheSizeOfTheFile) {
   refuses("expected 1 whole number, got int64 [3]");
 }
 
-TEST_F(DsecTest, AsksForTheSizeUnlessTheFileIsDsecsOwn) {
+TEST_F(DsecTest, AssumesASizeThatTheEventsReachOrAsks) {
+  struct Case {
+    std::int64_t x, y;  // the largest
+    std::optional<ImageSize> size;
+  };
+  constexpr ImageSize kDsec{480, 640};
   options_.sensor.reset();
-  EXPECT_EQ(open()->size(), (ImageSize{480, 640}));
-  datasets_.erase("ms_to_idx");
-  refuses("\"sensor\": {\"width\"");
-  datasets_.erase("t_offset");
-  refuses("\"sensor\": {\"width\"");
+  for (const auto& [x, y, size] : {Case{639, 479, kDsec},
+                                   {346, 0, kDsec},
+                                   {0, 260, kDsec},
+                                   {344, 259, {}},
+                                   {345, 259, ImageSize{260, 346}},
+                                   {319, 239, ImageSize{240, 320}},
+                                   {319, 238, {}},
+                                   {640, 0, {}},
+                                   {0, 480, {}},
+                                   {1279, 719, ImageSize{720, 1280}},
+                                   {1279, 718, {}},
+                                   {std::int64_t{1} << 40, 0, {}}}) {
+    SCOPED_TRACE(std::to_string(x) + ", " + std::to_string(y));
+    datasets_["events/x"] = {{5}, Numbers{0, x, 0, 0, -1}};
+    datasets_["events/y"] = {{5}, Numbers{0, 0, y, 0, 0}};
+    if (!size) {
+      refuses("\"sensor\": {\"width\"");
+      continue;
+    }
+    const auto recording = open();
+    EXPECT_EQ(recording->size(), *size);
+    EXPECT_THAT(recording->notes(), ElementsAre(HasSubstr(to_string(*size) + " is assumed")));
+  }
+  datasets_["events/x"] = {{5}, Numbers{0, 639, 0, 0, 0}};
+  for (const char* missing : {"ms_to_idx", "t_offset"}) {  // of another camera's kind
+    datasets_.erase(missing);
+    refuses("\"sensor\": {\"width\"");
+  }
+}
+
+TEST_F(DsecTest, TakesTheSizeOfAttributes) {
+  struct Case {
+    const char* owner;
+    testing::Hdf5Dataset width, height;
+    const char* fault;
+  };
+  const testing::Hdf5Dataset three{{}, Numbers{3}}, five{{}, Numbers{5}};
+  options_.sensor.reset();
+  const auto datasets = datasets_;
+  for (const auto& [owner, width, height, fault] : std::vector<Case>{
+           {"", five, three, ""},
+           {"events", five, three, ""},
+           {"", {{1}, std::vector<double>{5}}, {{}, std::vector<std::uint8_t>{3}}, ""},
+           {"", {{}, std::vector<double>{5.5}}, three, "1 to 8192 pixels a side, got 5.5x3"},
+           {"",
+            five,
+            {{}, std::vector<double>{std::nan("")}},
+            "1 to 8192 pixels a side, got 5xnan"},
+           {"events", {{}, Numbers{-5}}, three, "1 to 8192 pixels a side, got -5x3"},
+           {"", {{}, Numbers{std::int64_t{1} << 62}}, three, "1 to 8192 pixels a side"},
+           {"", {{}, std::vector<std::string>{"5"}}, three, "expected a number, got text [1]"},
+           {"events",
+            five,
+            {{}, std::vector<std::string>{"3"}, 1},
+            "expected a number, got text [1]"},
+           {"", {{2}, Numbers{5, 5}}, three, "expected a number, got int64 [2]"}}) {
+    SCOPED_TRACE(std::string(owner) + fault);
+    datasets_ = datasets;
+    datasets_[std::string(owner) + "@width"] = width;
+    datasets_[std::string(owner) + "@height"] = height;
+    if (*fault == '\0') {
+      const auto recording = open();
+      EXPECT_EQ(recording->size(), (ImageSize{3, 5}));
+      EXPECT_THAT(recording->notes(), IsEmpty());
+      continue;
+    }
+    refuses(fault);
+    options_.sensor = ImageSize{3, 4};  // which counts
+    EXPECT_THAT(open()->warnings(), ElementsAre(HasSubstr(fault)));
+    options_.sensor.reset();
+  }
 }
 
 TEST_F(DsecTest, WindowsThatTouchAFallAreRefusedAlone) {
@@ -130,6 +204,8 @@ TEST_F(DsecTest, WithoutEventsThereIsNoTime) {
     datasets_[std::string("events/") + name] = {{0}, Numbers{}};
   }
   datasets_["ms_to_idx"] = {{0}, Numbers{}};
+  options_.sensor.reset();
+  EXPECT_EQ(open()->size(), (ImageSize{480, 640}));
   EXPECT_EQ(open()->event_span(), std::nullopt);
   EXPECT_THAT(open()->events_in(0, 100), IsEmpty());
 }
@@ -163,15 +239,32 @@ TEST_F(DsecTest, NamesTheEventThatIsWrong) {
   changed("events/t", {0, 1000, 1000, 2500, most}, "expected a time of fewer than 2^53 us");
 }
 
-TEST_F(DsecTest, RefusesAnIndexOfOtherTimes) {
-  datasets_["ms_to_idx"] = {{4}, Numbers{0, 1, 2, 4}};
-  refuses("expected the first of 5 events at or after 2 ms, got event 2");
-  datasets_["ms_to_idx"] = {{4}, Numbers{0, 1, 3, 6}};
-  refuses("got event 6");
-  datasets_["ms_to_idx"] = {{4}, Numbers{0, -1, 3, 4}};
-  refuses("got event -1");
-  datasets_["ms_to_idx"] = {{6}, Numbers{0, 1, 3, 4, 5, 5}};  // beyond the last event
-  EXPECT_NO_THROW(open());
+TEST_F(DsecTest, DoesWithoutAnIndexOfOtherEvents) {
+  struct Case {
+    testing::Hdf5Dataset index;
+    const char* fault;  // empty: it fits
+  };
+  for (const auto& [index, fault] : std::vector<Case>{
+           {{{4}, Numbers{0, 1, 2, 4}},
+            "expected the first of 5 events at or after 2 ms, got event 2"},
+           {{{4}, Numbers{-1, 0, 2, 3}}, "got event -1"},
+           {{{4}, Numbers{0, 1, 3, 6}}, "got event 6"},
+           {{{4}, std::vector<double>{0, 1, 3, 4}}, "expected whole numbers [N], got float64 [4]"},
+           {{{2, 2}, Numbers{0, 1, 3, 4}}, "expected whole numbers [N], got int64 [2, 2]"},
+           {{{1}, std::vector<std::string>{"0"}}, "expected numbers, got text"},
+           {{{6}, Numbers{0, 1, 3, 4, 5, 5}}, ""}}) {  // beyond the last event
+    SCOPED_TRACE(fault);
+    datasets_["ms_to_idx"] = index;
+    const auto recording = open();
+    EXPECT_EQ(recording->events_in(10.0, 10.0025).size(), 3u);
+    if (*fault == '\0') {
+      EXPECT_THAT(recording->notes(), IsEmpty());
+    } else {
+      EXPECT_THAT(recording->notes(),
+                  ElementsAre(AllOf(HasSubstr("ms_to_idx does not fit the events and is not used"),
+                                    HasSubstr(fault))));
+    }
+  }
   datasets_["t_offset"] = {{}, Numbers{std::int64_t{1} << 60}};
   refuses("expected an offset of fewer than 2^53 us");
 }

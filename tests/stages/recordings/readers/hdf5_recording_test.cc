@@ -332,6 +332,13 @@ TEST_F(V2eTest, HasMicrosecondsFirstAndAsksForTheSize) {
               ElementsAre(Event{2, 1, 0.001, true}, Event{0, 1, 0.0025, false}));
 }
 
+TEST_F(V2eTest, AttributesTellTheSize) {
+  datasets_["events@width"] = {{}, Numbers{3}};
+  datasets_["events@height"] = {{}, Numbers{2}};
+  EXPECT_EQ(open()->size(), (ImageSize{2, 3}));
+  EXPECT_EQ(open()->frame_count(), 0);
+}
+
 TEST_F(V2eTest, FramesTellTheSize) {
   datasets_["frame"] = {{2, 2, 3},
                         std::vector<std::uint8_t>{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}};

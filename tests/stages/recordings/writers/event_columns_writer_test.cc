@@ -59,6 +59,10 @@ TEST(EventColumnsWriter, IndexesEachMillisecondAsDsecDoes) {
             std::vector<std::uint16_t>(kTimes_us.size(), 5));
   EXPECT_EQ(numbers<std::uint8_t>(folder / "events.h5", "events/p"),
             std::vector<std::uint8_t>(kTimes_us.size(), 0));
+  const Hdf5Lock lock;
+  const Hdf5Handle file = open_hdf5_file(folder / "events.h5");
+  EXPECT_EQ(read_number_attribute(file, "height"), 4);
+  EXPECT_EQ(read_number_attribute(file, "width"), 6);
 }
 
 TEST(EventColumnsWriter, OfProphesee) {
