@@ -134,8 +134,8 @@ void list_columns(Fields& fields, EventFields& spec) {
   fields.find("p", spec.p, texts(), "Polarities, 1 and 0 or 1 and -1; by default 3.");
   fields.find(
       "unit", spec.tick_s, words(kTimeUnitWords),
-      "What the times count. Default: what the name's end says (_s, _ms, _us, _ns), else s "
-      "where they have decimals, ns where they are of the clock of the day in ns, else us.");
+      "What the times count. Default: what the name's end says (_s, _ms, _us, _ns), else what "
+      "makes a recording of the times; if two do, it must be given.");
 }
 
 /// What a recording of events does not tell of itself.

@@ -138,12 +138,12 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
                         const GivenWishes& wishes) {
   GivenJob job;
   if (!may_be_source(given)) {
+    if (const std::string fault = fault_of_file(given); !fault.empty()) throw UsageError(fault);
     if (const std::string text = wishes.text(); !text.empty()) {
       throw UsageError(fmt::format(
           "{}: expected a folder, video or recording, got a manifest, whose keys count, in {}",
           text.substr(1), given.string()));
     }
-    if (const std::string fault = fault_of_file(given); !fault.empty()) throw UsageError(fault);
     job.manifest = read_job_manifest(given);
     job.output =
         output.value_or(resolve(job.manifest, job.manifest.output.directory).lexically_normal());

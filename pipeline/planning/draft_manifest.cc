@@ -165,7 +165,9 @@ class Draft {
       keys += fmt::format("      \"classes\": [{}],\n", fmt::join(classes, ", "));
     }
     if (found.columns != EventFields()) {
-      keys += fmt::format("      \"columns\": {{ \"t\": {} }},\n", quoted(found.columns.t));
+      const std::string& p = found.columns.p;
+      keys += fmt::format("      \"columns\": {{ \"t\": {}{} }},\n", quoted(found.columns.t),
+                          p == EventFields().p ? "" : ", \"p\": " + quoted(p));
     }
     return keys;
   }

@@ -282,20 +282,16 @@ std::unique_ptr<Dataset> open_source(SourceSpec spec, const fs::path& folder,
   if (!has_events(spec.dataset) || spec.recording.sensor) throw;
   constexpr int kLargest = 8192;
   spec.recording.sensor = ImageSize{kLargest, kLargest};
-  try {
-    auto dataset = open_dataset(spec, folder);
-    draft.needs_sensor = true;
-    draft.guess = guess_sensor(*dataset);
-    draft.findings.emplace_back("no size of the sensor in the files: set \"sensor\"");
-    if (const auto& guess = draft.guess) {
-      draft.findings.back() +=
-          fmt::format(" (the events reach x = {}, y = {}, as those of a camera of {})", guess->x,
-                      guess->y, to_string(guess->size));
-    }
-    return dataset;
-  } catch (const InputError&) {  // it lacks something else
+  auto dataset = open_dataset(spec, folder);
+  draft.needs_sensor = true;
+  draft.guess = guess_sensor(*dataset);
+  draft.findings.emplace_back("no size of the sensor in the files: set \"sensor\"");
+  if (const auto& guess = draft.guess) {
+    draft.findings.back() +=
+        fmt::format(" (the events reach x = {}, y = {}, as those of a camera of {})", guess->x,
+                    guess->y, to_string(guess->size));
   }
-  throw;
+  return dataset;
 }
 
 /// Whether each of the recordings is a window by itself, as tables with YOLO's texts are.

@@ -234,6 +234,16 @@ class Init(program.InFolder):
                           "as a list of people, recording of an event camera, images or videos, got none of these, "
                           f"in {path}", self.init(path, expect=66))
         self.assertIn("expected a folder or a video", self.init(self.folder / "absent", expect=66))
+        stream = self.folder / "a.es"
+        stream.write_bytes(b"Event Stream")
+        self.assertIn("got an Event Stream (.es), in ", self.init(stream, expect=66))
+        self.assertIn("got an Event Stream (.es), in ",
+                      run("convert", stream, "--sensor", "346x260", "--output", self.folder / "o", expect=64)[1])
+        ticks = self.folder / "ticks.npy"  # the sensor's size is asked for last
+        np.save(ticks, np.stack([np.arange(6000) // 6, np.arange(6000) * 7 % 64, np.arange(6000) * 5 % 48,
+                                 np.arange(6000) % 2], 1))
+        self.assertIn("since the times may be us (0.000999 s, 6000 events, 6.01 million a second) or ms (0.999 s, ",
+                      self.init(ticks, expect=66))
         self.assertIn("PATH: expected a value, got nothing", self.init("", expect=64))
         write_cars(self.folder / "k", 1, np.random.default_rng(7))
         self.assertIn("PATH: expected a value, got nothing", self.init(self.folder / "k", "", expect=64))

@@ -37,9 +37,10 @@ struct FoundRecording {
 };
 
 std::optional<FoundRecording> recording_at(const fs::path& path) {
-  // Of other names of the time it would be a guess what they count.
-  for (const char* time : {"t", "t_us"}) {
-    const EventFields columns{.t = time};
+  // PEDRo's, and those of TimeLens and of iniVation's DV.
+  static const std::array<EventFields, 3> kColumns{
+      {{}, {.t = "t_us"}, {.t = "timestamp", .p = "polarity"}}};
+  for (const EventFields& columns : kColumns) {
     if (const auto format = find_recording_format(path, {.columns = columns})) {
       return FoundRecording{*format, columns};
     }

@@ -5,6 +5,7 @@
 #include <system_error>
 #include <utility>
 
+#include "manifests/files/csv_records.h"
 #include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
@@ -164,6 +165,27 @@ std::optional<FileKind> kind_of_text(std::string_view text) {
   return std::nullopt;
 }
 
+/// Whether a file that is no recording as it is may be meant as one: HDF5, arrays, or a table with
+/// times and places, or of four numbers a line.
+bool may_have_events(const fs::path& file, std::string_view text) {
+  constexpr std::array kExtensions{".npy", ".npz", ".h5", ".hdf5"};
+  const std::string extension = lower_extension(file);
+  if (std::ranges::find(kExtensions, extension) != kExtensions.end()) return true;
+  const auto first = CsvReader(text).next();
+  if (extension != ".csv" || !first) return false;
+  bool has_time = false, has_x = false;
+  for (const std::string_view field : first->fields) {
+    has_time |= field == "t" || field.starts_with("t_") || field.starts_with("ts") ||
+                field.starts_with("time");
+    has_x |= field == "x";
+  }
+  const auto is_number = [](std::string_view field) {
+    return field.find_first_not_of("+-.eE0123456789") == field.npos;
+  };
+  return (has_time && has_x) ||
+         (first->fields.size() == 4 && std::ranges::all_of(first->fields, is_number));
+}
+
 std::optional<FileKind> kind_of_file(std::string_view text) {
   constexpr FileKind kCheckpoint{"a checkpoint of PyTorch",
                                  "eventgan import-weights makes weights of EventGAN's, which a "
@@ -230,11 +252,10 @@ std::string fault_of_file(const fs::path& file) {
   std::string reason;
   const auto input = InputFile::open(file, reason);
   if (!input) return {};
-  if (const RecordingFault recording = recording_fault(file, {}); recording.is_recording) {
-    return recording.reason;
-  }
   std::string text(kLooked, '\0');
   text.resize(input->read_some(0, text));
+  const RecordingFault recording = recording_fault(file, {});
+  if (recording.is_recording || may_have_events(file, text)) return recording.reason;
   const auto kind = kind_of_file(text);
   if (!kind) return {};
   return "expected a manifest, folder, video or recording, got " + std::string(kind->title) +

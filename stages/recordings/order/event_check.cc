@@ -25,15 +25,16 @@ void check_event_time(double previous_s, double time_s) {
 }
 
 Event EventCheck::take(const StoredEvent& stored) {
-  const bool positive = stored.polarity == 1;
-  const bool off = stored.polarity == -1 || stored.polarity == 0;
+  const double polarity = signed_polarity(stored.polarity);
+  const bool positive = polarity == 1;
+  const bool off = polarity == -1 || polarity == 0;
   const bool in_order = first_ ? stored.t_s > last_s_ : stored.t_s >= last_s_;
-  const bool one_convention = !off || std::isnan(off_) || off_ == stored.polarity;
+  const bool one_convention = !off || std::isnan(off_) || off_ == polarity;
   if (!is_index(stored.x, size_.width) || !is_index(stored.y, size_.height) || !(positive || off) ||
       !one_convention || !in_order || !(stored.t_s <= until_s_)) {
     refuse(stored);
   }
-  if (off) off_ = stored.polarity;
+  if (off) off_ = polarity;
   first_ = false;
   last_s_ = stored.t_s;
   return {static_cast<int>(stored.x), static_cast<int>(stored.y), stored.t_s, positive};

@@ -25,8 +25,14 @@ class EventFault : public std::runtime_error {
 /// Throws EventFault unless `time_s` is finite and not before `previous_s`.
 void check_event_time(double previous_s, double time_s);
 
+/// -1 where a file has it in numbers without a sign of 8, 16 or 32 bits.
+constexpr double signed_polarity(double polarity) {
+  return polarity == 255 || polarity == 65'535 || polarity == 4'294'967'295 ? -1 : polarity;
+}
+
 /// What holds for the events of one stretch of a recording: whole coordinates inside the image,
-/// finite times that never decrease, in (after_s, until_s], polarities of {-1, +1} or of {0, 1}.
+/// finite times that never decrease, in (after_s, until_s], polarities of {-1, +1} or of {0, 1}; of
+/// those -1 as signed_polarity has it, too.
 class EventCheck {
  public:
   EventCheck(ImageSize size, double after_s, double until_s)

@@ -30,13 +30,14 @@ void CompactEvents::reserve(std::size_t count) {
 }
 
 void CompactEvents::push_back(const StoredEvent& event) {
-  const bool is_whole = fits<std::int16_t>(event.x) && fits<std::int16_t>(event.y) &&
-                        fits<std::int8_t>(event.polarity);
+  const double polarity = signed_polarity(event.polarity);
+  const bool is_whole =
+      fits<std::int16_t>(event.x) && fits<std::int16_t>(event.y) && fits<std::int8_t>(polarity);
   if (!is_whole) others_.emplace(size(), event);
   t_s_.push_back(event.t_s);
   x_.push_back(is_whole ? static_cast<std::int16_t>(event.x) : std::int16_t{0});
   y_.push_back(is_whole ? static_cast<std::int16_t>(event.y) : std::int16_t{0});
-  polarity_.push_back(is_whole ? static_cast<std::int8_t>(event.polarity) : std::int8_t{0});
+  polarity_.push_back(is_whole ? static_cast<std::int8_t>(polarity) : std::int8_t{0});
 }
 
 void CompactEvents::divide_times(double divisor) {

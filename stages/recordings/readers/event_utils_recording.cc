@@ -26,13 +26,15 @@ namespace {
 // HDF5 as event_utils writes it (lib/data_formats/event_packagers.py), and HQF, EVREAL and others
 // with it: events/{xs, ys, ts, ps}, ts in seconds, and images/image000000000, ... with the
 // attribute timestamp; the file's attribute sensor_resolution is height and width, and perhaps
-// channels.
+// channels. event-vision-library writes raw_events/{x, y, t, p}, t in seconds, alone.
 
 constexpr char kImages[] = "images";
 
-const ColumnLayout& layout() {
-  static const ColumnLayout kLayout{.events = "events", .ending = "s", .counts_seconds = true};
-  return kLayout;
+const std::array<ColumnLayout, 2>& layouts() {
+  static const std::array<ColumnLayout, 2> kLayouts{
+      {{.events = "events", .ending = "s", .counts_seconds = true},
+       {.events = "raw_events", .counts_seconds = true}}};
+  return kLayouts;
 }
 
 std::optional<ImageSize> told_size(hid_t file, const std::string& name) {
@@ -131,7 +133,9 @@ std::unique_ptr<Recording> open_event_utils(const std::filesystem::path& path,
     sized.sensor = sensor_size(told, options.sensor, parts);
     warnings = std::move(parts.warnings);
   }
-  StoredParts parts = open_event_columns(path, layout(), sized);
+  const RecordingInput input(path);
+  const bool is_raw = input.has_hdf5_dataset(layouts()[1].column("t"));
+  StoredParts parts = open_event_columns(path, layouts()[is_raw ? 1 : 0], sized);
   parts.warnings = std::move(warnings);
   auto frames = read_hdf5(name, [&] { return std::make_unique<ImageDatasets>(path, parts.size); });
   if (!frames->times_s().empty()) parts.frames = std::move(frames);
@@ -142,8 +146,12 @@ std::unique_ptr<Recording> open_event_utils(const std::filesystem::path& path,
 
 constinit const RecordingReader kEventUtilsReader{
     .format = RecordingFormat::kEventUtils,
-    .fits = [](const RecordingInput& input,
-               const RecordingOptions&) { return input.has_hdf5_dataset(layout().column("t")); },
+    .fits =
+        [](const RecordingInput& input, const RecordingOptions&) {
+          return std::ranges::any_of(layouts(), [&](const ColumnLayout& layout) {
+            return input.has_hdf5_dataset(layout.column("t"));
+          });
+        },
     .open = open_event_utils};
 
 }  // namespace eventgan

@@ -25,6 +25,7 @@
 #include "stages/recordings/readers/detail/event_parts.h"
 #include "stages/recordings/readers/detail/recording_reader.h"
 #include "stages/recordings/readers/detail/stored_recording.h"
+#include "stages/recordings/readers/detail/time_unit.h"
 
 namespace eventgan {
 namespace {
@@ -38,30 +39,91 @@ std::array<std::string, kColumns> names_of(const EventFields& columns) {
   return {columns.t, columns.x, columns.y, columns.p};
 }
 
-/// A row's numbers, in the columns' order.
+/// A row's numbers, in the columns' order, and where a file has them.
 using Row = std::array<double, kColumns>;
+using Places = std::array<std::size_t, kColumns>;
 
 /// Events with their times as the table has them, and how large its sensor is if it says.
 struct TableContent {
   CompactEvents events;
-  std::optional<ImageSize> sensor;
+  std::optional<ImageSize> sensor = {};
+  std::string note = {};  ///< empty: none
 };
 
 StoredEvent event_of(const Row& row) { return {row[kX], row[kY], row[kTime], row[kPolarity]}; }
 
-// ---- NumPy
+// ---- columns without names
 
-/// Columns of an array [N, 4] by the names that the options give them.
-std::array<std::size_t, kColumns> places_of(const EventFields& columns, const std::string& name) {
+constexpr Places kMetavisionPlaces{3, 0, 1, 2}, kArrayPlaces{0, 1, 2, 3};
+constexpr std::size_t kLookedRows = 10'000;  ///< the first ones tell
+
+std::string order_text(const Places& places) {
+  std::array<std::string_view, kColumns> words;
+  for (std::size_t i = 0; i < kColumns; ++i) words[places[i]] = std::array{"t", "x", "y", "p"}[i];
+  return fmt::format("{}", fmt::join(words, ", "));
+}
+
+/// Which column is what, by those that have polarities and those that never fall: as usual if that
+/// may be, else the only way in which one is p and another t, x being before y. None: no way.
+std::optional<Places> order_of(std::span<const Row> rows, const Places& usual) {
+  constexpr std::size_t kFewRows = 20;
+  std::array<bool, kColumns> may_be_p{}, never_falls{};
+  for (std::size_t i = 0; i < kColumns; ++i) {
+    const auto value = [i](const Row& row) { return row[i]; };
+    const auto others = std::ranges::count_if(rows, [i](const Row& row) {
+      const double polarity = signed_polarity(row[i]);
+      return polarity != 1 && polarity != 0 && polarity != -1;
+    });
+    may_be_p[i] = others * 100 <= std::ssize(rows);  // a few are at fault
+    never_falls[i] = std::ranges::is_sorted(rows, {}, value);
+  }
+  const bool has_p = may_be_p[usual[kPolarity]];
+  if (rows.size() < kFewRows || (has_p && never_falls[usual[kTime]])) return usual;
+  std::vector<Places> ways;
+  for (std::size_t t = 0; t < kColumns; ++t) {
+    for (std::size_t p = 0; p < kColumns; ++p) {
+      if (!never_falls[t] || may_be_p[t] || !may_be_p[p]) continue;
+      std::size_t x = 0;
+      while (x == t || x == p) ++x;
+      ways.push_back({t, x, 6 - t - x - p, p});
+    }
+  }
+  if (ways.size() == 1) return ways[0];
+  return has_p ? std::optional(usual) : std::nullopt;
+}
+
+/// The same, with a note where it is not as usual. Throws InputError where there is no way.
+Places known_order(std::span<const Row> rows, const Places& usual, const std::string& name,
+                   std::string& note) {
+  const auto places = order_of(rows, usual);
+  if (!places) {
+    throw InputError(fmt::format(
+        "expected columns {} as of tables without names, got values other than 0, 1 and -1 for p, "
+        "in {} (the manifest's \"columns\": {{\"t\": \"0\", \"x\": \"1\", \"y\": \"2\", \"p\": "
+        "\"3\"}} says which is what)",
+        order_text(usual), name));
+  }
+  if (*places != usual) {
+    note = fmt::format(
+        "columns without names are taken as {}, since of these t never falls and p has two "
+        "values, in {}",
+        order_text(*places), name);
+  }
+  return *places;
+}
+
+/// Columns by the numbers that the options give them.
+Places places_of(const EventFields& columns, const std::string& name) {
   const std::array<std::string, kColumns> defaults = names_of(EventFields());
   const std::array<std::string, kColumns> names = names_of(columns);
-  std::array<std::size_t, kColumns> places{};
+  Places places{};
   for (std::size_t i = 0; i < kColumns; ++i) {
     const bool is_number = names[i].size() == 1 && names[i][0] >= '0' && names[i][0] <= '3';
     if (!is_number && names[i] != defaults[i]) {
       throw InputError(
-          "expected fields by names, got an array [N, 4] (\"columns\" may have the "
-          "numbers 0 to 3), in " +
+          "expected fields by names, got an array [N, 4] or lines without a header (\"columns\" "
+          "may "
+          "have the numbers 0 to 3), in " +
           name);
     }
     places[i] = is_number ? static_cast<std::size_t>(names[i][0] - '0') : i;
@@ -72,6 +134,12 @@ std::array<std::size_t, kColumns> places_of(const EventFields& columns, const st
   }
   return places;
 }
+
+bool has_usual_names(const EventFields& columns) {
+  return names_of(columns) == names_of(EventFields());
+}
+
+// ---- NumPy
 
 CompactEvents from_columns(const std::array<TypedArray, kColumns>& arrays,
                            const EventFields& columns, const std::string& file) {
@@ -95,25 +163,35 @@ CompactEvents from_columns(const std::array<TypedArray, kColumns>& arrays,
   return events;
 }
 
-CompactEvents read_npy(const fs::path& path, const EventFields& columns) {
+TableContent read_npy(const fs::path& path, const EventFields& columns) {
   const std::string name = path.string();
   const InputFile file(path);
   const std::vector<std::byte> bytes = file.read_bytes(0, file.size_bytes());
   std::size_t begin = 0;
   if (parse_npy_header(bytes, name, begin).fields.empty()) {
-    const std::array<std::size_t, kColumns> places = places_of(columns, name);
+    Places places = places_of(columns, name);
     const TypedArray array = parse_npy(bytes, name);
     if (array.shape.size() != 2 || array.shape[1] != kColumns || array.is_text()) {
       throw InputError("expected numbers [N, 4], got " + array.shape_text() + ", in " + name);
     }
-    CompactEvents events;
-    events.reserve(array.shape[0]);
-    for (std::size_t k = 0; k < array.shape[0]; ++k) {
+    const auto row_at = [&](std::size_t k, const Places& from) {
       Row row{};
-      for (std::size_t i = 0; i < kColumns; ++i) row[i] = array.number(k * kColumns + places[i]);
-      events.push_back(event_of(row));
+      for (std::size_t i = 0; i < kColumns; ++i) row[i] = array.number(k * kColumns + from[i]);
+      return row;
+    };
+    TableContent content;
+    if (has_usual_names(columns)) {
+      std::vector<Row> rows;
+      for (std::size_t k = 0; k < std::min<std::size_t>(array.shape[0], kLookedRows); ++k) {
+        rows.push_back(row_at(k, kArrayPlaces));
+      }
+      places = known_order(rows, kArrayPlaces, name, content.note);
     }
-    return events;
+    content.events.reserve(array.shape[0]);
+    for (std::size_t k = 0; k < array.shape[0]; ++k) {
+      content.events.push_back(event_of(row_at(k, places)));
+    }
+    return content;
   }
   std::vector<NamedArray> fields = parse_npy_fields(bytes, name);
   std::array<TypedArray, kColumns> arrays;
@@ -125,7 +203,7 @@ CompactEvents read_npy(const fs::path& path, const EventFields& columns) {
     }
     arrays[i] = field->values;  // a name may be there for two
   }
-  return from_columns(arrays, columns, name);
+  return {from_columns(arrays, columns, name)};
 }
 
 CompactEvents read_npz(const fs::path& path, const EventFields& columns) {
@@ -145,9 +223,8 @@ CompactEvents read_npz(const fs::path& path, const EventFields& columns) {
 // ---- CSV
 
 /// The columns' places in a header line; none unless it has all of them.
-std::optional<std::array<std::size_t, kColumns>> find_columns(const CsvRecord& header,
-                                                              const EventFields& columns) {
-  std::array<std::size_t, kColumns> places{};
+std::optional<Places> find_columns(const CsvRecord& header, const EventFields& columns) {
+  Places places{};
   const std::array<std::string, kColumns> names = names_of(columns);
   for (std::size_t i = 0; i < kColumns; ++i) {
     if (std::ranges::count(header.fields, names[i]) != 1) return std::nullopt;
@@ -157,14 +234,28 @@ std::optional<std::array<std::size_t, kColumns>> find_columns(const CsvRecord& h
   return places;
 }
 
-/// A line of Metavision's CSV, which has no header: x, y, p and t in µs, whole numbers.
-bool is_metavision_line(const CsvRecord& record) {
-  const auto is_whole = [](std::string_view field) {
-    std::int64_t number = 0;
-    const auto [stop, error] = std::from_chars(field.data(), field.data() + field.size(), number);
-    return error == std::errc() && stop == field.data() + field.size();
-  };
-  return record.fields.size() == kColumns && std::ranges::all_of(record.fields, is_whole);
+std::optional<double> number_of(std::string_view field) {
+  double number = 0;
+  const auto [stop, error] = std::from_chars(field.data(), field.data() + field.size(), number);
+  if (error != std::errc() || stop != field.data() + field.size()) return std::nullopt;
+  return number;
+}
+
+/// The first rows of a table without a header; none if it has one, or not four columns.
+std::vector<Row> first_rows(std::string_view text) {
+  std::vector<Row> rows;
+  CsvReader reader(text);
+  for (auto record = reader.next(); record && rows.size() < kLookedRows; record = reader.next()) {
+    if (record->fields.size() != kColumns) break;
+    Row row{};
+    for (std::size_t i = 0; i < kColumns; ++i) {
+      const auto number = number_of(record->fields[i]);
+      if (!number) return rows;
+      row[i] = *number;
+    }
+    rows.push_back(row);
+  }
+  return rows;
 }
 
 /// Lines before the first with fields, "%geometry:1280,720"; they go off `text`. Gives the size.
@@ -189,19 +280,36 @@ std::optional<ImageSize> take_metavision_header(std::string_view& text) {
   return sensor;
 }
 
-/// Which fields of a CSV are what, by its first line: a header, or an event of Metavision's.
+/// Which fields of a CSV are what: by its header, else as in Metavision's or in the order that the
+/// first rows tell.
 struct CsvLayout {
-  std::array<std::size_t, kColumns> places{};
+  Places places{};
   std::size_t fields = 0;
   bool has_header = true;
+  std::string note = {};
 };
 
-std::optional<CsvLayout> layout_of(const CsvRecord& first, const EventFields& columns) {
-  if (const auto places = find_columns(first, columns))
-    return CsvLayout{*places, first.fields.size()};
-  const bool is_named = names_of(columns) != names_of(EventFields());
-  if (is_named || !is_metavision_line(first)) return std::nullopt;
-  return CsvLayout{{3, 0, 1, 2}, kColumns, false};
+/// `text` is the file's from its first line on, or its beginning, whose last line may be cut.
+/// Throws InputError; none: it is no table of events, as far as its first line tells.
+std::optional<CsvLayout> layout_of(std::string_view text, const EventFields& columns,
+                                   bool is_metavision, const std::string& name) {
+  const auto first = CsvReader(text).next();
+  if (!first) return std::nullopt;
+  if (const auto places = find_columns(*first, columns)) {
+    return CsvLayout{*places, first->fields.size()};
+  }
+  const std::vector<Row> rows = first_rows(text.substr(0, text.rfind('\n')));
+  if (rows.empty()) return std::nullopt;
+  CsvLayout layout{kMetavisionPlaces, kColumns, false};
+  if (!has_usual_names(columns)) {
+    layout.places = places_of(columns, name);
+  } else if (!is_metavision) {
+    const bool are_whole =
+        std::ranges::all_of(rows[0], [](double number) { return number == std::floor(number); });
+    if (!are_whole && !order_of(rows, kMetavisionPlaces)) return std::nullopt;
+    layout.places = known_order(rows, kMetavisionPlaces, name, layout.note);
+  }
+  return layout;
 }
 
 TableContent read_csv(const fs::path& path, const EventFields& columns) {
@@ -218,12 +326,13 @@ TableContent read_csv(const fs::path& path, const EventFields& columns) {
   std::optional<CsvRecord> record = reader.next();
   if (!record && content.sensor) return content;  // Metavision's, without events
   if (!record) refuse("expected a header line, got none", 1);
-  const auto layout = layout_of(*record, columns);
+  const auto layout = layout_of(rest, columns, content.sensor.has_value(), path.string());
   if (!layout) {
     refuse("expected a header line with " + columns.t + ", " + columns.x + ", " + columns.y +
                " and " + columns.p + " (\"columns\" in the manifest names others), got another",
            record->line);
   }
+  content.note = layout->note;
   content.events.reserve(static_cast<std::size_t>(std::ranges::count(rest, '\n')) + 1);
   if (layout->has_header) record = reader.next();
   for (; record; record = reader.next()) {
@@ -235,11 +344,9 @@ TableContent read_csv(const fs::path& path, const EventFields& columns) {
     }
     Row row{};
     for (std::size_t i = 0; i < kColumns; ++i) {
-      const std::string_view field = record->fields[layout->places[i]];
-      const auto [stop, error] = std::from_chars(field.data(), field.data() + field.size(), row[i]);
-      if (error != std::errc() || stop != field.data() + field.size()) {
-        refuse("expected a number of " + names[i] + ", got another field", record->line);
-      }
+      const auto number = number_of(record->fields[layout->places[i]]);
+      if (!number) refuse("expected a number of " + names[i] + ", got another field", record->line);
+      row[i] = *number;
     }
     content.events.push_back(event_of(row));
   }
@@ -247,8 +354,8 @@ TableContent read_csv(const fs::path& path, const EventFields& columns) {
 }
 
 TableContent read_table(const fs::path& path, const EventFields& columns) try {
-  if (path.extension() == ".npy") return {read_npy(path, columns), {}};
-  if (path.extension() == ".npz") return {read_npz(path, columns), {}};
+  if (path.extension() == ".npy") return read_npy(path, columns);
+  if (path.extension() == ".npz") return {read_npz(path, columns)};
   return read_csv(path, columns);
 } catch (const InputError&) {
   throw;
@@ -256,55 +363,16 @@ TableContent read_table(const fs::path& path, const EventFields& columns) try {
   throw InputError(error.what());
 }
 
-/// What times count, and what tells so.
-struct TimeUnit {
-  double ticks_per_s = 1e6;
-  std::string_view reason;  ///< empty: it is told, or there is no time
-};
-
 /// By the name of the column or Metavision's header, else by the times. Throws InputError where
 /// these can be two things.
 TimeUnit time_unit(const EventFields& columns, const TableContent& content,
                    const std::string& file) {
-  const std::vector<double>& times = content.events.times_s();
   if (columns.tick_s) return {std::round(1 / *columns.tick_s), {}};
   for (const auto& [ending, ticks_per_s] :
        {std::pair("_s", 1.0), {"_ms", 1e3}, {"_us", 1e6}, {"_ns", 1e9}}) {
     if (columns.t.ends_with(ending)) return {ticks_per_s, {}};
   }
-  if (content.sensor) return {};
-  double least = HUGE_VAL, most = -HUGE_VAL;
-  bool is_whole = true;
-  for (const double time : times) {
-    if (!std::isfinite(time)) continue;
-    least = std::min(least, time);
-    most = std::max(most, time);
-    is_whole &= time == std::floor(time);
-  }
-  if (most < least) return {};
-  const double span = most - least;
-  const auto doubt = [&](double a_per_s, std::string_view a, double b_per_s, std::string_view b) {
-    throw InputError(fmt::format(
-        "expected \"unit\" in \"columns\" in the manifest, since the times may be {} (then {} "
-        "events take {:g} s) or {} ({:g} s), got none, in {}",
-        a, times.size(), span / a_per_s, b, span / b_per_s, file));
-  };
-  constexpr double kDay_s = 86'400, kFewEvents = 1000;
-  if (!is_whole) {
-    if (span > kDay_s) doubt(1, "s", 1e6, "us");
-    return {1, "since they have decimals"};
-  }
-  constexpr double kClockOfTheDay_ns = 1e17;  // of 1973; as us it would be of the year 5138
-  if (least >= kClockOfTheDay_ns) return {1e9, "since they are of the clock of the day"};
-  if (span > kDay_s * 1e6) doubt(1e6, "us", 1e9, "ns");
-  // Of a camera: rather this many in a second of a recording of so many seconds or fewer.
-  const double seconds = span / 1e6;
-  const auto events = static_cast<double>(times.size());
-  const double most_events = seconds * (seconds < 1 ? 5e6 : 1e8);
-  const double least_events = seconds < 60 ? 0 : seconds * (seconds < 3600 ? 100 : 1e4);
-  if (events > kFewEvents && events > most_events) doubt(1e6, "us", 1e3, "ms");
-  if (events > kFewEvents && events < least_events) doubt(1e6, "us", 1e9, "ns");
-  return {1e6, "since they are whole numbers"};
+  return content.sensor ? TimeUnit() : tell_time_unit(content.events, file);
 }
 
 /// The same events at times in seconds.
@@ -341,12 +409,10 @@ class TableEvents final : public EventParts {
     sensor_ = content.sensor;
     const TimeUnit unit = time_unit(columns_, content, path_.string());
     columns_.tick_s = 1 / unit.ticks_per_s;  // when it is read again
-    if (!unit.reason.empty()) {
-      notes_.push_back(fmt::format("times are taken to count {}, {}, in {}",
-                                   unit.ticks_per_s == 1     ? "seconds"
-                                   : unit.ticks_per_s == 1e6 ? "microseconds"
-                                                             : "nanoseconds",
-                                   unit.reason, path_.string()));
+    if (!content.note.empty()) notes_.push_back(content.note);
+    if (!unit.found.empty()) {
+      notes_.push_back(
+          fmt::format("times are taken to count {}, in {}", unit.found, path_.string()));
     }
     CompactEvents events = in_seconds(std::move(content.events), unit.ticks_per_s);
     if (const auto place = sort_by_time(events)) {
@@ -409,7 +475,7 @@ void require_event_table(const RecordingInput& input, const RecordingOptions& op
   const bool is_metavision = take_metavision_header(text).has_value();
   const auto first = CsvReader(text).next();
   if (!first && is_metavision) return;
-  if (!first || !layout_of(*first, options.columns)) {
+  if (!layout_of(text, options.columns, is_metavision, path.string())) {
     refuse(first ? fmt::format("a first line {}", fmt::join(first->fields, ", ")) : "no line");
   }
 }

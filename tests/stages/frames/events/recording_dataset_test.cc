@@ -714,6 +714,7 @@ TEST_F(RecordingDatasetTest, AFileOfEventsIsOpenedTwiceAndReadOnce) {
   write("table.csv", table);
   write("camera.dat", dat);
   spec_.recording.sensor = ImageSize{3, 4};
+  spec_.recording.columns.tick_s = 1e-6;
   spec_.window.duration_s = 500e-6;
   for (const char* name : {"table.csv", "camera.dat"}) {
     spec_.root = name;

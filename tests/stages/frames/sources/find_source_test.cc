@@ -197,6 +197,11 @@ TEST_F(FindSource, SaysWhatAFileIsAndWhatToDoWithIt) {
       {"a.xml", "<annotation>", "XML", "give the folder"},
       {"videos.txt", "clips/a.mp4\nclips/b.mp4\n", "a list of files", "eventgan init A B"},
       {"boxes.csv", "image,class,left\n", "a table", "give the folder"},
+      {"dv.csv", "ts,x,y,on\n", "a first line ts, x, y, on",
+       "\"columns\" in the manifest names others"},
+      {"four.csv", "0.5,1,2,9\n", "a first line 0.5, 1, 2, 9", "\"columns\" in the manifest"},
+      {"matrix.npy", testing::npy_doubles({1, 3}, {1, 2, 3}), "an array not [N, 4]", "\"columns\""},
+      {"drive.es", "Event Stream", "an Event Stream (.es)", "a table of t, x, y and p"},
       {"EventGAN.pt", "\x80\x02\x8a\n", "a checkpoint of PyTorch", "eventgan import-weights"},
       {"new.pt", "PK\3\4 archive/data.pkl", "a checkpoint of PyTorch", "eventgan import-weights"},
       {"a.zip", "PK\3\4 a.jpg", "an archive", "unpack it"},
@@ -786,6 +791,8 @@ TEST_F(FindSource, KnowsRecordingsOfEventCameras) {
   EXPECT_EQ(find("tables").columns, EventFields());
   write("microseconds/a.csv", "x,y,t_us,p\n");
   EXPECT_EQ(find("microseconds").columns.t, "t_us");
+  write("timelens/a.csv", "timestamp,x,y,polarity\n");
+  EXPECT_EQ(find("timelens").columns, (EventFields{.t = "timestamp", .p = "polarity"}));
   // Numbers beside images are no events; [N, 4] of them are only if one says so, or their labels
   // beside them do, if they are no labels of images.
   const std::string events = testing::npy_doubles({1, 4}, {0, 0, 1, 1});

@@ -91,6 +91,17 @@ TEST_F(EventUtilsTest, ReadsEventsImagesAndTheSize) {
   EXPECT_THAT(recording->notes(), ElementsAre(HasSubstr("frames in colour are made grey")));
 }
 
+TEST_F(EventUtilsTest, ReadsRawEventsOfEventVisionLibrary) {
+  datasets_ = {{"raw_events/x", {{3}, Numbers{0, 1, 2}}},
+               {"raw_events/y", {{3}, Numbers{0, 1, 0}}},
+               {"raw_events/t", {{3}, Seconds{5, 5.25, 5.5}}},
+               {"raw_events/p", {{3}, Numbers{0, 1, 1}}}};
+  attributes_ = {};
+  options_.sensor = ImageSize{2, 3};
+  EXPECT_THAT(open()->events_in(5, 6),
+              ElementsAre(Event{1, 1, 5.25, true}, Event{2, 0, 5.5, true}));
+}
+
 TEST_F(EventUtilsTest, TheManifestsSizeCountsAndIsAskedForWhereTheFileTellsNone) {
   options_.sensor = ImageSize{2, 4};
   EXPECT_THAT(open()->warnings(), ElementsAre(HasSubstr("the file tells a sensor of 3x2")));

@@ -1,10 +1,12 @@
 #include "stages/recordings/readers/detail/table_recording.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <string>
+#include <tuple>
 
 #include "manifests/values/faults.h"
 #include "stages/base/archives/numpy_arrays.h"
@@ -19,6 +21,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::ElementsAre;
+using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
 
 /// Three events of 4x3 pixels at 5, 7 and 7 µs, as each kind of table.
@@ -174,7 +177,7 @@ TEST_F(TableRecordingTest, IsSortedByTimeAndSaysSo) {
   testing::write_file(folder_ / "a.csv", "t,x,y,p\n7,3,0,0\n7,1,1,1\n5,0,2,1\n");
   holds_the_events("a.csv");
   EXPECT_THAT(open("a.csv")->notes(),
-              ElementsAre(HasSubstr("microseconds, since they are whole numbers"),
+              ElementsAre(HasSubstr("microseconds: 2e-06 s, 3 events, "),
                           AllOf(HasSubstr("first at event 2"), HasSubstr("sorted by time"))));
   testing::write_file(folder_ / "b.csv", "t,x,y,p\n5,0,2,1\n7,1,1,1\n");
   EXPECT_EQ(open("b.csv")->notes().size(), 1u);
@@ -209,45 +212,82 @@ TEST_F(TableRecordingTest, TellsWhatItsTimesCount) {
     return *open("t.csv")->event_span();
   };
   EXPECT_EQ(table("0 2000000"), (std::array{0.0, 2.0}));
-  EXPECT_THAT(open("t.csv")->notes(), ElementsAre(HasSubstr("microseconds, since they are whole")));
-  EXPECT_EQ(table("0 0.25 2"), (std::array{0.0, 2.0}));
   EXPECT_THAT(open("t.csv")->notes(),
-              ElementsAre(AllOf(HasSubstr("seconds"), HasSubstr("decimals"))));
+              ElementsAre(HasSubstr("microseconds: 2 s, 2 events, 1 a second, in ")));
+  EXPECT_EQ(table("0 0.25 2"), (std::array{0.0, 2.0}));
+  EXPECT_THAT(open("t.csv")->notes(), ElementsAre(HasSubstr("seconds: 2 s, 3 events, ")));
   EXPECT_EQ(table("1700000000000000000 1700000002000000000"),
             (std::array{1'700'000'000.0, 1'700'000'002.0}));
   EXPECT_EQ(table("0 2000000000", "t_ns"), (std::array{0.0, 2.0}));
   EXPECT_EQ(table("0 2000", "time_ms"), (std::array{0.0, 2.0}));
   EXPECT_EQ(table("0 2", "t_s"), (std::array{0.0, 2.0}));
-  const auto refused = [&](const std::string& times, const std::string& what) {
-    EXPECT_THROWS(table(times), InputError, "expected \"unit\"", what);
-  };
-  refused("0 300000000000", "us (then 2 events take 300000 s) or ns (300 s)");
-  refused("0.5 300000000", "s (then 2 events take 3e+08 s) or us (300 s)");
+  EXPECT_THROWS(table("0 300000000000"), InputError, "expected \"unit\"");
   options_.columns.tick_s = 1e-9;
   EXPECT_EQ(table("0 300000000000"), (std::array{0.0, 300.0}));
 }
 
-TEST_F(TableRecordingTest, AsksWhatTimesCountThatMayBeTwoThings) {
-  const auto open_evenly = [&](int events, double span) {  // whole numbers 0..span
-    std::string text = "t,x,y,p\n";
-    for (int i = 0; i < events; ++i) {
-      text += std::to_string(static_cast<std::int64_t>(span * i / (events - 1))) + ",0,0,1\n";
+/// Rows of t, x, y, p of 100x80 pixels in the order of `columns` ("xytp").
+std::string rows_in_order(const std::string& columns, int rows, bool are_seconds = false) {
+  std::string text;
+  for (int i = 0; i < rows; ++i) {
+    for (const char column : columns) {
+      if (column != columns[0]) text += ',';
+      if (column == 't')
+        text += are_seconds ? fmt::format("{:.6f}", i * 1e-3) : std::to_string(i * 1000);
+      if (column == 'x') text += std::to_string(i * 37 % 100);
+      if (column == 'y') text += std::to_string(i * 53 % 80);
+      if (column == 'p') text += std::to_string(i * 7 % 3 % 2);
     }
-    testing::write_file(folder_ / "t.csv", text);
-    return open("t.csv");
-  };
-  const auto asks = [&](int events, double span, const std::string& readings) {
-    EXPECT_THROWS(open_evenly(events, span), InputError, readings);
-  };
-  asks(100'000, 9'999, "us (then 100000 events take 0.009999 s) or ms (9.999 s)");
-  asks(2'000, 0, "or ms (0 s)");
-  asks(100'000, 6e9, "us (then 100000 events take 6000 s) or ns (6 s)");
-  asks(2'000, 61e6, "us (then 2000 events take 61 s) or ns (0.061 s)");
-  EXPECT_EQ(open_evenly(4'000, 100e3)->event_span()->at(1), 0.1);  // as of N-CARS
-  EXPECT_EQ(open_evenly(20'000, 150e6)->event_span()->at(1), 150);
-  EXPECT_EQ(open_evenly(900, 9e9)->event_span()->at(1), 9000);  // too few to tell
-  testing::write_file(folder_ / "t.csv", "t,x,y,p\n");
-  EXPECT_THAT(open("t.csv")->notes(), ElementsAre());
+    text += '\n';
+  }
+  return text;
+}
+
+TEST_F(TableRecordingTest, ColumnsWithoutNamesTellTheirOrder) {
+  options_.sensor = ImageSize{80, 100};
+  testing::write_file(folder_ / "named.csv", "t,x,y,p\n" + rows_in_order("txyp", 90));
+  const auto events = open("named.csv")->events_in(-1, 1);
+  ASSERT_EQ(events.size(), 90u);
+  for (const auto& [columns, are_seconds, note] :
+       {std::tuple("xypt", false, ""),
+        {"xytp", false, "are taken as x, y, t, p, since"},
+        {"txyp", false, "are taken as t, x, y, p, since"},
+        {"ptxy", true, "are taken as p, t, x, y"},
+        {"txyp", true, "are taken as t, x, y, p"}}) {
+    SCOPED_TRACE(columns);
+    testing::write_file(folder_ / "a.csv", rows_in_order(columns, 90, are_seconds));
+    EXPECT_EQ(find_recording_format(folder_ / "a.csv", options_), RecordingFormat::kTable);
+    const auto read = open("a.csv");
+    EXPECT_THAT(read->events_in(-1, 1), ElementsAreArray(events));
+    EXPECT_EQ(read->notes().size(), *note == '\0' ? 1u : 2u);
+    EXPECT_THAT(read->notes()[0], HasSubstr(note));
+  }
+  std::vector<double> values;
+  for (const Event& event : events) {
+    for (const double value :
+         {event.x * 1.0, event.y * 1.0, event.t_s * 1e6, event.positive ? 1.0 : -1.0}) {
+      values.push_back(value);
+    }
+  }
+  testing::write_file(folder_ / "a.npy", testing::npy_doubles({90, 4}, values));
+  EXPECT_THAT(open("a.npy")->events_in(-1, 1), ElementsAreArray(events));
+  // Two columns never fall, and no column is as usual: p.
+  std::string text = rows_in_order("txyp", 90);
+  for (std::size_t at = 0; (at = text.find('\n', at)) != text.npos; at += 3) text.insert(at, "7");
+  refuses("b.csv", text, "expected columns x, y, p, t as of tables without names");
+  options_.columns = {"0", "1", "2", "3"};
+  EXPECT_THROWS(open("b.csv")->events_in(-1, 1), InputError, "polarities");
+  testing::write_file(folder_ / "b.csv", rows_in_order("txyp", 90));
+  EXPECT_THAT(open("b.csv")->events_in(-1, 1), ElementsAreArray(events));
+}
+
+TEST_F(TableRecordingTest, ANegativePolarityMayHaveLostItsSign) {
+  for (const char* minus : {"-1", "255", "65535", "4294967295"}) {
+    testing::write_file(folder_ / "a.csv",
+                        fmt::format("t,x,y,p\n5,0,2,1\n7,3,0,{}\n7,1,1,1\n", minus));
+    holds_the_events("a.csv");
+  }
+  refuses("b.csv", "t,x,y,p\n3,2,1,254\n", "got 254");
 }
 
 TEST_F(TableRecordingTest, AFileIsReadAgainWhenItIsOpenedAgain) {
