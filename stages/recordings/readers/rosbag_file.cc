@@ -271,7 +271,12 @@ void RosbagFile::find_chunks(std::vector<std::string>& notes) {
   for (std::int64_t byte = std::ssize(kRosbagFirstLine); byte < file_.end_byte();) {
     try {
       const Record record = record_at(byte);
-      if (Fields(record.header).op() == Op::kChunk) chunks_.emplace(byte, std::nullopt);
+      if (Fields(record.header).op() == Op::kChunk) {
+        if (record.end == record.data) {  // its length is written when it is closed
+          throw EventFault("expected a chunk that was closed, got another");
+        }
+        chunks_.emplace(byte, std::nullopt);
+      }
       byte = record.end;
     } catch (const EventFault& fault) {
       notes.push_back(fmt::format("the last {} bytes are left out: {}, in {} (byte {})",
