@@ -147,7 +147,8 @@ void list_recording(Fields::Only some, RecordingOptions& options) {
   some.find("sensor", options.sensor, sizes(1, kLargestSensor),
             "the camera's size in pixels. Default: what the file tells.");
   some.find("stream", options.stream, integers(0, kMostStreams),
-            "of AEDAT4, the number of its stream of events. Default: the first.");
+            "of AEDAT, the number of its stream of events, by default the first; of a ROS bag, "
+            "which of several topics of events, by name, from 0.");
   some.find("time_shift", options.time_shift, booleans(),
             "of Prophesee's RAW, takes the camera's time at the recording's start off all times, "
             "as Metavision's readers do. Labels made with these need it.");

@@ -30,7 +30,7 @@ MOST_WORDS = {
     "manifests/guides/own_data.md": 2200,
     "manifests/guides/python.md": 1300,
     "manifests/guides/real_cameras.md": 1200,
-    "manifests/guides/real_events.md": 1600,
+    "manifests/guides/real_events.md": 1700,
     "manifests/guides/realism.md": 750,
     "manifests/guides/scores.md": 800,
     "manifests/guides/sensor.md": 700,

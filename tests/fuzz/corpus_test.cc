@@ -18,8 +18,10 @@
 #include "stages/frames/own_labels/yolo_text.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/safetensors.h"
+#include "stages/recordings/readers/detail/aedat3_recording.h"
 #include "stages/recordings/readers/detail/aedat4_recording.h"
 #include "stages/recordings/readers/detail/prophesee_recording.h"
+#include "stages/recordings/readers/detail/rosbag_recording.h"
 #include "stages/recordings/readers/detail/table_recording.h"
 #include "tests/fuzz/readers.h"
 #include "tests/testing/temporary_folder.h"
@@ -39,7 +41,8 @@ INSTANTIATE_TEST_SUITE_P(
                       testing::read_cdf_input, testing::read_voc_input, testing::read_mot_input,
                       testing::read_csv_input, testing::read_coco_input, testing::read_yolo_input,
                       testing::read_mask_input, testing::read_png_input, testing::read_table_input,
-                      testing::read_aedat4_input, testing::read_prophesee_input));
+                      testing::read_aedat3_input, testing::read_aedat4_input,
+                      testing::read_prophesee_input, testing::read_rosbag_input));
 
 TEST_P(FuzzCorpus, IsReadOrRefused) {
   const testing::TemporaryFolder folder;
@@ -123,6 +126,13 @@ TEST(FuzzCorpusSeeds, AreReadWhereTheyAreSound) {
     const StoredParts parts = open_aedat4(corpus / "aedat4" / name);
     EXPECT_EQ(parts.events->count(), 4) << name;
     EXPECT_EQ(parts.frames->times_s(), (std::vector<double>{6e-6, 10e-6})) << name;
+  }
+  const StoredParts aedat3 = open_aedat3(corpus / "aedat3" / "plain");
+  EXPECT_EQ(aedat3.events->count(), 2);
+  for (const char* name : {"plain", "bz2", "lz4", "interrupted"}) {
+    const StoredParts parts = open_rosbag(corpus / "rosbag" / name);
+    EXPECT_EQ(parts.events->count(), 3) << name;
+    EXPECT_EQ(parts.frames->times_s(), std::vector<double>{1.000003}) << name;
   }
   const std::pair<const char*, int> recordings[] = {{"dat", 2}, {"evt2", 2}, {"evt3", 5}};
   for (const auto& [name, count] : recordings) {

@@ -7,6 +7,7 @@ Needs no PyTorch: classes of its names stand in for what a pickle refers to. Bes
 stand inputs that the fuzzer made of them to reach other branches of the readers (found_*).
 """
 
+import bz2
 import collections
 import gzip
 import io
@@ -322,6 +323,51 @@ class Aedat4:
         return self.header(len(result)) + result[len(self.header(-1)):] + self.packed(table)
 
 
+def aedat3():
+    """Events of a DVS128, one marked invalid; others; a frame that its sensor does not have."""
+    def packet(kind, size, *events):
+        return struct.pack("<HHIIIIII", kind, 1, size, 4, 0, *[len(events)] * 3) + b"".join(events)
+    events = [struct.pack("<II", x << 17 | y << 2 | p << 1 | valid, t)
+              for x, y, t, p, valid in ((0, 0, 5, 1, 1), (9, 9, 6, 1, 0), (127, 1, 7, 0, 1))]
+    return (b"#!AER-DAT3.1\r\n#Format: RAW\r\n#Source 1: DVS128\r\n#!END-HEADER\r\n" + packet(1, 8, *events)
+            + packet(3, 12, bytes(12)) + packet(2, 40, struct.pack("<9i", 3, 1, 4, 2, 3, 2, 1, 0, 0) + bytes(4)))
+
+
+def rosbag(compression, has_index=True):
+    """An EventArray, an Image and an EventPacket in mono; definitions are left out."""
+    def text(content):
+        return struct.pack("<I", len(content)) + content
+
+    def record(data, **fields):
+        header = b"".join(text(name.encode() + b"=" + value) for name, value in fields.items())
+        return text(header) + text(data)
+
+    def start(height, width):
+        return struct.pack("<III", 1, 1, 3000) + text(b"cam") + struct.pack("<II", height, width)
+    number = struct.Struct("<I").pack
+    connections = b"".join(
+        record(text(b"type=" + kind) + text(b"message_definition="), op=b"\7", conn=number(i), topic=topic)
+        for i, (topic, kind) in enumerate(((b"/a/e", b"dvs_msgs/EventArray"), (b"/a/i", b"sensor_msgs/Image"),
+                                           (b"/a/e", b"event_camera_msgs/EventPacket"))))
+    messages = (start(3, 4) + struct.pack("<IHHIIBHHIIB", 2, 0, 0, 1, 5000, 1, 3, 2, 1, 9000, 0),
+                start(3, 4) + text(b"mono8") + struct.pack("<BI", 0, 4) + text(bytes(range(12))),
+                start(3, 4) + struct.pack("<QQ", 1, 50000) + text(b"mono") + b"\0" + text(
+                    struct.pack("<Q", 1 << 63 | 1 << 48 | 2 << 32 | 7000)))
+    content = connections + b"".join(record(message, op=b"\2", conn=number(i), time=bytes(8))
+                                     for i, message in enumerate(messages))
+    packed = {"none": content, "bz2": bz2.compress(content),
+              "lz4": bytes.fromhex("04224d18604082") + number(len(content) | 1 << 31) + content + bytes(4)}[compression]
+    chunk = record(packed, op=b"\5", compression=compression.encode(), size=number(len(content)))
+
+    def head(index_at):
+        return b"#ROSBAG V2.0\n" + record(b"", op=b"\3", index_pos=struct.pack("<Q", index_at), conn_count=number(3),
+                                          chunk_count=number(1))
+    place = len(head(0))
+    index = connections + record(b"".join(struct.pack("<II", i, 1) for i in range(3)), op=b"\6", ver=number(1),
+                                 chunk_pos=struct.pack("<Q", place), count=number(3))
+    return head(place + len(chunk)) + chunk + index if has_index else head(0) + chunk
+
+
 def prophesee(header, letter, *words):
     return "".join(f"% {line}\n" for line in header).encode() + struct.pack(f"<{len(words)}{letter}", *words)
 
@@ -448,6 +494,12 @@ def main(folder):
         "aedat4/unplugged": Aedat4(3).file(has_table=False)[:-7],
         "aedat4/begun": Aedat4().file()[:len(Aedat4().file(has_table=False)) + 4],
         "aedat4/huge": Aedat4().file().replace(struct.pack("<Iq", 2, 5), struct.pack("<Iq", 1 << 31, 5)),
+        "aedat3/plain": aedat3(),
+        "aedat3/cut": aedat3()[:-50],
+        "rosbag/plain": rosbag("none"),
+        "rosbag/bz2": rosbag("bz2"),
+        "rosbag/lz4": rosbag("lz4"),
+        "rosbag/interrupted": rosbag("none", has_index=False) + b"\x20\0\0\0",
         "prophesee/dat": prophesee(dat, "H", 0x080c) + struct.pack("<4I", 5, 1 << 28 | 5 << 14 | 7, 6, 0),
         "prophesee/evt2": prophesee(evt2, "I", 0x10000000, 0x80000003, 0x11403805, 0xa0000000, 0x80000004, 0x00001003),
         "prophesee/evt3": prophesee(evt3, "H", 0x2001, 0x8fff, 0x6fff, 0x0005, 0x2827, 0x3803, 0x4801, 0x5080, 0xa001,

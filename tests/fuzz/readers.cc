@@ -25,8 +25,10 @@
 #include "stages/generator/checkpoints/fold.h"
 #include "stages/generator/safetensors.h"
 #include "stages/generator/weights_file.h"
+#include "stages/recordings/readers/detail/aedat3_recording.h"
 #include "stages/recordings/readers/detail/aedat4_recording.h"
 #include "stages/recordings/readers/detail/prophesee_recording.h"
+#include "stages/recordings/readers/detail/rosbag_recording.h"
 #include "stages/recordings/readers/detail/table_recording.h"
 #include "tests/testing/zip_file.h"
 
@@ -70,6 +72,16 @@ void read_parts(const StoredParts& parts) {
   for (std::size_t i = 0; parts.frames && i < parts.frames->times_s().size(); ++i) {
     const GreyImage frame = parts.frames->read(static_cast<std::int64_t>(i));
     if (frame.size != parts.size || frame.pixels.size() != parts.size.pixel_count()) std::abort();
+  }
+}
+
+template <class Open>
+void read_recording(std::span<const std::uint8_t> input, const std::filesystem::path& scratch,
+                    Open open) {
+  std::ofstream(scratch, std::ios::binary) << text_of(input);
+  try {
+    read_parts(open(scratch, RecordingOptions()));
+  } catch (const InputError&) {
   }
 }
 
@@ -307,21 +319,21 @@ void read_png_input(std::span<const std::uint8_t> input, const std::filesystem::
   }
 }
 
+void read_aedat3_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {
+  read_recording(input, scratch, open_aedat3);
+}
+
 void read_aedat4_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {
-  std::ofstream(scratch, std::ios::binary) << text_of(input);
-  try {
-    read_parts(open_aedat4(scratch));
-  } catch (const InputError&) {
-  }
+  read_recording(input, scratch, open_aedat4);
 }
 
 void read_prophesee_input(std::span<const std::uint8_t> input,
                           const std::filesystem::path& scratch) {
-  std::ofstream(scratch, std::ios::binary) << text_of(input);
-  try {
-    read_parts(open_prophesee(scratch));
-  } catch (const InputError&) {
-  }
+  read_recording(input, scratch, open_prophesee);
+}
+
+void read_rosbag_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {
+  read_recording(input, scratch, open_rosbag);
 }
 
 void read_table_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {

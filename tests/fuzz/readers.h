@@ -63,6 +63,14 @@ constexpr std::uint64_t most_png_memory(std::uint64_t) { return std::uint64_t{51
 /// a file with sound checksums: its colours and its numbers.
 void read_png_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
 
+/// What reading a recording in AEDAT 3.1 may take: a frame of its sensor, and its events.
+constexpr std::uint64_t most_aedat3_memory(std::uint64_t file_size) {
+  return file_size * 64 + (std::uint64_t{64} << 20);
+}
+
+/// A recording in AEDAT 3.1: all its events and frames.
+void read_aedat3_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
+
 /// What reading a recording in AEDAT 4.0 may take: of what is unpacked, at most 256 MiB and as much
 /// again while that grows, its events and its XML, and what the unpackers keep.
 constexpr std::uint64_t most_aedat4_memory(std::uint64_t) { return std::uint64_t{1536} << 20; }
@@ -78,6 +86,13 @@ constexpr std::uint64_t most_prophesee_memory(std::uint64_t file_size) {
 /// A recording of Prophesee's: all its events.
 void read_prophesee_input(std::span<const std::uint8_t> input,
                           const std::filesystem::path& scratch);
+
+/// What reading a ROS bag may take: what bzip2 makes of a file of 16 KiB, and as much again while
+/// that grows.
+constexpr std::uint64_t most_rosbag_memory(std::uint64_t) { return std::uint64_t{1536} << 20; }
+
+/// A ROS bag: all its events and frames.
+void read_rosbag_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
 
 /// What reading a table of events may take: deflate's growth, and an event for every four numbers.
 constexpr std::uint64_t most_table_memory(std::uint64_t file_size) {

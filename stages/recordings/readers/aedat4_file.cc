@@ -2,18 +2,15 @@
 
 #include <aedat4_generated.h>
 #include <fmt/core.h>
-#include <lz4frame.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <cstring>
-#include <memory>
-#include <new>
 #include <opencv2/imgproc.hpp>
 #include <pugixml.hpp>
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "stages/recordings/readers/detail/unpacking.h"
 
 namespace eventgan {
 namespace {
@@ -25,83 +22,6 @@ constexpr std::size_t kMostBytes = std::size_t{1} << 28;
 constexpr std::int64_t kTimesEnd = std::int64_t{1} << 52;
 
 static_assert(sizeof(aedat4::Event) == 16, "events are copied as they are stored");
-
-// ---- Unpacking
-
-template <class Context, auto release>
-struct Released {
-  void operator()(Context* context) const { release(context); }
-};
-using Lz4Context = std::unique_ptr<LZ4F_dctx, Released<LZ4F_dctx, LZ4F_freeDecompressionContext>>;
-using ZstdContext = std::unique_ptr<ZSTD_DStream, Released<ZSTD_DStream, ZSTD_freeDStream>>;
-
-/// What one step of unpacking took and gave.
-struct UnpackStep {
-  std::size_t taken = 0;
-  std::size_t given = 0;
-  bool is_end = false;
-};
-
-/// Memory grows with what comes out, not with what the frame claims. `step` gets the target and the
-/// packed bytes left.
-template <class Step>
-std::string unpack_by(std::string_view packed, Step step) {
-  std::string unpacked;
-  std::size_t used = 0;
-  for (;;) {
-    if (used == unpacked.size()) {
-      if (used == kMostBytes) {
-        throw EventFault(fmt::format("expected at most {} bytes unpacked, got more", kMostBytes));
-      }
-      unpacked.resize(std::min(std::max(2 * used, 4 * packed.size() + 64), kMostBytes));
-    }
-    const UnpackStep made = step(unpacked.data() + used, unpacked.size() - used, packed);
-    used += made.given;
-    packed.remove_prefix(made.taken);
-    if (made.is_end) break;
-    if (made.taken == 0 && made.given == 0) {
-      throw EventFault("expected a whole packed frame, got one that is cut off");
-    }
-  }
-  if (!packed.empty()) {
-    throw EventFault(
-        fmt::format("expected one packed frame, got {} bytes behind its end", packed.size()));
-  }
-  unpacked.resize(used);
-  return unpacked;
-}
-
-std::string unpack_lz4(std::string_view packed) {
-  LZ4F_dctx* made = nullptr;
-  if (LZ4F_isError(LZ4F_createDecompressionContext(&made, LZ4F_VERSION))) throw std::bad_alloc();
-  const Lz4Context context(made);
-  return unpack_by(packed, [&](char* target, std::size_t room, std::string_view rest) {
-    UnpackStep step{rest.size(), room};
-    const std::size_t hint =
-        LZ4F_decompress(context.get(), target, &step.given, rest.data(), &step.taken, nullptr);
-    if (LZ4F_isError(hint)) {
-      throw EventFault(
-          fmt::format("expected an LZ4 frame, got damage ({})", LZ4F_getErrorName(hint)));
-    }
-    step.is_end = hint == 0;
-    return step;
-  });
-}
-
-std::string unpack_zstd(std::string_view packed) {
-  const ZstdContext context(ZSTD_createDStream());
-  if (!context) throw std::bad_alloc();
-  return unpack_by(packed, [&](char* target, std::size_t room, std::string_view rest) {
-    ZSTD_outBuffer output{target, room, 0};
-    ZSTD_inBuffer input{rest.data(), rest.size(), 0};
-    const std::size_t hint = ZSTD_decompressStream(context.get(), &output, &input);
-    if (ZSTD_isError(hint)) {
-      throw EventFault(
-          fmt::format("expected a Zstandard frame, got damage ({})", ZSTD_getErrorName(hint)));
-    }
-    return UnpackStep{input.pos, output.pos, hint == 0};
-  });
-}
 
 // ---- Tables, times and sizes
 
@@ -243,7 +163,7 @@ std::string Aedat4File::read(std::int64_t begin, std::int64_t end) const {
 
 std::string Aedat4File::unpack(std::string bytes) const {
   if (header_.compression == 0) return bytes;
-  return header_.compression <= 2 ? unpack_lz4(bytes) : unpack_zstd(bytes);
+  return header_.compression <= 2 ? unpack_lz4(bytes, kMostBytes) : unpack_zstd(bytes, kMostBytes);
 }
 
 /// What is in a packet, whose stream and size must lie in front of it.
@@ -380,13 +300,13 @@ CompactEvents Aedat4File::events(PacketPlace& packet) const {
   });
 }
 
-Aedat4File::Frame Aedat4File::frame(const PacketPlace& packet, ImageSize size) const {
+PlacedFrame Aedat4File::frame(const PacketPlace& packet, ImageSize size) const {
   return at(packet.byte, [&] {
     std::string bytes = content(packet);
     const aedat4::Frame& table = table_of<aedat4::Frame>(bytes, "FRME");
     const std::int64_t begin_us = table.exposure_begin_us();
     const std::int64_t end_us = table.exposure_end_us();
-    Frame frame;
+    PlacedFrame frame;
     std::int64_t time_us = table.t_us();
     if (begin_us != 0 || end_us != 0) {
       check_time(begin_us);

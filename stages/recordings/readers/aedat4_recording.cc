@@ -13,6 +13,7 @@
 #include "manifests/values/faults.h"
 #include "stages/recordings/readers/detail/aedat4_file.h"
 #include "stages/recordings/readers/detail/event_parts.h"
+#include "stages/recordings/readers/detail/placed_frames.h"
 #include "stages/recordings/readers/detail/recording_reader.h"
 
 namespace eventgan {
@@ -91,59 +92,6 @@ class Aedat4Events final : public EventParts {
   std::vector<PacketPlace> packets_;  ///< those with events
 };
 
-class Aedat4Frames final : public FrameStore {
- public:
-  Aedat4Frames(std::shared_ptr<const Aedat4File> file, ImageSize size)
-      : file_(std::move(file)), size_(size) {}
-
-  /// Reads a packet. The events do without a frame that is damaged, of another size or no later
-  /// than the one before: it is left out.
-  void add(const PacketPlace& packet) {
-    try {
-      const Aedat4File::Frame frame = file_->frame(packet, size_);
-      if (!times_s_.empty() && frame.time_s <= times_s_.back()) {
-        file_->refuse(fmt::format("expected a frame after {:.6f} s, got one at {:.6f} s",
-                                  times_s_.back(), frame.time_s),
-                      packet.byte);
-      }
-      packets_.push_back(packet);
-      times_s_.push_back(frame.time_s);
-      in_colour_ |= frame.is_colour;
-      deep_ |= frame.is_deep;
-    } catch (const InputError& error) {
-      if (left_out_++ == 0) reason_ = error.what();
-    }
-  }
-
-  std::vector<std::string> notes() const override {
-    std::vector<std::string> notes;
-    if (in_colour_) notes.push_back("frames in colour are made grey, in " + file_->name());
-    if (deep_) {
-      notes.push_back("of frames of 16 bits the upper 8 are taken, in " + file_->name());
-    }
-    if (left_out_ > 0) {
-      notes.push_back(fmt::format("frames left out: {} (the first: {})", left_out_, reason_));
-    }
-    return notes;
-  }
-
-  const std::vector<double>& times_s() const override { return times_s_; }
-
-  GreyImage read(std::int64_t index) const override {
-    return file_->frame(packets_[static_cast<std::size_t>(index)], size_).image;
-  }
-
- private:
-  std::shared_ptr<const Aedat4File> file_;
-  ImageSize size_;
-  std::vector<PacketPlace> packets_;
-  std::vector<double> times_s_;
-  bool in_colour_ = false;
-  bool deep_ = false;
-  std::int64_t left_out_ = 0;
-  std::string reason_;
-};
-
 /// The packets, and what the table tells of each; nothing if it is of no use, which a note says.
 struct FoundPackets {
   std::vector<PacketPlace> packets;
@@ -188,7 +136,9 @@ StoredParts open_aedat4(const std::filesystem::path& path, const RecordingOption
   }
   const auto [packets, told] = find_packets(*file, streams.events, parts.notes);
   auto events = std::make_unique<Aedat4Events>(file);
-  auto frames = std::make_unique<Aedat4Frames>(file, parts.size);
+  auto frames = std::make_unique<PlacedFrames<PacketPlace>>(
+      file->name(),
+      [file, size = parts.size](const PacketPlace& packet) { return file->frame(packet, size); });
   for (std::size_t i = 0; i < packets.size(); ++i) {
     if (packets[i].stream == streams.events)
       events->add(packets[i], told.empty() ? nullptr : &told[i]);

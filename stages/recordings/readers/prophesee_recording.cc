@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <charconv>
 #include <cstring>
@@ -15,6 +14,7 @@
 #include "stages/recordings/order/packed_bytes.h"
 #include "stages/recordings/readers/detail/event_parts.h"
 #include "stages/recordings/readers/detail/open_files.h"
+#include "stages/recordings/readers/detail/prophesee_words.h"
 #include "stages/recordings/readers/detail/recording_reader.h"
 
 namespace eventgan {
@@ -161,31 +161,6 @@ PropheseeHeader read_prophesee_header(std::string_view text, const std::string& 
 
 // ---- The words
 
-/// What was passed over.
-struct WordCounts {
-  std::int64_t left_out = 0;    ///< events before their time and place were told
-  std::int64_t outside = 0;     ///< events beside the sensor
-  std::int64_t reserved = 0;    ///< words of types that mean nothing
-  std::int64_t steps_back = 0;  ///< events before an earlier one, by too much to be lifted
-};
-
-/// What a word's meaning depends on: all that the words before it have said.
-struct WordState {
-  std::optional<std::uint32_t> counter;  ///< the upper part of the time as stored, or all of it
-  std::int64_t wraps = 0;                ///< of the counter
-  std::int64_t shift_us = 0;             ///< taken off all times
-  std::uint32_t low_us = 0;              ///< EVT 3.0: the lower part
-  std::optional<int> y;                  ///< EVT 3.0
-  std::optional<int> vector_x;           ///< EVT 3.0: of the next vector's first pixel
-  bool vector_on = false;
-  bool is_second_camera = false;
-  std::int64_t last_us = 0;  ///< of the last event that was not lifted
-  WordCounts counts;
-};
-
-constexpr std::size_t kMostEventsPerWord = 32;
-using WordEvents = std::array<StoredEvent, kMostEventsPerWord>;
-
 /// Takes a new value of a counter of so many bits. A fall of half its range or more is a wrap, as
 /// where words were lost around one; a smaller one is a step back, and so is a rise of three
 /// quarters or more, of a late word behind a wrap: less may be a time without events.
@@ -281,6 +256,8 @@ std::size_t take_evt21_legacy(std::uint64_t word, WordState& state, bool shifts,
   return take_evt21(word << 32 | word >> 32, state, shifts, events);
 }
 
+}  // namespace
+
 std::size_t take_evt3(std::uint16_t word, WordState& state, bool shifts, WordEvents& events) {
   constexpr int kTimeBits = 12;
   const std::uint32_t type = word >> 12;
@@ -348,6 +325,8 @@ std::size_t take_evt3(std::uint16_t word, WordState& state, bool shifts, WordEve
       return 0;
   }
 }
+
+namespace {
 
 /// Where decoding can begin.
 struct DecodingStart {

@@ -96,15 +96,15 @@ struct ForeignKind {
   std::string_view way_out;
 };
 constexpr std::array kForeignKinds{
-    ForeignKind{"#!AER-DAT", "AEDAT of another version than 4.0",
+    ForeignKind{"#!AER-DAT", "AEDAT of another version than 3.1 and 4.0",
                 "jAER or dv-gui write AEDAT4 of it"},
-    ForeignKind{"#ROSBAG", "a bag of ROS", "write its events as a table of t, x, y and p (.npz)"},
+    ForeignKind{"#ROSBAG", "a ROS bag of another version than 2.0", "rosbag fix writes that"},
     ForeignKind{"\x89MCAP", "MCAP", "write its events as a table of t, x, y and p (.npz)"},
     ForeignKind{"Event Stream", "an Event Stream (.es)",
                 "write its events as a table of t, x, y and p (.npz)"}};
 
 bool has_own_extension(const std::filesystem::path& path) {
-  constexpr std::array kExtensions{".h5", ".hdf5", ".aedat4", ".raw", ".dat"};
+  constexpr std::array kExtensions{".h5", ".hdf5", ".aedat4", ".bag", ".raw", ".dat"};
   return std::ranges::find(kExtensions, path.extension()) != kExtensions.end();
 }
 

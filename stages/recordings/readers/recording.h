@@ -77,8 +77,8 @@ class Recording {
 
 /// What lies at `path`, told by what is in it: a folder with events.txt (or this file) is ECD's,
 /// one with events/left/events.h5 DSEC's, an HDF5 file or an array tells by its fields' names, a
-/// CSV by its header, a file of AEDAT4 or Prophesee's by how it begins; none if it is nothing of
-/// that. The first format of kRecordingFormats that fits counts.
+/// CSV by its header, AEDAT, a ROS bag and a file of Prophesee's by how they begin; none if it is
+/// nothing of that. The first format of kRecordingFormats that fits counts.
 std::optional<RecordingFormat> find_recording_format(const std::filesystem::path& path,
                                                      const RecordingOptions& options = {});
 

@@ -37,11 +37,11 @@ const ManifestCase kTrainingCases[] = {
       "$.steps: expected an object, got nothing", "$.output: expected an object, got nothing",
       "$.steps: expected at least one phase with more than 0 steps, got none"}},
     {"a recording of no kind",
-     {{"/recordings/0", R"({"path": "", "format": "rosbag", "weight": 0, "first_frame": -1,
+     {{"/recordings/0", R"({"path": "", "format": "mcap", "weight": 0, "first_frame": -1,
                             "last_frame": 0, "wieght": 1})"}},
      {R"($.recordings[0].path: expected a path, got "")",
-      R"($.recordings[0].format: expected "mvsec", "eventgan", "ecd", "aedat4", "dsec", "event_utils" or )"
-      R"("v2e", got "rosbag")",
+      R"($.recordings[0].format: expected "mvsec", "eventgan", "ecd", "aedat4", "aedat3", "rosbag", "dsec", )"
+      R"("event_utils" or "v2e", got "mcap")",
       "$.recordings[0].weight: expected a number 1e-06..1e+06, got 0",
       "$.recordings[0].first_frame: expected an integer 0..1000000000, got -1",
       "$.recordings[0].last_frame: expected an integer 1..1000000000, got 0",
@@ -59,8 +59,8 @@ const ManifestCase kTrainingCases[] = {
     {"rectified", {{"/recordings/0/rectify", "true"}, {"/recordings/0/format", R"("dsec")"}}, {}},
     {"a recording without frames",
      {{"/recordings/0/format", R"("m3ed")"}},
-     {R"($.recordings[0].format: expected "mvsec", "eventgan", "ecd", "aedat4", "dsec", "event_utils" or )"
-      R"("v2e", got "m3ed")"}},
+     {R"($.recordings[0].format: expected "mvsec", "eventgan", "ecd", "aedat4", "aedat3", "rosbag", "dsec", )"
+      R"("event_utils" or "v2e", got "m3ed")"}},
     {"rectified without a map",
      {{"/recordings/0/rectify", "true"}},
      {R"($.recordings[0].rectify: expected no such key for format "mvsec" (only for dsec), got true)"}},

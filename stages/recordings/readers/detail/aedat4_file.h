@@ -12,6 +12,7 @@
 #include "stages/recordings/readers/aedat4_packets.h"
 #include "stages/recordings/readers/detail/event_parts.h"
 #include "stages/recordings/readers/detail/open_files.h"
+#include "stages/recordings/readers/detail/placed_frames.h"
 
 namespace eventgan {
 
@@ -32,12 +33,6 @@ class Aedat4File {
     std::int64_t table_byte = -1;  ///< -1: there is no table
     int compression = 0;
     std::map<int, Stream> streams;
-  };
-  struct Frame {
-    double time_s = 0;
-    bool is_colour = false;
-    bool is_deep = false;  ///< of 16 bits
-    GreyImage image;
   };
 
   /// Reads the header.
@@ -65,7 +60,7 @@ class Aedat4File {
   CompactEvents events(PacketPlace& packet) const;
 
   /// The frame of a packet, which must be of this size; its time is the middle of its exposure.
-  Frame frame(const PacketPlace& packet, ImageSize size) const;
+  PlacedFrame frame(const PacketPlace& packet, ImageSize size) const;
 
   /// Runs `read`; an EventFault in it is of what lies at `byte`.
   template <class Read>

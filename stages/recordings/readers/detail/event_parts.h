@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <limits>
 #include <map>
 #include <memory>
@@ -75,8 +76,11 @@ class EventParts : public EventStore {
   /// The same, of what has been read already; nothing if it is empty.
   void add_part(CompactEvents events);
 
-  /// What the parts added so far tell; the second takes it from `bytes` instead of adding them,
-  /// false if it is not of so many parts.
+  /// What lies between the parts added before and the next one is unknown.
+  void add_unreadable(std::exception_ptr error) { order_.add_unreadable(std::move(error)); }
+
+  /// What the parts added so far, none of them unreadable, tell; the second takes it from `bytes`
+  /// instead of adding them, false if it is not of so many parts.
   void pack_parts(std::string& bytes) const;
   bool unpack_parts(std::string_view bytes, std::size_t parts);
 

@@ -71,8 +71,9 @@ struct RecordingReader {
                                          const RecordingOptions& options) = nullptr;
 };
 
-extern const RecordingReader kMvsecReader, kEventganReader, kEcdReader, kAedat4Reader, kDsecReader,
-    kM3edReader, kEventUtilsReader, kV2eReader, kPropheseeReader, kTableReader;
+extern const RecordingReader kMvsecReader, kEventganReader, kEcdReader, kAedat3Reader,
+    kAedat4Reader, kRosbagReader, kDsecReader, kM3edReader, kEventUtilsReader, kV2eReader,
+    kPropheseeReader, kTableReader;
 
 /// Every format's, in the order of kRecordingFormats.
 inline constexpr auto kRecordingReaders = parts_of<RecordingReader>(
@@ -80,6 +81,8 @@ inline constexpr auto kRecordingReaders = parts_of<RecordingReader>(
                         {RecordingFormat::kEventgan, &kEventganReader},
                         {RecordingFormat::kEcd, &kEcdReader},
                         {RecordingFormat::kAedat4, &kAedat4Reader},
+                        {RecordingFormat::kAedat3, &kAedat3Reader},
+                        {RecordingFormat::kRosbag, &kRosbagReader},
                         {RecordingFormat::kDsec, &kDsecReader},
                         {RecordingFormat::kM3ed, &kM3edReader},
                         {RecordingFormat::kEventUtils, &kEventUtilsReader},
