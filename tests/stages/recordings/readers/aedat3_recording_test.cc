@@ -12,7 +12,7 @@
 #include "tests/testing/text_file.h"
 #include "tests/testing/texts.h"
 
-namespace eventgan {
+namespace eventgan::aedat3 {
 namespace {
 
 using ::testing::HasSubstr;
@@ -190,4 +190,4 @@ TEST_F(Aedat3, WithoutEventsIsAStillScene) {
 }
 
 }  // namespace
-}  // namespace eventgan
+}  // namespace eventgan::aedat3

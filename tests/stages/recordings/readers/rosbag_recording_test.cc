@@ -19,7 +19,7 @@
 #include "tests/testing/text_file.h"
 #include "tests/testing/texts.h"
 
-namespace eventgan {
+namespace eventgan::rosbag {
 namespace {
 
 using ::testing::ElementsAre;
@@ -622,4 +622,4 @@ TEST_F(Rosbag, RefusesOtherFiles) {
 }
 
 }  // namespace
-}  // namespace eventgan
+}  // namespace eventgan::rosbag
