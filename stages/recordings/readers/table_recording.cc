@@ -56,6 +56,7 @@ StoredEvent event_of(const Row& row) { return {row[kX], row[kY], row[kTime], row
 
 constexpr Places kMetavisionPlaces{3, 0, 1, 2}, kArrayPlaces{0, 1, 2, 3};
 constexpr std::size_t kLookedRows = 10'000;  ///< the first ones tell
+constexpr std::size_t kFewRows = 20;         ///< fewer tell nothing
 
 std::string order_text(const Places& places) {
   std::array<std::string_view, kColumns> words;
@@ -66,7 +67,6 @@ std::string order_text(const Places& places) {
 /// Which column is what, by those that have polarities and those that never fall: as usual if that
 /// may be, else the only way in which one is p and another t, x being before y. None: no way.
 std::optional<Places> order_of(std::span<const Row> rows, const Places& usual) {
-  constexpr std::size_t kFewRows = 20;
   std::array<bool, kColumns> may_be_p{}, never_falls{};
   for (std::size_t i = 0; i < kColumns; ++i) {
     const auto value = [i](const Row& row) { return row[i]; };
@@ -306,7 +306,8 @@ std::optional<CsvLayout> layout_of(std::string_view text, const EventFields& col
   } else if (!is_metavision) {
     const bool are_whole =
         std::ranges::all_of(rows[0], [](double number) { return number == std::floor(number); });
-    if (!are_whole && !order_of(rows, kMetavisionPlaces)) return std::nullopt;
+    const bool is_known = rows.size() >= kFewRows && order_of(rows, kMetavisionPlaces);
+    if (!are_whole && !is_known) return std::nullopt;
     layout.places = known_order(rows, kMetavisionPlaces, name, layout.note);
   }
   return layout;

@@ -14,8 +14,8 @@ namespace eventgan {
 /// has four numbers, or in the order that their values tell, which a note says; a name in the
 /// options that is a number 0..3 is another column. Everything else in the file is passed over.
 /// Times count what the options say, else what their column's name ends with, else what the times
-/// alone tell (time_unit.h). Where they fall, the events are sorted, which a note says. The sensor's
-/// size is the options', or Metavision's line "%geometry". There are no frames.
+/// alone tell (time_unit.h). Where they fall, the events are sorted, which a note says. The
+/// sensor's size is the options', or Metavision's line "%geometry". There are no frames.
 ///
 /// A file is read as a whole, first when it is opened; the tables used last are kept. Throws
 /// InputError "expected X, got Y, in PATH (line 3)".

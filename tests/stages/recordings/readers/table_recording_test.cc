@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <string>
 #include <tuple>
@@ -265,13 +266,13 @@ TEST_F(TableRecordingTest, ColumnsWithoutNamesTellTheirOrder) {
   std::vector<double> values;
   for (const Event& event : events) {
     for (const double value :
-         {event.x * 1.0, event.y * 1.0, event.t_s * 1e6, event.positive ? 1.0 : -1.0}) {
+         {event.x * 1.0, event.y * 1.0, std::round(event.t_s * 1e6), event.positive ? 1.0 : -1.0}) {
       values.push_back(value);
     }
   }
   testing::write_file(folder_ / "a.npy", testing::npy_doubles({90, 4}, values));
   EXPECT_THAT(open("a.npy")->events_in(-1, 1), ElementsAreArray(events));
-  // Two columns never fall, and no column is as usual: p.
+  // None has polarities.
   std::string text = rows_in_order("txyp", 90);
   for (std::size_t at = 0; (at = text.find('\n', at)) != text.npos; at += 3) text.insert(at, "7");
   refuses("b.csv", text, "expected columns x, y, p, t as of tables without names");
