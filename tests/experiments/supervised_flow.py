@@ -24,6 +24,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import recordings
 import self_supervised
 import torch
 import train_flow
@@ -32,6 +33,7 @@ from self_supervised import CONTROLS, REAL, Pair
 TRAINER = pathlib.Path(train_flow.__file__)
 ROWS: dict[str, dict[str, Any]] = {"EventGAN 8": {"weights": "shipped:8"}, "EventGAN 16": {"weights": "shipped:16"},
                                    "esim": {"kind": "esim"}, "difference": {"kind": "difference"}}
+PLANES = "planes in the time of events"  # the network that has learnt nothing
 SIDE, CLIP = 160, 5  # pixels of the volumes; frames of each photograph
 # At the size of the photographs, which are some four times as large as the volumes.
 SHIFT = {"translation_px": [0, 12], "rotation_deg": 3, "scale": 0.05}
@@ -88,7 +90,7 @@ def learnt(args: argparse.Namespace, row: str, seed: int) -> train_flow.FlowNetw
         subprocess.run([sys.executable, TRAINER, "--data", photographs(args, row), "--out", out, "--seed", str(seed),
                         "--steps", str(args.steps), "--threads", str(args.threads), "--images", "2",
                         *(["--bfloat16"] if args.bfloat16 else [])], check=True)
-    network = train_flow.FlowNetwork(2 * self_supervised.recordings.BINS)
+    network = train_flow.FlowNetwork(2 * recordings.BINS)
     network.load_state_dict(torch.load(out / "weights.pt", weights_only=True))
     return network.eval()
 
@@ -119,6 +121,7 @@ def main() -> None:
 
     rows = {name: [kept(name, lambda pairs, name=name: self_supervised.control_scores(name, pairs)["error"])]
             for name in CONTROLS}
+    rows[PLANES] = [kept(PLANES, lambda pairs: error_of(train_flow.FlowNetwork(2 * recordings.BINS).eval(), pairs))]
     plain = np.array([*rows[next(iter(CONTROLS))][0].values()])
     for seed in range(args.seeds):  # all rows of a seed first: they can be compared early
         for row in args.rows:
