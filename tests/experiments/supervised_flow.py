@@ -8,7 +8,8 @@ events of cameras.
 Each photograph is a clip, in which image and labelled objects move on their own; each way of making its events has a
 row, of the same motions. The network and its training are those of train_flow.py; networks see no recording. Scored is
 how far the previous frame, moved by the flow, is from the next one at pixels with events, as a share of that without
-flow. The controls have learnt nothing; the best constant flow is chosen on the test. The same command resumes.
+flow. The controls have learnt nothing: among them is what the network has at first, planes in the time of events, and
+the best constant flow, which is chosen on the test. The same command resumes.
 """
 
 from __future__ import annotations
@@ -35,9 +36,11 @@ ROWS: dict[str, dict[str, Any]] = {"EventGAN 8": {"weights": "shipped:8"}, "Even
                                    "esim": {"kind": "esim"}, "difference": {"kind": "difference"}}
 PLANES = "planes in the time of events"  # the network that has learnt nothing
 SIDE, CLIP = 160, 5  # pixels of the volumes; frames of each photograph
-# At the size of the photographs, which are some four times as large as the volumes.
-SHIFT = {"translation_px": [0, 12], "rotation_deg": 3, "scale": 0.05}
-MOTION = {**SHIFT, "rests": 0, "objects": {**SHIFT, "rests": 0.25}}
+# In pixels of the photographs, which are two to three times as large as the volumes: half of all pixels move by less
+# than 2 px there, a hundredth by more than 7.
+MOTION = {"translation_px": [0, 7], "rotation_deg": 1, "scale": 0.02, "rests": 0,
+          "objects": {"translation_px": [0, 7], "rotation_deg": 2, "scale": 0.03, "rests": 0.25}}
+
 
 
 def read_args() -> argparse.Namespace:

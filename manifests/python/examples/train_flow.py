@@ -3,8 +3,9 @@
 
     train_flow.py --data out --test recordings --out flows
 
-It finds how each pixel has moved from the previous image to the next in an event volume, by the flow network of the
-EventGAN paper, of a quarter of its width. Shards with flow come of photographs, `"flow": true` in their source.
+It finds how each pixel has moved from the previous image to the next in an event volume: planes in the time of events
+say it roughly, and the flow network of the EventGAN paper, of a quarter of its width, corrects them. Shards with flow
+are of photographs, with `"flow": true` in their source.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from torch.utils.data import Dataset
 LEVELS, RESIDUAL_BLOCKS, WIDTH = 4, 2, 8
 STEPS = 6000  # unless the options say
 SIDE = 96  # of the crops, pixels
+SPREAD = 0.7  # most share of the events that come at any time: a camera's are less regular than generated ones
 WINDOWS = (4, 8, 16)  # pixels, of planes in the time of events
 RESTING, FARTHEST = 0.01, 16.0  # what is added to the planes' sums of squares; most pixels of their flow
 CHECKED = 64  # validation samples that are looked at while it learns
@@ -228,7 +230,10 @@ class Crops(Dataset):
         flow = sign * flow
         if transpose:
             volume, flow, valid = (each.transpose(1, 2) for each in (volume, flow.flip(0), valid))
-        return AUGMENTATION.events(AUGMENTATION.sensor(volume.contiguous())), flow.contiguous(), valid.contiguous()
+        volume = AUGMENTATION.events(AUGMENTATION.sensor(volume.contiguous())).unflatten(0, (2, -1))
+        share = SPREAD * torch.rand(())
+        volume = (1 - share) * volume + share * volume.mean(1, keepdim=True)
+        return volume.flatten(0, 1), flow.contiguous(), valid.contiguous()
 
 
 def flow_loss(predictions: Sequence[torch.Tensor], flow: torch.Tensor, valid: torch.Tensor) -> torch.Tensor:
@@ -345,7 +350,7 @@ def main() -> None:
 
     test = scores_of(network, position, test_shards)
     if not test:
-        raise SystemExit(f"expected samples with flow, or of a recording whose frames are where they were, got none, in "
+        raise SystemExit(f"expected samples with flow, or of recordings whose frames are still there, got none, in "
                          f"{args.test}")
     for title, numbers in test.items():
         print(f"{title}: " + ", ".join(f"{name} {value:.3g}" for name, value in numbers.items()))
