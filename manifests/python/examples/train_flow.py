@@ -33,7 +33,6 @@ from torch.utils.data import Dataset
 LEVELS, RESIDUAL_BLOCKS, WIDTH = 4, 2, 8
 STEPS = 6000  # unless the options say
 SIDE = 96  # of the crops, pixels
-SPREAD = 0.7  # most share of the events that come at any time: a camera's are less regular than generated ones
 WINDOWS = (4, 8, 16)  # pixels, of planes in the time of events
 RESTING, FARTHEST = 0.01, 16.0  # what is added to the planes' sums of squares; most pixels of their flow
 CHECKED = 64  # validation samples that are looked at while it learns
@@ -230,10 +229,7 @@ class Crops(Dataset):
         flow = sign * flow
         if transpose:
             volume, flow, valid = (each.transpose(1, 2) for each in (volume, flow.flip(0), valid))
-        volume = AUGMENTATION.events(AUGMENTATION.sensor(volume.contiguous())).unflatten(0, (2, -1))
-        share = SPREAD * torch.rand(())
-        volume = (1 - share) * volume + share * volume.mean(1, keepdim=True)
-        return volume.flatten(0, 1), flow.contiguous(), valid.contiguous()
+        return AUGMENTATION.events(AUGMENTATION.sensor(volume.contiguous())), flow.contiguous(), valid.contiguous()
 
 
 def flow_loss(predictions: Sequence[torch.Tensor], flow: torch.Tensor, valid: torch.Tensor) -> torch.Tensor:
