@@ -3,8 +3,9 @@
 
     train_flow.py --data out --test recordings --out flows
 
-It finds how each pixel has moved from the previous image to the next in an event volume, by the flow network of the
-EventGAN paper, of a quarter of its width. Shards with flow come of photographs, `"flow": true` in their source.
+It finds how each pixel has moved from the previous image to the next in an event volume: planes in the time of events
+say it roughly, and the flow network of the EventGAN paper, of a quarter of its width, corrects them. Shards with flow
+are of photographs, with `"flow": true` in their source.
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ from __future__ import annotations
 import argparse
 import collections
 import json
+import math
 import pathlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
@@ -31,8 +33,11 @@ from torch.utils.data import Dataset
 LEVELS, RESIDUAL_BLOCKS, WIDTH = 4, 2, 8
 STEPS = 6000  # unless the options say
 SIDE = 96  # of the crops, pixels
+WINDOWS = (4, 8, 16)  # pixels, of planes in the time of events
+RESTING, FARTHEST = 0.01, 16.0  # what is added to the planes' sums of squares; most pixels of their flow
+CHECKED = 64  # validation samples that are looked at while it learns
 # Polarities are exchanged, but not time: flow is at the pixels of one image, backwards of the other.
-AUGMENTATION = EventAugmentation(flip=0, invert=0.5, lost=(0.0, 0.4), isolated=(0.0, 0.02))
+AUGMENTATION = EventAugmentation(flip=0, invert=0.5, threshold=(0.0, 0.5), lost=(0.0, 0.4), isolated=(0.0, 0.02))
 
 
 def layer(inputs: int, outputs: int, kernel: int = 3, stride: int = 1, norm: bool = True,
@@ -102,38 +107,69 @@ def begin_at_rest(network: UNet) -> UNet:
     return network
 
 
-def slopes(volume: torch.Tensor) -> torch.Tensor:
-    """How the time of events rises from pixel to pixel, which is how edges move (Benosman et al. 2014, "Event-based
-    visual flow"): float32 [B, 8, H, W] of volumes [B, 2b, H, W], two channels (of the polarities) each for the slope
-    along x, along y, and the speed along x and along y, its inverse. Times are means around a pixel, from -1 to 1."""
-    bins = volume.shape[1] // 2
+def blurred(images: torch.Tensor, times: int = 1) -> torch.Tensor:
+    """[B, C, H, W] by 1, 2, 1 along x and y, so many times."""
+    kernel = torch.tensor([1.0, 2.0, 1.0], device=images.device) / 4
+    kernel = (kernel[:, None] * kernel).expand(images.shape[1], 1, 3, 3)
+    for _ in range(times):
+        images = functional.conv2d(functional.pad(images, (1, 1, 1, 1), mode="replicate"), kernel,
+                                   groups=images.shape[1])
+    return images
+
+
+def planes(volume: torch.Tensor) -> tuple[torch.Tensor, list[torch.Tensor]]:
+    """How edges move, by the time of their events, which rises along their way (Benosman et al. 2014, "Event-based
+    visual flow"; here times are means of both polarities' own).
+
+    Parameters
+    ----------
+    volume : torch.Tensor
+        [B, 2b, H, W], divided by its 98th percentile.
+
+    Returns
+    -------
+    slopes : torch.Tensor
+        float32 [B, 4, H, W]: of the positive and the negative events' mean time, from -1 to 1, along x, then along y,
+        weighted by how many events there are.
+    flows : list of torch.Tensor
+        float32 [B, 2, H, W], pixels, for each of WINDOWS: the motion of which the slopes around a pixel are, by least
+        squares that prefer no motion.
+    """
+    bins, (height, width) = volume.shape[1] // 2, volume.shape[2:]
     time = torch.linspace(-1, 1, bins, device=volume.device)[:, None, None]
     events = volume.float().unflatten(1, (2, bins))
-    kernel = torch.tensor([1.0, 2.0, 1.0], device=volume.device) / 4
-    kernel = (kernel[:, None] * kernel).expand(4, 1, 3, 3)
-    sums = functional.conv2d(torch.cat([events.sum(2), (events * time).sum(2)], 1), kernel, padding=1, groups=4)
-    count, times = sums.chunk(2, 1)
+    count, times = blurred(torch.cat([events.sum(2), (events * time).sum(2)], 1), 3).chunk(2, 1)
     mean = functional.pad(times / (count + 0.02), (1, 1, 1, 1), mode="replicate")
-    slope = torch.stack([mean[..., 1:-1, 2:] - mean[..., 1:-1, :-2], mean[..., 2:, 1:-1] - mean[..., :-2, 1:-1]], 1) / 2
-    weighted = slope * (count / (count + 0.1))[:, None]
-    speed = 0.1 * weighted / (slope.square().sum(1, keepdim=True) + 0.01)
-    return torch.cat([weighted, speed], 1).flatten(1, 2)
+    x, y = ((mean[..., 1:-1, 2:] - mean[..., 1:-1, :-2]) / 2, (mean[..., 2:, 1:-1] - mean[..., :-2, 1:-1]) / 2)
+    weight = count / (count + 0.1)
+    moments = torch.stack([weight * each for each in (x * x, x * y, y * y, x, y)], 1).sum(2)
+    flows = []
+    for side in WINDOWS:
+        parts = functional.avg_pool2d(functional.pad(moments, (0, -width % side, 0, -height % side)), side)
+        xx, xy, yy, sum_x, sum_y = blurred(parts).unbind(1)
+        xx, yy = xx + RESTING, yy + RESTING
+        flow = 2 * torch.stack([yy * sum_x - xy * sum_y, xx * sum_y - xy * sum_x], 1) / (xx * yy - xy * xy)[:, None]
+        flows.append(functional.interpolate(flow.clamp(-FARTHEST, FARTHEST), scale_factor=side,
+                                            mode="bilinear")[..., :height, :width])
+    return torch.cat([weight * x, weight * y], 1), flows
 
 
 class FlowNetwork(nn.Module):
-    """The U-Net, which sees the slopes of time beside the volume: they spare it thousands of steps in which it would
-    have to find them. Its predictions are in pixels; at first they are zero."""
+    """The U-Net, which finds what is to be added to the flow of the largest planes. It sees slopes and flows of all
+    planes beside the volume. At first it adds nothing."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()
-        self.unet = begin_at_rest(UNet(channels + 8, 2))
+        self.unet = begin_at_rest(UNet(channels + 4 + 2 * len(WINDOWS), 2))
         for prediction in self.unet.pred_layers:
             prediction.activation = nn.Identity()
 
     def forward(self, volume: torch.Tensor) -> list[torch.Tensor]:
+        """Float [B, 2b, H, W] -> four flows in pixels, float32 [B, 2, h, w], coarse to fine, the last one of H x W."""
         with torch.autocast(volume.device.type, enabled=False):
-            found = slopes(volume)
-        return self.unet(torch.cat([volume, found], 1))
+            slopes, flows = planes(volume)
+        added = self.unet(torch.cat([volume, slopes, *(flow / 4 for flow in flows)], 1))
+        return [functional.adaptive_avg_pool2d(flows[-1], each.shape[2:]) + each.float() for each in added]
 
 
 def moved(previous: torch.Tensor, flow: torch.Tensor) -> torch.Tensor:
@@ -227,22 +263,21 @@ def in_units(sample: Sample) -> np.ndarray:
     return normalized(sample["volume"])
 
 
-def frames_of(sample: Sample) -> tuple[torch.Tensor, torch.Tensor] | None:
+def frames_of(sample: Sample) -> list[torch.Tensor]:
     """The previous and the next frame of a sample of a recording (MVSEC's layout, or images), as they lie in the
-    volume, [1, 1, H, W], 0 to 255; None of other samples."""
-    images = []
-    for path, index in ((sample["pair"][f"{side}_path"], sample["pair"][f"{side}_video_frame"])
-                        for side in ("prev", "next")):
-        if index < 0:
-            images.append(cv2.imread(path, cv2.IMREAD_GRAYSCALE))
-        elif h5py.is_hdf5(path):
-            with h5py.File(path) as file:
-                frames = file.get("davis/left/image_raw")
-                images.append(None if frames is None else frames[index])
-    if sample["pair"]["dataset"] != "recording" or len(images) < 2 or any(image is None for image in images):
-        return None
-    previous, following = (torch.from_numpy(training.placed(sample, image))[None, None] for image in images)
-    return previous, following
+    volume, [1, 1, H, W], 0 to 255; none of other samples."""
+    def read(path: str, index: int) -> np.ndarray | None:
+        if index < 0 or not h5py.is_hdf5(path):
+            return cv2.imread(path, cv2.IMREAD_GRAYSCALE)
+        with h5py.File(path) as file:
+            return file["davis/left/image_raw"][index] if "davis/left/image_raw" in file else None
+
+    if sample["pair"]["dataset"] != "recording":
+        return []
+    images = [read(sample["pair"][f"{side}_path"], sample["pair"][f"{side}_video_frame"]) for side in ("prev", "next")]
+    if any(image is None for image in images):
+        return []
+    return [torch.from_numpy(training.placed(sample, image))[None, None] for image in images]
 
 
 def errors_of_frames(flow: torch.Tensor, position: float, previous: torch.Tensor, following: torch.Tensor,
@@ -251,7 +286,6 @@ def errors_of_frames(flow: torch.Tensor, position: float, previous: torch.Tensor
     [2, H, W], at the next frame's pixels (position 1) or at the previous one's (0), has moved the other, and before."""
     other, here, where = (previous, following, -flow) if position == 1 else (following, previous, flow)
     return error_at_events(moved(other, where[None]), here, volume), error_at_events(other, here, volume)
-
 
 
 def scores_of(network: nn.Module, position: float, shards: Shards) -> dict[str, Any]:
@@ -303,7 +337,7 @@ def main() -> None:
         return flow_loss(predictions, flow, valid)
 
     def check() -> dict[str, float]:
-        scores = scores_of(network, position, validation_shards)
+        scores = scores_of(network, position, validation_shards[::math.ceil(len(validation_shards) / CHECKED)])
         return {"AEE": scores["dense"]["aee"], "AEE at events": scores["at events"]["aee"],
                 "above 1 px": scores["dense"]["npe_1"], "above 3 px": scores["dense"]["npe_3"]}
 
@@ -312,7 +346,7 @@ def main() -> None:
 
     test = scores_of(network, position, test_shards)
     if not test:
-        raise SystemExit(f"expected samples with flow, or of a recording whose frames are where they were, got none, in "
+        raise SystemExit(f"expected samples with flow, or of recordings whose frames are still there, got none, in "
                          f"{args.test}")
     for title, numbers in test.items():
         print(f"{title}: " + ", ".join(f"{name} {value:.3g}" for name, value in numbers.items()))

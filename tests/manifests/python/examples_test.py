@@ -207,23 +207,27 @@ def test_flow_network_learns_and_goes_on(tmp_path):
     assert f"expected flow at the pixels of the next image, or of the previous one (side), got both, in {after}" in said
 
 
-def test_the_slopes_of_an_edge_are_those_of_its_times(monkeypatch):
-    """It goes to the right by a pixel a bin, a quarter of the time's unit: events at pixel x in bin x - 1."""
+@pytest.mark.parametrize("axis, sign", [(2, 1), (2, -1), (1, 1), (1, -1)])
+def test_planes_find_the_way_of_an_edge(monkeypatch, axis, sign):
+    """It goes over 128 pixels from time -1 to 1: an event a pixel, shared between two bins."""
     monkeypatch.syspath_prepend(str(EXAMPLES))
     import train_flow
 
-    volume = torch.zeros(1, 18, 12, 12)
-    for b in range(9):
-        volume[0, b, :, b + 1] = 1
-    slope = 0.25 / 1.02
-    expected = torch.zeros(8)
-    expected[0], expected[4] = slope / 1.1, 0.1 * slope / 1.1 / (slope**2 + 0.01)
-    found = train_flow.slopes(volume)[0, :, 3:9, 3:8]  # where a neighbour's neighbour has an event, too
-    torch.testing.assert_close(found, expected[:, None, None].expand_as(found))
-    turned = train_flow.slopes(volume.flip(3).transpose(2, 3))[0, :, 4:9, 3:9]
-    expected = torch.zeros(8)
-    expected[2], expected[6] = -slope / 1.1, -0.1 * slope / 1.1 / (slope**2 + 0.01)
-    torch.testing.assert_close(turned, expected[:, None, None].expand_as(turned))
+    at = torch.linspace(0, 8, 128)
+    shares = (1 - (at - torch.arange(9)[:, None]).abs()).clamp(min=0)  # [bin, x]
+    volume = torch.zeros(18, 128, 128)
+    volume[:9] = shares[:, None]
+    volume = volume if axis == 2 else volume.transpose(1, 2)
+    slopes, flows = train_flow.planes((volume if sign == 1 else volume.flip(axis))[None])
+    slope, weight = 2 / 127 / 1.02, 1 / 1.1
+    expected = torch.zeros(2)
+    expected[2 - axis] = sign * 2 * weight * slope / (weight * slope**2 + train_flow.RESTING)
+    for flow in flows:
+        found = flow[0, :, 62:66, 62:66]
+        torch.testing.assert_close(found, expected[:, None, None].expand_as(found), rtol=1e-4, atol=1e-4)
+    assert slopes[0, 2 * (2 - axis), 64, 64] == pytest.approx(sign * weight * slope, rel=1e-4)
+    network = train_flow.FlowNetwork(18).eval()
+    assert torch.equal(train_flow.predict(network, volume), train_flow.planes(volume[None])[1][-1][0])
 
 
 def test_flow_is_true_of_its_crop_and_moves_the_frames(monkeypatch):
