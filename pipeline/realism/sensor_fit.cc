@@ -263,7 +263,7 @@ class Fitter {
         std::abs(of_another_past - threshold) + std::abs(refitted(made(alike)) - threshold);
     fitted.mean.low -= unknown;
     fitted.mean.high += unknown;
-    if (std::abs(of_another_past - threshold) > kMostOfThePast * threshold) {
+    if (frames_.size() >= 3 && std::abs(of_another_past - threshold) > kMostOfThePast * threshold) {
       warn(
           fmt::format("the threshold of difference is {:.3g} if pixels saw nothing before the "
                       "first frame, {:.3g} if they saw the frames backwards: {:.2g} events a pixel "
