@@ -554,17 +554,17 @@ StoredParts open_prophesee(const std::filesystem::path& path, const RecordingOpt
   parts.size =
       sensor_size(is_told ? std::optional(ImageSize{*header.height, *header.width}) : std::nullopt,
                   options.sensor, parts);
-  const auto read = [&](PropheseeEncoding encoding) {
-    return std::make_unique<PropheseeEvents>(std::make_unique<const RecordingFile>(path), index_key,
-                                             encoding, header.end_byte, parts.size,
-                                             options.time_shift);
+  const auto read = [&](std::unique_ptr<const RecordingFile> opened, PropheseeEncoding encoding) {
+    return std::make_unique<PropheseeEvents>(std::move(opened), index_key, encoding,
+                                             header.end_byte, parts.size, options.time_shift);
   };
-  auto events = read(*header.encoding);
+  auto events = read(std::move(file), *header.encoding);
   const bool is_legacy = header.encoding == PropheseeEncoding::kEvt21Legacy;
   constexpr double kGarbage = 0.2, kSense = 0.01;
   if ((is_legacy || header.encoding == PropheseeEncoding::kEvt21) &&
       events->nonsense() > kGarbage) {
-    auto exchanged = read(is_legacy ? PropheseeEncoding::kEvt21 : PropheseeEncoding::kEvt21Legacy);
+    auto exchanged = read(std::make_unique<const RecordingFile>(path),
+                          is_legacy ? PropheseeEncoding::kEvt21 : PropheseeEncoding::kEvt21Legacy);
     if (exchanged->count() > 0 && exchanged->nonsense() < kSense) {
       parts.warnings.push_back(fmt::format(
           "words of EVT 2.1 are read as \"endianness={}\": the header has them in the other order, "

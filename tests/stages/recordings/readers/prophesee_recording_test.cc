@@ -321,7 +321,8 @@ TEST_F(PropheseeTest, PassesOverWordsThatMeanNothing) {
       open(kEvt2Header + words<std::uint32_t>({evt2_high(1), evt2(0, 1, 1, 1), 0x20000000}) + "123")
           ->notes(),
       ElementsAre(HasSubstr("passed over: 1, in "), HasSubstr("passed over: 3, in ")));
-  EXPECT_THAT(open(kDatHeader + "12345678901")->notes(), ElementsAre(HasSubstr("over: 3, in ")));
+  EXPECT_THAT(open(kDatHeader + words<std::uint64_t>({dat(0, 1, 1, 1)}) + "123")->notes(),
+              ElementsAre(HasSubstr("over: 3, in ")));
 }
 
 TEST_F(PropheseeTest, LeavesOutEventsBesideTheSensor) {
