@@ -411,9 +411,10 @@ BagContents read_contents(const std::shared_ptr<const RosbagFile>& bag, const st
   BagContents contents = empty_contents(bag, topic, size);
   const std::vector<std::int64_t> with_events = bag->chunks_of(event_connections);
   std::set<std::uint32_t> all = event_connections;
+  const Topics image_topics = topics_of(*bag, MessageKind::kImage);
   std::map<std::uint32_t, BagFrames*> frames;
   for (const auto& [images, found] : contents.frames) {
-    for (const std::uint32_t number : topics_of(*bag, MessageKind::kImage).at(images)) {
+    for (const std::uint32_t number : image_topics.at(images)) {
       frames.emplace(number, found.get());
       all.insert(number);
     }

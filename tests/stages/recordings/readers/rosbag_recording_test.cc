@@ -552,7 +552,8 @@ TEST_F(Rosbag, TakesTheFramesOfTheCamerasTopic) {
   const std::pair<TestMessage, std::string> left_out[] = {
       {{1, image(1, "bayer_rggb8", 4, padded)},
        "expected a frame of 4x3 in mono8, bgr8 or rgb8, got 4x3 in bayer_rggb8"},
-      {{1, image(1, "mono8", 3, padded, {3, 3})}, "got 3x3 in mono8"},
+      {{1, image(1, "mono8", 3, padded, {3, 3})},
+       "expected a frame of 4x3 in mono8, bgr8 or rgb8, got 3x3 in mono8"},
       {{1, image(1, "mono8", 4, "short")}, "expected 3 rows of 4 bytes, got 5 bytes of rows of 4"},
       {{1, image(1, "rgb8", 4, padded)}, "expected 3 rows of 12 bytes, got 18 bytes of rows of 4"}};
   for (const auto& [message, reason] : left_out) {
