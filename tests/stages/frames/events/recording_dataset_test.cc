@@ -540,7 +540,7 @@ TEST_F(RecordingDatasetTest, TellsOfRecordingsThatCannotBeRead) {
   EXPECT_THAT(unreadable.reasons,
               ElementsAre(AllOf(HasSubstr("b.h5"), HasSubstr("truncated")),
                           AllOf(HasSubstr("c.raw"), HasSubstr("2.0, 2.1 or 3.0")),
-                          AllOf(HasSubstr("d.aedat"), HasSubstr("another version than 4.0")),
+                          AllOf(HasSubstr("d.aedat"), HasSubstr("the sensor's size")),
                           AllOf(HasSubstr("e.raw"), HasSubstr("the sensor's size"))));
   for (const auto& [root, reason] : {std::pair("all/b.h5", "truncated"),
                                      {"all/c.raw", "2.0, 2.1 or 3.0"},
@@ -568,7 +568,7 @@ TEST_F(WithoutFramesTest, WithoutEventsItIsAStillScene) {
   write("all/a.csv", "t,x,y,p\n1,0,0,1\n2,0,0,1\n");
   write("all/b.csv", "t,x,y,p\n");
   write("labels/b.csv", kLabelHeader + "5,0,0,2,1,car,\n7.5\n"s);
-  struct Case {
+  struct Row {
     const char* root;
     std::optional<std::string> labels;
     WindowSpec window;
@@ -576,10 +576,10 @@ TEST_F(WithoutFramesTest, WithoutEventsItIsAStillScene) {
   };
   const WindowSpec second{.duration_s = 1, .events = std::nullopt, .label = LabelPlace::kEnd};
   const WindowSpec events{.duration_s = std::nullopt, .events = 3, .label = LabelPlace::kEnd};
-  for (const Case& each : {Case{"all", {}, second, "(1 empty event volume): all/b.csv"},
-                           {"all/b.csv", {}, second, "(1 empty event volume): all/b.csv"},
-                           {"all", "labels", second, "(2 empty"},
-                           {"all", "labels", events, "(2 empty"}}) {
+  for (const Row& each : {Row{"all", {}, second, "(1 empty event volume): all/b.csv"},
+                          {"all/b.csv", {}, second, "(1 empty event volume): all/b.csv"},
+                          {"all", "labels", second, "(2 empty"},
+                          {"all", "labels", events, "(2 empty"}}) {
     SCOPED_TRACE(each.root);
     spec_.root = each.root;
     spec_.annotations = each.labels;
