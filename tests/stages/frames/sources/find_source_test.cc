@@ -191,7 +191,8 @@ TEST_F(FindSource, SaysWhatAFileIsAndWhatToDoWithIt) {
   const struct {
     std::string name, text, title, way_out;
   } cases[] = {
-      {"x.aedat", "#!AER-DAT2.0\r\n\xc0", "AEDAT of another version than 3.1 and 4.0", "write AEDAT4"},
+      {"x.aedat", "#!AER-DAT2.0\r\n\xc0", "AEDAT of another version than 3.1 and 4.0",
+       "write AEDAT4"},
       {"instances.json", R"({"images": [{"file_name": "a"}], "annotations": []})",
        "labels as COCO's", "give the folder of its images"},
       {"a.xml", "<annotation>", "XML", "give the folder"},
