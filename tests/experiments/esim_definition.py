@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """`eventgan simulate` against ESIM's definition: of the same frames, events where log intensity, linear from frame to
 frame, is a threshold away from the last event's (0.2 either way, no refractory time, no noise).
 
@@ -36,7 +36,8 @@ COLUMNS = ["frames", "made by", "events", "÷ the definition's", "of other count
 
 def esim(frames, times_s):
     """Events [N, 4] of x, y, t in seconds, polarity -1 or +1, of frames uint8 [F, H, W] (Rebecq et al., ESIM, 2018),
-    and bool [H, W] of pixels whose events hang on rounding, as where one event up is followed by the grey level before."""
+    and bool [H, W] of pixels whose events hang on rounding, as where one event up is followed by the grey level before.
+    """
     logs = np.log(frames / 255 + LOG_EPSILON)
     level, events, tied = logs[0].copy(), [np.empty((0, 4))], np.zeros(logs.shape[1:], bool)
     for (start, end), (before, after) in zip(itertools.pairwise(times_s), itertools.pairwise(logs)):

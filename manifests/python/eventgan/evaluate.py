@@ -16,7 +16,8 @@ Boxes and joints are in volume pixels, boxes by edges, joints by pixel centres (
 the row in the sample and may be left out where there is only one; joints come in the order of Shards.default_joints().
 Flows are an .npz of numpy.savez with an array [2, H, W] (x, then y, volume pixels) for each sample's id.
 
-detection_scores.py, pose_scores.py and flow_scores.py define the numbers. One that is not defined is null in JSON and "-" in a table.
+detection_scores.py, pose_scores.py and flow_scores.py define the numbers. One that is not defined is null in JSON and
+"-" in a table.
 """
 
 from __future__ import annotations
@@ -368,8 +369,8 @@ def evaluate_flows(predictions: PathLike, samples: Samples) -> tuple[dict[str, A
             sample = shards.sample(i, {"volume", "flow"})
             scored, flow = sample["flow_valid"] != 0, found[name]
             if flow.shape != sample["flow"].shape or not np.isfinite(flow[:, scored]).all():
-                raise ValueError(f"expected finite numbers of shape {sample['flow'].shape}, got {flow.dtype} of shape "
-                                 f"{flow.shape}, in {predictions} (sample {name})")
+                raise ValueError(f"expected finite numbers of shape {sample['flow'].shape}, got {flow.dtype} of "
+                                 f"shape {flow.shape}, in {predictions} (sample {name})")
             yield flow, sample["flow"], scored & (sample["volume"] != 0).any(0) if at_events else scored
 
     counts = {"samples": len(labelled), "not_of_these_samples": len(names - labelled.keys())}

@@ -10,7 +10,6 @@ are of photographs, with `"flow": true` in their source.
 
 from __future__ import annotations
 
-import argparse
 import collections
 import json
 import math
