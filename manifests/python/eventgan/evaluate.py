@@ -369,12 +369,13 @@ def evaluate_flows(predictions: PathLike, samples: Samples) -> tuple[dict[str, A
             sample = shards.sample(i, {"volume", "flow"})
             scored, flow = sample["flow_valid"] != 0, found[name]
             if flow.shape != sample["flow"].shape or not np.isfinite(flow[:, scored]).all():
-                raise ValueError(f"expected finite numbers of shape {sample['flow'].shape}, got {flow.dtype} of "
-                                 f"shape {flow.shape}, in {predictions} (sample {name})")
+                raise ValueError(f"expected finite numbers of shape {sample['flow'].shape}, got {flow.dtype} "
+                                 f"of shape {flow.shape}, in {predictions} (sample {name})")
             yield flow, sample["flow"], scored & (sample["volume"] != 0).any(0) if at_events else scored
 
     counts = {"samples": len(labelled), "not_of_these_samples": len(names - labelled.keys())}
-    return {"counts": counts, "flow": {"dense": flow_scores(flows(False)), "at events": flow_scores(flows(True))}}, found
+    scores = {"dense": flow_scores(flows(False)), "at events": flow_scores(flows(True))}
+    return {"counts": counts, "flow": scores}, found
 
 
 def table(title: str, rows: Mapping[str, Mapping[str, float | str]], columns: Mapping[str, str],
