@@ -43,7 +43,9 @@ bool same(double a, double b) {
   return std::abs(a - b) <= 1e-9 + 1e-14 * std::abs(b) || (std::isnan(a) && std::isnan(b));
 }
 bool same(float a, float b) { return a == b || (std::isnan(a) && std::isnan(b)); }
-bool same(Half a, Half b) { return a == b || (is_nan(a) && is_nan(b)); }
+bool same(Half a, Half b) {  // rounded from such a number of 64 bits: the next one, too
+  return std::abs(a.bits - b.bits) <= 1 || (is_nan(a) && is_nan(b));
+}
 // Of bytes, those of outlines: last bits of 64 can lie between two numbers of 32.
 bool same(const std::vector<char>& a, const std::vector<char>& b) {
   if (a == b) return true;
@@ -118,7 +120,7 @@ Outcome<Annotation> read_annotation(const Dataset& dataset, const std::string& l
 
 SourceComparison::SourceComparison(JobManifest manifest,
                                    const std::vector<std::optional<ClassNames>>& stored)
-    : manifest_(std::move(manifest)) {
+    : manifest_(std::move(manifest)), reader_(manifest_.directory, manifest_.image, 1) {
   for (const SourceSpec& source : manifest_.sources) {
     try {
       datasets_.push_back(open_dataset(source, manifest_.directory));
@@ -173,9 +175,11 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   const std::string of_source = source_key(manifest_.sources, source);
   const PairKey key{manifest_.seed, to_string(kind), planned.sample_id, of_source};
   const auto planned_motion = pair.motion;
+  std::vector<Box> boxes;
   if (!is_fault(read)) {
     const bool is_sized = stored.source_size.width > 0;
-    settle_motion(manifest_.sources[source].pairs, key, read->boxes,
+    boxes = read->boxes;
+    settle_motion(manifest_.sources[source].pairs, key, boxes,
                   is_sized ? std::optional(stored.source_size) : std::nullopt, pair);
   }
   // Labels that could not be read when a sample was quarantined decided nothing.
@@ -246,6 +250,19 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   }
   expected.tiles = stored.tiles;
   expected.flow = stored.flow;
+  if (manifest_.sources[source].flow) {
+    Outcome<MadePair> parts = dataset.made_pair(planned.label_key);
+    if (is_fault(parts))
+      return {"expected the flow of its still, got none: " + parts.fault().reason};
+    FramePair still = pair;
+    if (!parts->poses.empty()) {
+      still.poses = std::move(parts->poses);
+      boxes = std::move(parts->boxes);
+    }
+    Outcome<PreparedPair> prepared =
+        reader_.read(still, orientation_of(kind), manifest_.sources[source].every, boxes, {}, true);
+    if (!is_fault(prepared)) expected.flow = std::move(prepared->flow);
+  }
   expected.annotation = std::move(annotation);
   expected.labels = std::move(*mapped);
   ShardHeader header = reader.header();

@@ -12,6 +12,7 @@
 #include "manifests/values/shard.h"
 #include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/decoding/pair_reader.h"
 #include "stages/frames/sources/class_numbers.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_tables.h"
@@ -35,10 +36,10 @@ class SourceComparison {
 
   /// Compares every valid sample: that it is the planned one, that its columns of `/pairs` and
   /// `/labels` are those of the plan and of its annotation read again and mapped by the placement
-  /// of its source size, that its image, where it can be read, has that size, that classes and
-  /// joints have the source's names. Of a quarantined sample the original annotation is compared,
-  /// if the shard has one and it can be read. Texts "expected X, got Y (sample SLOT, ID)" without
-  /// the file's name; none for a source that is not there.
+  /// of its source size, that its image, where it can be read, has that size and its optical flow,
+  /// that classes and joints have the source's names. Of a quarantined sample the original
+  /// annotation is compared, if the shard has one and it can be read. Texts "expected X, got Y
+  /// (sample SLOT, ID)" without the file's name; none for a source that is not there.
   std::vector<std::string> faults(const PlannedShard& planned, const ShardReader& reader);
 
   /// Valid samples that were compared.
@@ -51,15 +52,16 @@ class SourceComparison {
   JobManifest manifest_;
   std::vector<std::unique_ptr<Dataset>> datasets_;  // null where the source is not there
   std::vector<std::string> notes_;
-  ImageSizes sizes_;  ///< of the datasets that keep none; a video serves many samples
+  ImageSizes sizes_;   ///< of the datasets that keep none; a video serves many samples
+  PairReader reader_;  ///< of stills whose flow is compared
   long long compared_ = 0;
 };
 
 /// What slot `slot` of `stored` holds that `expected`, the sample made again from its source (its
 /// `tiles` as stored), would not: every column of the format but those of `/events`, which the
 /// generator makes, is compared, so that a new one cannot be forgotten. Numbers of 64 bits may
-/// differ by 1e-9, and those of outlines by the last of their 32 bits, since the compiler decides
-/// on last bits; all else is the same exactly.
+/// differ by 1e-9, those of outlines by the last of their 32 bits and those of flow by the last of
+/// 16, since the compiler decides on last bits; all else is the same exactly.
 /// A column that shards of today may have and this one has not is left out. Texts "expected X in
 /// COLUMN by PLACE, got Y" in which `place` names the annotation, one for each box,
 /// person or sample and column; where the annotation's bytes or the numbers of labels differ, that

@@ -326,7 +326,7 @@ class EveryColumn(program.InFolder):
                    {"dataset": "human36m", "layout": "extracted", "root": "walk", "pairs": program.pairs([1])},
                    {"dataset": "mpii_list", "root": "people", "annotations": "people/people.json",
                     "sequences": "people/sequences", "pairs": program.pairs([2], side="around")},
-                   {"dataset": "kitti_object", "root": "cars", "split": "stills", "outlines": "masks",
+                   {"dataset": "kitti_object", "root": "cars", "split": "stills", "outlines": "masks", "flow": True,
                     "pairs": {"from": "stills",
                               "motion": {"translation_px": [1, 1], "rotation_deg": 1, "scale": 0.01,
                                          "objects": {"translation_px": [1, 2]}}}}]

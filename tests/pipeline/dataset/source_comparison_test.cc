@@ -60,6 +60,13 @@ TEST_F(RowDifferences, AreNoneIfAllIsTheSame) {
   const float corner = std::nextafter(4.25f, 5.0f);  // of an outline, which has 32 bits
   expected_.labels.boxes[0].outline.rings[0][1].x = corner;
   EXPECT_THAT(found(expected_), IsEmpty());
+  const ShardSample& still = example_.samples[4];
+  stored_.flow[4 * still.flow.px.size()].bits += 1;  // of 16 bits
+  EXPECT_THAT(found(still, 4), IsEmpty());
+  stored_.flow[4 * still.flow.px.size()].bits += 1;
+  EXPECT_THAT(
+      found(still, 4),
+      texts_with({"expected 0.5 in /labels/flow according to labels/0.txt, got 0.50097656"}));
 }
 
 TEST_F(RowDifferences, AreOfOutlinesThatLieElsewhere) {
