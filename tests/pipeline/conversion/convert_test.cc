@@ -115,7 +115,7 @@ TEST_F(Convert, OpensARecordingToRecogniseItAndReadsItOnce) {
   testing::write_file(folder_ / "events.csv", table);
   manifest_ = parse_job_manifest(
       R"({"format": "eventgan-manifest", "version": 1, "name": "job", "seed": 1, "sources": [
-          {"dataset": "recording", "root": "events.csv", "window_s": 0.001, "unit": "us",
+          {"dataset": "recording", "root": "events.csv", "window_s": 0.001, "columns": {"unit": "us"},
            "sensor": {"width": 4, "height": 3}}], "image": {}, "generator": {"kind": "events"},
           "output": {"directory": "out", "samples_per_shard": 4}})",
       folder_.path(), "manifest.json");
