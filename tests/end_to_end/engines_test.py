@@ -356,10 +356,11 @@ class Engines(program.InFolder):
         for limit in ["AVX2", "AVX512_CORE", "ALL"]:
             with self.subTest(limit):
                 environment = {"ONEDNN_MAX_CPU_ISA": limit}
-                told, _ = run("init", self.job / "cars", "--out", self.folder / f"{limit}.json", environment=environment)
+                path = self.folder / f"{limit}.json"
+                told, _ = run("init", self.job / "cars", "--out", path, environment=environment)
                 if limit == "AVX2":
                     self.assertIn("this processor (avx2) has no instructions for int8", told)
-                _, err = run("convert", self.folder / f"{limit}.json", "--limit", 2, "--progress", "none",
+                _, err = run("convert", path, "--output", self.folder / limit, "--limit", 2, "--progress", "none",
                              environment=environment)
                 self.assertNotIn("warning: precision", err)
 
