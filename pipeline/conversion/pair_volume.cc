@@ -1,29 +1,53 @@
 #include "pipeline/conversion/pair_volume.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "manifests/values/generators.h"
 #include "stages/events/drawn_events.h"
 #include "stages/events/noise.h"
+#include "stages/events/simulation/sensor.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/generator/wanted_tiles.h"
 
 namespace eventgan {
+namespace {
+
+/// Whether the generator gives events although nothing moves.
+bool has_events_at_rest(const GeneratorSpec& spec) {
+  const GeneratorRow& row = generator_row(spec.kind);
+  return row.moves_one_frame ||
+         (row.has_sensor_settings && idle_event_bytes(spec.sensor, 1, spec.duration_s) > 0);
+}
+
+bool is_same_image(const PreparedPair& pair) {
+  const auto next = pair.input.begin() + static_cast<std::ptrdiff_t>(pair.content.pixel_count());
+  return std::equal(next, pair.input.end(), pair.input.begin());
+}
+
+}  // namespace
 
 GeneratedPart generate_volume(const Generator& generator, const GeneratorSpec& spec,
                               const PairKey& key, const PreparedPair& pair,
                               const VolumeLabels& labels, std::span<float> volume) {
   GeneratedPart part;
   part.threshold = pair_threshold(spec, key);
-  const GeneratorInput input{pair.input, pair.content, part.threshold,
-                             pair.between.at ? &pair.between : nullptr, key.draw};
-  if (spec.scope.scope == Scope::kWhole) {
-    part.notes = generator.generate(input, volume);
-  } else {
-    const TileMask wanted =
+  TileMask wanted;
+  if (spec.scope.scope != Scope::kWhole) {
+    wanted =
         wanted_tiles(spec.scope, pair.input, pair.content, pair.content_y, pair.content_x, labels);
-    part.notes = generator.generate_tiles(input, wanted, volume);
     part.tiles = tiles_of_volume(wanted, pair.content_y, pair.content_x, pair.placement.volume);
   }
+  part.same_image = is_same_image(pair);
+  if (part.same_image && !has_events_at_rest(spec)) {
+    std::ranges::fill(volume, 0.0f);
+    part.notes.sound = true;
+    return part;
+  }
+  const GeneratorInput input{pair.input, pair.content, part.threshold,
+                             pair.between.at ? &pair.between : nullptr, key.draw};
+  part.notes = spec.scope.scope == Scope::kWhole ? generator.generate(input, volume)
+                                                 : generator.generate_tiles(input, wanted, volume);
   if (spec.sample && generator.thresholds()) {
     draw_events(volume, {generator.bins(), pair.content}, key.pair().keyed("events"));
   }

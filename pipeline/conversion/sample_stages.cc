@@ -238,6 +238,7 @@ void SampleStages::generate(SampleMessage& message) const try {
                                        message.sample.labels, message.volume);
   if (part.threshold) message.sample.threshold = part.threshold->mean;
   message.notes = part.notes;
+  message.same_image = part.same_image;
   message.sample.tiles = std::move(part.tiles);
   free_memory(message.prepared.input);
 } catch (const std::exception&) {

@@ -38,6 +38,7 @@ struct SampleMessage {
   ShardSample sample;         ///< read: everything but statistics
   PreparedPair prepared;      ///< read → generate; of events without `input`
   OutlineCounts outlines;     ///< read → write
+  bool same_image = false;    ///< generate → write: both frames are one image
   std::vector<Event> events;  ///< read → generate: of datasets of events, in pixels of the content
   /// With `events`: times of the window's first and last event, whether a crop has left them or
   /// not.

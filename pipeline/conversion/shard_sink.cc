@@ -163,6 +163,7 @@ void ShardSink::add(const SampleMessage& message) {
     record_.outlines += message.outlines;
   }
   losses_.add(message.sample.annotation);
+  same_images_ += message.same_image ? 1 : 0;
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     record_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }
@@ -205,6 +206,15 @@ bool ShardSink::commit() {
   quarantined_ += std::ssize(record_.quarantined);
   committed_.push_back({shard_, std::move(record_)});
   return true;
+}
+
+std::vector<std::string> ShardSink::notes() const {
+  std::vector<std::string> notes = losses_.notes();
+  if (same_images_ > 0) {
+    notes.push_back(
+        count_text(same_images_, "pair", " of the same image twice: nothing moves there"));
+  }
+  return notes;
 }
 
 void ShardSink::abandon() {

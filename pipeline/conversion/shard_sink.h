@@ -54,8 +54,9 @@ class ShardSink final : public SampleSink {
   bool closed() const override;
 
   const std::vector<CommittedShard>& committed() const { return committed_; }
-  /// What a person should know of the labels of all samples that were added.
-  std::vector<std::string> notes() const { return losses_.notes(); }
+  /// What a person should know of all samples that were added: what labels lost, and how many pairs
+  /// are the same image twice.
+  std::vector<std::string> notes() const;
 
  private:
   const ConversionJob& job_;
@@ -67,6 +68,7 @@ class ShardSink final : public SampleSink {
   std::unique_ptr<ShardWriter> writer_;  // of the shard under way
   CommitRecord record_;                  // of the shard under way
   LabelLosses losses_;
+  std::int64_t same_images_ = 0;
 };
 
 }  // namespace eventgan

@@ -188,11 +188,12 @@ LoadedGenerator load_generator(const JobManifest& manifest) {
                      : choose_precision(spec.engine, spec.device,
                                         engine_support(Precision::kBfloat16, spec.device));
   const EngineSupport support = engine_support(precision, spec.device);
-  const EngineChoice choice = choose_engine(
+  EngineChoice choice = choose_engine(
       {spec.engine, precision, loaded.weights.calibration != nullptr, spec.weights, spec.device},
       support);
   LoadedGenerator result;
   result.generator = make_engine(choice.engine, loaded.weights, spec, precision);
+  if (precision == Precision::kInt8 && int8_pays(loaded.weights)) choice.warning.clear();
   result.weights_hash = std::move(loaded.hash);
   result.choice = choice_text(choice, spec, precision, support, loaded.weights.training_gaps);
   for (const std::string& warning : {loaded.warning, choice.warning}) {

@@ -19,6 +19,7 @@
 #include "pipeline/planning/source_draft.h"
 #include "stages/frames/dataset/dataset_reader.h"
 #include "stages/generator/onednn/onednn_generator.h"
+#include "stages/generator/shipped_weights.h"
 
 namespace eventgan {
 namespace {
@@ -87,35 +88,85 @@ class Draft {
                        quoted(place_.output));
   }
 
+  /// Decides what `text` says of the network: what it found, a line each.
+  std::vector<std::string> decide(const std::vector<SourceDraft>& sources) {
+    std::vector<std::string> lines;
+    if (has_events(sources.front().found.dataset)) return lines;
+    has_int8_ = int8_pays(read_shipped_weights(moves() ? kWideWeights : kNarrowWeights));
+    if (!is_network(sources)) return lines;
+    if (const OnednnSupport int8 = onednn_support(Precision::kInt8); int8.able && !int8.native) {
+      lines.push_back(
+          fmt::format("\"precision\": \"{}\" is the faster one here; this processor "
+                      "({}) has no instructions for int8",
+                      precision(), int8.instruction_set));
+    }
+    if (const std::string why = rest_text(sources); !why.empty()) {
+      lines.push_back("\"scope\": \"motion\", since " + why);
+    }
+    return lines;
+  }
+
  private:
+  bool is_network(const std::vector<SourceDraft>& sources) const {
+    return !has_events(sources.front().found.dataset) &&
+           (moves() || !std::ranges::all_of(sources, is_in_layers));
+  }
+
+  /// Why what moves is enough, where at least a third of the tiles of all frames rests, as far as
+  /// the pairs that were looked at tell; else empty.
+  static std::string rest_text(const std::vector<SourceDraft>& sources) {
+    constexpr double kLeast = 1.0 / 3;
+    double frames = 0, moving = 0;
+    int pairs = 0, resting = 0;
+    for (const SourceDraft& source : sources) {
+      const auto count = static_cast<double>(source.labelled_frames);
+      frames += count;
+      moving += count * source.motion.tiles;
+      pairs += source.motion.pairs;
+      resting += source.motion.resting;
+    }
+    if (pairs == 0 || 1 - moving / frames < kLeast) return "";
+    return fmt::format("the image rests in {} of {} pairs: {:.0f} % of the tiles move", resting,
+                       pairs, 100 * moving / frames);
+  }
+
+  const char* precision() const { return has_int8_ ? "int8" : "auto"; }
+
   std::string generator_text(const std::vector<SourceDraft>& sources) const {
-    const bool has_int8 = onednn_support(Precision::kInt8).able;
+    const std::string rest = rest_text(sources);
+    const std::string scope = rest.empty() ? "" : R"(, "scope": "motion")";
+    const std::string scope_comment =
+        rest.empty() ? ""
+                     : fmt::format(
+                           "  // Only what moves is generated (\"scope\"), since {}\n  // "
+                           "(manifests/guides/speed.md).\n",
+                           rest);
     if (moves()) {
       return fmt::format(
           R"(  // Before a moving camera detectors of persons learn most from the wide weights (manifests/guides/choose.md).
-  "generator": {{ "weights": "shipped:16", "precision": "{}" }},
+{}  "generator": {{ "weights": "shipped:16", "precision": "{}"{} }},
 )",
-          has_int8 ? "int8" : "auto");
+          scope_comment, precision(), scope);
     }
-    if (std::ranges::all_of(sources, is_in_layers)) {
+    if (!is_network(sources)) {
       return fmt::format(
           R"(  // The motion of photographs is drawn, so a simulator can follow it: detectors of persons learn more
   // from its events than from the network's, which take less time (manifests/guides/choose.md):
   // "generator": {{ "weights": "shipped:8", "precision": "{}" }},
   "generator": {{ "kind": "esim" }},
 )",
-          has_int8 ? "int8" : "auto");
+          precision());
     }
     return fmt::format(
         R"(  // Detectors and pose networks learn as much from the narrow weights{} as from the wide ones in
   // float32, "shipped:16", which take four times as long (manifests/guides/choose.md).
   // Weights of your own: {{ "weights": "my.safetensors" }}.
-  "generator": {{ "weights": "shipped:8", "precision": "{}" }},
+{}  "generator": {{ "weights": "shipped:8", "precision": "{}"{} }},
   // Weights that know their sensor make the events of a camera, of one that ships or of your own, which
   // `eventgan fit --weights` finds in its recordings (manifests/guides/sensor.md):
   // "generator": {{ "weights": "shipped:sensor", "sensor": "davis346" }},
 )",
-        has_int8 ? " in 8 bits" : "", has_int8 ? "int8" : "auto");
+        has_int8_ ? " in 8 bits" : "", scope_comment, precision(), scope);
   }
   static constexpr std::string_view kEvents =
       R"(  // Volumes are made of the camera's own events.
@@ -285,9 +336,12 @@ class Draft {
         (place_.is_relative ? path.lexically_proximate(place_.folder) : path).generic_string());
   }
 
+  static constexpr int kNarrowWeights = 8, kWideWeights = 16;
+
   DraftPlace place_;
   std::string name_;
   DraftWishes wishes_;
+  bool has_int8_ = false;
 };
 
 void require_one_job(const std::vector<FoundSource>& sources) {
@@ -340,7 +394,7 @@ double rests_of(CameraMotion camera) {
 ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const DraftPlace& place,
                              const DraftWishes& wishes) {
   require_one_job(sources);
-  const Draft draft(place, draft_name(sources), wishes);
+  Draft draft(place, draft_name(sources), wishes);
   std::vector<SourceDraft> drafts;
   ManifestDraft made;
   made.has_samples = true;
@@ -360,7 +414,7 @@ ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const Draf
       }
     }
     source.preset = alone.image.preset;
-    look_at_source(alone.sources.front(), place.folder, source);
+    look_at_source(alone.sources.front(), alone.image, place.folder, source);
     if (found.ids) {
       source.findings.push_back("of these only what is listed in " + found.ids->string());
       if (!source.is_stills) {
@@ -380,6 +434,7 @@ ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const Draf
     throw UsageError(fmt::format("--camera: expected photographs with labels, got {}, in {}",
                                  first.title, first.root.string()));
   }
+  std::ranges::move(draft.decide(drafts), std::back_inserter(made.findings));
   made.text = draft.text(drafts);
   parse_job_manifest(made.text, place.folder, "the manifest for " + sources.front().root.string());
   return made;

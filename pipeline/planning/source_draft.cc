@@ -20,9 +20,11 @@
 #include "pipeline/planning/spread.h"
 #include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/decoding/pair_reader.h"
 #include "stages/frames/sources/class_numbers.h"
 #include "stages/frames/sources/dataset_kinds.h"
 #include "stages/frames/sources/open_dataset.h"
+#include "stages/generator/wanted_tiles.h"
 
 namespace eventgan {
 namespace {
@@ -198,6 +200,46 @@ void consider_stills(const Dataset& dataset, const fs::path& folder, SourceDraft
       std::ranges::any_of(frames, [](const LabelledFrame& frame) { return frame.fault.empty(); });
 }
 
+/// Looks at what moves in some pairs; those of videos are near the start, since nothing else is
+/// there without all before it.
+void look_at_motion(const Dataset& dataset, SourceSpec spec, ImageSpec image,
+                    const fs::path& folder, SourceDraft& draft) {
+  constexpr std::size_t kPairs = 20, kTurns = 4;
+  constexpr std::int64_t kVideoFrames = 100;
+  spec.pairs.gaps = draft.gaps;
+  image.range = draft.range;
+  const ScopeSpec scope{.scope = Scope::kMotion};
+  const PairReader reader(folder, image, 1);
+  std::vector<const LabelledFrame*> frames;
+  for (const LabelledFrame& frame : dataset.labelled_frames()) {
+    if (frame.frame.video_frame < kVideoFrames) frames.push_back(&frame);
+  }
+  SeenMotion seen;
+  double moving = 0;
+  const std::vector<std::size_t> places = spread(kPairs * kTurns, frames.size());
+  for (std::size_t turn = 0; turn < kTurns; ++turn) {
+    for (std::size_t i = turn; i < places.size() && seen.pairs < int{kPairs}; i += kTurns) {
+      for (const PlannedSample& sample :
+           choose_pairs(dataset, *frames[places[i]], spec, 0).samples) {
+        if (!sample.fault.empty()) continue;
+        const auto pair = reader.read(sample.pair, orientation_of(spec.dataset));
+        if (is_fault(pair)) continue;
+        const std::vector<std::uint8_t> tiles =
+            wanted_tiles(scope, pair->input, pair->content, pair->content_y, pair->content_x, {})
+                .wanted;
+        const double share =
+            static_cast<double>(std::ranges::count(tiles, 1)) / static_cast<double>(tiles.size());
+        moving += share;
+        ++seen.pairs;
+        seen.resting += share <= 0.5 ? 1 : 0;
+      }
+    }
+  }
+  if (seen.pairs == 0) return;
+  seen.tiles = moving / seen.pairs;
+  draft.motion = seen;
+}
+
 /// What was counted, before what else was found.
 std::vector<std::string> findings_of(const SourceDraft& draft, const Survey& survey) {
   const FoundSource& found = draft.found;
@@ -322,12 +364,14 @@ SourceDraft::SourceDraft(const FoundSource& source)
   std::ranges::copy_if(habits.gaps, std::back_inserter(gaps), [](int gap) { return gap > 0; });
 }
 
-void look_at_source(const SourceSpec& spec, const fs::path& folder, SourceDraft& draft) {
+void look_at_source(const SourceSpec& spec, const ImageSpec& image, const fs::path& folder,
+                    SourceDraft& draft) {
   std::vector<std::unique_ptr<Dataset>> datasets;
   datasets.push_back(open_source(spec, folder, draft));
   number_classes({spec}, datasets);
   const auto& dataset = datasets.front();
   const Survey counted = survey(*dataset, spec);
+  draft.labelled_frames = counted.labelled_frames;
   if (has_events(spec.dataset)) {
     draft.has_frames = all_have_frames(*dataset);
     draft.are_windows = !draft.has_frames && each_is_a_window(spec, folder, *dataset, draft);
@@ -344,7 +388,10 @@ void look_at_source(const SourceSpec& spec, const fs::path& folder, SourceDraft&
     draft.has_samples =
         std::ranges::any_of(counted.pairs_by_gap, [](const auto& gap) { return gap.second > 0; });
     consider_stills(*dataset, folder, draft);
-    if (!draft.is_stills) note_unknown_times(*dataset, draft);
+    if (!draft.is_stills) {
+      note_unknown_times(*dataset, draft);
+      look_at_motion(*dataset, spec, image, folder, draft);
+    }
   }
   draft.findings = findings_of(draft, counted);
   draft.notes = dataset->notes();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -14,6 +15,14 @@ namespace eventgan {
 struct SensorGuess {
   ImageSize size;
   int x = 0, y = 0;  ///< the largest of an event
+};
+
+/// What moves in some pairs of a source, spread over its sequences, as Scope::kMotion sees it.
+struct SeenMotion {
+  int pairs = 0;    ///< that were looked at
+  int resting = 0;  ///< of them those of whose tiles at most half move: the image rests
+  double tiles =
+      1;  ///< share of the tiles that move, mean of the pairs; of none, and of stills, all
 };
 
 /// What is known of a source when its part of a manifest is written.
@@ -34,12 +43,15 @@ struct SourceDraft {
   std::optional<SensorGuess> guess = {};  ///< then: what the events show, if any was seen
   bool has_samples = false;               ///< labelled frames that make pairs, or windows
   std::optional<ValueRange> range = {};   ///< of images of 16 bits that use little of them
+  std::int64_t labelled_frames = 0;
+  SeenMotion motion = {};
 };
 
 /// Opens the dataset of `spec`, which a manifest in `folder` has for it, counts its labelled frames
-/// and their paired frames, and looks at some images: do neighbours show the same scene, or does
-/// each image make a pair with itself? Throws as open_dataset does.
-void look_at_source(const SourceSpec& spec, const std::filesystem::path& folder,
-                    SourceDraft& draft);
+/// and their paired frames, and looks at some images, prepared as `image` says: do neighbours show
+/// the same scene, or does each image make a pair with itself? How much of the pairs moves? What
+/// cannot be read is passed over. Throws as open_dataset does.
+void look_at_source(const SourceSpec& spec, const ImageSpec& image,
+                    const std::filesystem::path& folder, SourceDraft& draft);
 
 }  // namespace eventgan

@@ -110,7 +110,9 @@ Comparison::Able Comparison::look_at(const Computation& computation) const {
   if (has_weights(computation.method)) {
     able.base_channels = load_weights(job).weights.base_channels;  // throws: a slip of the user's
     const EngineSupport support = engine_support(computation.precision);
-    if (options_.only_native && computation.precision != Precision::kFloat32 && !support.native) {
+    const bool is_wanted = computation.precision == Precision::kFloat32 ||
+                           computation.precision == manifest_.generator.precision;
+    if (options_.only_native && !is_wanted && !support.native) {
       able.reason = fmt::format("this processor ({}) has no instructions for {}", support.processor,
                                 to_string(computation.precision));
       return able;

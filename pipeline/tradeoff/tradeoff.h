@@ -19,8 +19,8 @@ namespace eventgan {
 
 struct TradeoffOptions {
   TradeoffAxes axes;
-  /// Leave out precisions that this processor has no instructions for, and say so: float32 is both
-  /// faster and exact there.
+  /// Leave out precisions that this processor has no instructions for, but for the manifest's own,
+  /// and say so.
   bool only_native = true;
   /// What the others are compared with; none: the widest weights of the axes, float32, size 1.
   std::optional<Computation> reference;

@@ -350,6 +350,20 @@ class Engines(program.InFolder):
                     self.assert_near(volumes, reference)
                     self.assertNotIn("warning", err)
 
+    def test_what_init_chooses_is_no_bad_bargain(self):
+        """A precision without instructions is chosen only where it is the faster one, and init says so."""
+        self.needs_onednn()
+        for limit in ["AVX2", "AVX512_CORE", "ALL"]:
+            with self.subTest(limit):
+                environment = {"ONEDNN_MAX_CPU_ISA": limit}
+                path = self.folder / f"{limit}.json"
+                told, _ = run("init", self.job / "cars", "--out", path, environment=environment)
+                if limit == "AVX2":
+                    self.assertIn("this processor (avx2) has no instructions for int8", told)
+                _, err = run("convert", path, "--output", self.folder / limit, "--limit", 2, "--progress", "none",
+                             environment=environment)
+                self.assertNotIn("warning: precision", err)
+
     def test_bfloat16_gets_a_clear_word_on_lesser_processors(self):
         self.needs_onednn()
         path = self.manifest("half.json", precision="bfloat16")

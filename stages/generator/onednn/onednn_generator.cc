@@ -1,16 +1,21 @@
 #include "stages/generator/onednn/onednn_generator.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <ctime>
 #include <dnnl.hpp>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <new>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
+#include "manifests/values/events.h"
 #include "stages/generator/flush_subnormals.h"
 #include "stages/generator/generator.h"
 #include "stages/generator/onednn/buffers.h"
@@ -176,6 +181,46 @@ void require_onednn(const Weights& weights, Precision precision) {
                              std::string(to_string(precision)) + ", got " +
                              support.instruction_set);
   }
+}
+
+namespace {
+
+double thread_processor_s() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+bool is_int8_faster(const Weights& weights) {
+  constexpr ImageSize kSize{64, 96};
+  constexpr int kRounds = 3;  // the first builds the plans
+  const std::array generators{make_onednn_generator(weights, Precision::kInt8),
+                              make_onednn_generator(weights, Precision::kFloat32)};
+  const std::vector<float> frames(2 * kSize.pixel_count());
+  std::vector<float> volume(VolumeShape{weights.bins, kSize}.value_count());
+  std::array<double, 2> least_s{};
+  for (int round = 0; round < kRounds; ++round) {
+    for (std::size_t k = 0; k < generators.size(); ++k) {
+      const double start_s = thread_processor_s();
+      generators[k]->generate({frames, kSize}, volume);
+      const double spent_s = thread_processor_s() - start_s;
+      if (round == 0 || spent_s < least_s[k]) least_s[k] = spent_s;
+    }
+  }
+  return least_s[0] < least_s[1];
+}
+
+}  // namespace
+
+bool int8_pays(const Weights& weights) {
+  const OnednnSupport support = onednn_support(Precision::kInt8);
+  if (support.native || !support.able) return support.native;
+  static std::mutex measuring;
+  static std::map<int, bool> known;  // by width
+  const std::lock_guard lock(measuring);
+  const auto found = known.find(weights.base_channels);
+  if (found != known.end()) return found->second;
+  return known[weights.base_channels] = is_int8_faster(weights);
 }
 
 std::unique_ptr<Generator> make_onednn_generator(const Weights& weights, Precision precision) {

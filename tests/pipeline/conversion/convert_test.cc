@@ -51,6 +51,15 @@ TEST_F(Convert, WritesShardsCommitRecordsAndPlan) {
   EXPECT_EQ(check.valid, 11);
 }
 
+TEST_F(Convert, SaysHowManyPairsAreTheSameImageTwice) {
+  EXPECT_THAT(run("before").notes, ::testing::IsEmpty());
+  for (const int frame : {1, 5, 6}) {
+    fs::copy_file(image(frame - 1), image(frame), fs::copy_options::overwrite_existing);
+  }
+  EXPECT_THAT(run().notes,
+              ::testing::ElementsAre("3 pairs of the same image twice: nothing moves there"));
+}
+
 TEST_F(Convert, GivesTheSameBytesForAnyNumberOfThreadsAndAgain) {
   run("one", 1);
   run("two", 2);

@@ -506,6 +506,39 @@ TEST_F(SampleStagesTest, GeneratesWhatTheScopeWants) {
   EXPECT_EQ(generator_.calls(), 1);
 }
 
+TEST_F(SampleStagesTest, OfTheSameImageTwiceAsksNoGeneratorThatSeesMotionAlone) {
+  const auto write = [&](int last_pixel) {
+    std::vector<int> pixels(24, 51);
+    pixels.back() = last_pixel;
+    testing::write_index_image(folder_ / "clip" / "0001.png", {4, 6}, pixels);
+  };
+  GeneratorSpec network, labels, esim, difference, leak, noise;
+  labels.scope.scope = Scope::kLabels;
+  esim.kind = GeneratorKind::kEsim;
+  difference.kind = leak.kind = noise.kind = GeneratorKind::kDifference;
+  leak.sensor.leak_rate_hz = noise.sensor.shot_noise_rate_hz = 0.1;
+  for (const auto& [spec, asks] : {std::pair{network, false},
+                                   {labels, false},
+                                   {esim, true},  // moves the image whatever comes after it
+                                   {difference, false},
+                                   {leak, true},
+                                   {noise, true}}) {
+    manifest_.generator = spec;
+    write(51);
+    const int before = generator_.calls();
+    const SampleMessage same = run();
+    ASSERT_FALSE(same.failed()) << same.sample.fault;
+    EXPECT_TRUE(same.same_image);
+    EXPECT_EQ(generator_.calls() - before, asks);
+    EXPECT_EQ(same.sample.statistics.flags, kFlagEmpty);
+    EXPECT_THAT(volume(same), ::testing::Each(0));
+    write(52);
+    const SampleMessage other = run();
+    EXPECT_FALSE(other.same_image);
+    EXPECT_EQ(generator_.calls() - before, asks + 1);
+  }
+}
+
 /// Gives the same value everywhere, or no memory.
 class FlatGenerator final : public Generator {
  public:

@@ -6,6 +6,7 @@
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
 #include "stages/generator/onednn/onednn_generator.h"
+#include "stages/generator/shipped_weights.h"
 #include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -27,6 +28,19 @@ class DraftManifest : public ::testing::Test {
   FoundSource images(const fs::path& name, const std::vector<ImageSize>& sizes) {
     for (std::size_t i = 0; i < sizes.size(); ++i) {
       testing::write_flat_image(folder_.path() / name / (std::to_string(i) + ".png"), sizes[i], 9);
+    }
+    return found(DatasetKind::kFrames, name);
+  }
+
+  /// Frames of 128x32, 8 x 2 tiles, whose `wide` left columns become brighter and darker by turns.
+  FoundSource blinking(const fs::path& name, int frames, int wide) {
+    for (int i = 0; i < frames; ++i) {
+      std::vector<int> pixels(32 * 128, 90);
+      for (int at = 0; at < std::ssize(pixels); ++at) {
+        if (at % 128 < wide) pixels[at] += i % 2 * 9;  // more than the threshold, 8
+      }
+      testing::write_index_image(folder_.path() / name / (std::to_string(100 + i) + ".png"),
+                                 {32, 128}, pixels);
     }
     return found(DatasetKind::kFrames, name);
   }
@@ -79,7 +93,8 @@ TEST_F(DraftManifest, OfASequenceTakesPairsOfNeighboursAsTheyAre) {
       made.text,
       HasSubstr(R"(// "generator": { "weights": "shipped:sensor", "sensor": "davis346" },)"));
   EXPECT_EQ(job.generator.weights, "shipped:8");
-  if (onednn_support(Precision::kInt8).able) {
+  const bool has_int8 = int8_pays(read_shipped_weights(8));
+  if (has_int8) {
     EXPECT_EQ(job.generator.precision, Precision::kInt8);
     EXPECT_THAT(made.text, HasSubstr("narrow weights in 8 bits as from"));
   } else {
@@ -88,9 +103,57 @@ TEST_F(DraftManifest, OfASequenceTakesPairsOfNeighboursAsTheyAre) {
   }
   EXPECT_FALSE(job.image.size);
   EXPECT_TRUE(made.has_samples);
-  EXPECT_THAT(made.findings, ElementsAre("what was found: 3 frames of 1 sequence, NO LABELS",
-                                         HasSubstr("by gap: gap 1: 2, gap 2: 1, gap 3: 0"),
-                                         HasSubstr("set \"frames_per_second\"")));
+  const OnednnSupport int8 = onednn_support(Precision::kInt8);
+  std::vector<::testing::Matcher<std::string>> findings{
+      "what was found: 3 frames of 1 sequence, NO LABELS",
+      HasSubstr("by gap: gap 1: 2, gap 2: 1, gap 3: 0"), HasSubstr("set \"frames_per_second\""),
+      HasSubstr("\"scope\": \"motion\"")};
+  if (int8.able && !int8.native) {
+    findings.insert(findings.end() - 1, HasSubstr("has no instructions for int8"));
+  }
+  EXPECT_THAT(made.findings, ::testing::ElementsAreArray(findings));
+}
+
+TEST_F(DraftManifest, GeneratesWhatMovesWhereAThirdOfTheTilesRests) {
+  struct Case {
+    int wide;            // columns that change; 4 more are wanted
+    const char* motion;  // empty: everything is generated
+  };
+  int number = 0;
+  for (const Case& one :
+       {Case{0, "rests in 20 of 20 pairs: 0 % of the tiles move"},
+        Case{1, "rests in 20 of 20 pairs: 12 % of"}, Case{60, "rests in 20 of 20 pairs: 50 % of"},
+        Case{61, "rests in 0 of 20 pairs: 62 % of"}, Case{77, ""}, Case{128, ""}}) {
+    const ManifestDraft made = draft({blinking("blink" + std::to_string(number++), 30, one.wide)});
+    const JobManifest job = read(made);
+    EXPECT_EQ(job.generator.scope.scope == Scope::kMotion, one.motion != std::string()) << one.wide;
+    EXPECT_EQ(job.generator.weights, "shipped:8");
+    if (job.generator.scope.scope == Scope::kMotion) {
+      EXPECT_THAT(made.text, HasSubstr(one.motion));
+      EXPECT_THAT(made.findings.back(), HasSubstr(one.motion));
+    }
+  }
+  // Of several sources each counts as often as it has frames.
+  const auto scope = [&](int resting, int moving) {
+    const std::string both = std::to_string(number++);
+    return read(
+               draft({blinking("rests" + both, resting, 0), blinking("moves" + both, moving, 128)}))
+        .generator.scope.scope;
+  };
+  EXPECT_EQ(scope(16, 24), Scope::kMotion);
+  EXPECT_EQ(scope(12, 28), Scope::kWhole);
+}
+
+TEST_F(DraftManifest, PassesOverImagesThatCannotBeRead) {
+  const FoundSource source = blinking("some", 12, 1);
+  for (const char* name : {"100.png", "103.png", "104.png", "107.png"}) {
+    testing::write_file(folder_ / "some" / name, "no image");
+  }
+  EXPECT_THAT(draft({source}).findings.back(), HasSubstr("rests in 5 of 5 pairs: 12 % of"));
+  for (int i = 100; i < 112; ++i) {
+    testing::write_file(folder_ / "some" / (std::to_string(i) + ".png"), "no image");
+  }
+  EXPECT_EQ(read(draft({source})).generator.scope.scope, Scope::kWhole);
 }
 
 TEST_F(DraftManifest, OfPhotographsIsForTheCameraThatIsWanted) {
@@ -112,6 +175,7 @@ TEST_F(DraftManifest, OfPhotographsIsForTheCameraThatIsWanted) {
     EXPECT_EQ(job.generator.kind, one.kind);
     if (one.kind == GeneratorKind::kNetwork) {
       EXPECT_EQ(job.generator.weights, "shipped:16");
+      EXPECT_EQ(job.generator.scope.scope, Scope::kWhole) << "all of a still moves";
     }
     EXPECT_THAT(job.sources[0].classes, ElementsAre("dog"));
   }
