@@ -118,8 +118,8 @@ struct FramePair {
 
 /// What is seen between two frames, in the size of the generator's input.
 struct FramesBetween {
-  /// The frame at u in [0, 1] of the time from the first frame (0) to the second (1). Null: nobody
-  /// knows. Thread safe.
+  /// The frame at u in [0, 1] of the time from the first frame (0) to the second (1). At the ends
+  /// it is these frames. Null: nobody knows. Thread safe.
   std::function<GreyImage(double u)> at = {};
   double displacement_px = 0;  ///< no point of a frame moves farther from the first to the second
 };

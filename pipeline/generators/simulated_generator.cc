@@ -58,7 +58,10 @@ std::vector<Event> between_events(const SimulatedPair& pair) {
   const FramesBetween& between = *pair.between;
   constexpr double kRoundingPx = 1e-9;
   const int steps = std::max(1, static_cast<int>(std::ceil(between.displacement_px - kRoundingPx)));
-  const auto image = [&](int step) { return between.at(static_cast<double>(step) / steps); };
+  const auto image = [&](int step) {
+    if (step == 0) return pair.previous;
+    return step == steps ? pair.next : between.at(static_cast<double>(step) / steps);
+  };
   const CounterRandom random = pair.random.keyed("sensor");
   const double duration_s = pair.duration_s;
   if (steps < kMostImages) {

@@ -11,6 +11,7 @@
 
 #include "manifests/values/outlines.h"
 #include "manifests/values/still_motion.h"
+#include "stages/frames/decoding/detail/scaled_layers.h"
 #include "stages/frames/decoding/detail/still_layers.h"
 #include "stages/frames/decoding/detail/unless_refused.h"
 #include "stages/frames/decoding/still_clip.h"
@@ -65,8 +66,8 @@ Resizable grey_if_first(const ImageView& frame, const ImageSpec& spec) {
   return {as_grey(image, frame.channels), Channels::kGrey};
 }
 
-/// Resized, grey and blurred, uncut.
-cv::Mat scaled_grey(const Resizable& whole, const Placement& placement, const ImageSpec& spec) {
+/// Resized and grey, uncut.
+cv::Mat scaled_grey(const Resizable& whole, const Placement& placement) {
   const cv::Size scaled(placement.scaled.width, placement.scaled.height);
   cv::Mat resized = without_borders(whole.image, placement);
   if (resized.size() != scaled) {  // else OpenCV would make a copy
@@ -74,11 +75,7 @@ cv::Mat scaled_grey(const Resizable& whole, const Placement& placement, const Im
     cv::resize(resized, other, scaled, 0, 0, cv::INTER_LINEAR);
     resized = other;
   }
-  resized = as_grey(resized, whole.channels);
-  if (spec.blur == 0) return resized;
-  cv::Mat blurred;
-  cv::GaussianBlur(resized, blurred, cv::Size(spec.blur, spec.blur), 0);
-  return blurred;
+  return as_grey(resized, whole.channels);
 }
 
 /// How far the map moves a corner at most: of an affine one no point between them moves farther.
@@ -112,6 +109,21 @@ class MovingStill {
   cv::Mat at(double u) const {
     if (u == pair_.label_position) return image_;
     return layers_.frame(image_map(u), object_maps(u));
+  }
+
+  /// For `frame`, while this lives.
+  ScaledLayers scaled(const Placement& placement, Channels channels) const {
+    cv::Mat resting;
+    if (pair_.motion == ImageMotion()) {
+      const cv::Mat frame = layers_.resting_frame(object_maps(moved_end()));
+      resting = scaled_grey({frame, channels}, placement);
+    }
+    return {layers_, placement, resting};
+  }
+
+  /// As `at`, but resized and grey (ScaledLayers).
+  cv::Mat frame(const ScaledLayers& scaled, double u) const {
+    return scaled.frame(image_map(u), object_maps(u));
   }
 
   double moved_end() const { return 1 - pair_.label_position; }
@@ -231,7 +243,15 @@ class ClipFrames {
   StillClip clip_;
 };
 
-std::vector<std::uint8_t> cut(const cv::Mat& grey, const VisiblePart& part) {
+/// What the volume shows of a resized grey frame, blurred.
+std::vector<std::uint8_t> finished(cv::Mat grey, const Placement& placement,
+                                   const ImageSpec& spec) {
+  if (spec.blur != 0) {
+    cv::Mat blurred;
+    cv::GaussianBlur(grey, blurred, cv::Size(spec.blur, spec.blur), 0);
+    grey = blurred;
+  }
+  const VisiblePart part = visible_part(placement);
   std::vector<std::uint8_t> pixels;
   pixels.reserve(part.size.pixel_count());
   for (int y = 0; y < part.size.height; ++y) {
@@ -303,7 +323,7 @@ constexpr auto kInputOfGrey = [] {
 }();
 
 PreparedFrame prepare(const Resizable& image, const Placement& placement, const ImageSpec& spec) {
-  return {cut(scaled_grey(image, placement, spec), visible_part(placement)), placement};
+  return {finished(scaled_grey(image, placement), placement, spec), placement};
 }
 
 }  // namespace
@@ -350,22 +370,23 @@ ColourFrame move_still(const ColourFrame& image, const FramePair& pair,
 
 namespace {
 
-/// `Moving`: MovingStill or ClipFrames. The image lives as long as what tells its frames.
+/// `Moving`: MovingStill or ClipFrames, of an image that lives as long.
 template <class Moving>
-FramesBetween between_of(const SharedImage& image, const FramePair& pair, const ImageSpec& spec,
-                         const std::vector<Box>& boxes, const Placement& placement,
-                         PixelFlow* flow) {
-  struct Kept {
-    SharedImage image;
-    Resizable still;
-    Moving moving;
-    Kept(SharedImage frame, const FramePair& pair, const ImageSpec& spec,
-         const std::vector<Box>& boxes)
-        : image(std::move(frame)),
-          still(grey_if_first({image->size, image->bgr.data()}, spec)),
-          moving(still, pair, boxes) {}
-  };
-  const auto kept = std::make_shared<const Kept>(image, pair, spec, boxes);
+struct KeptImage {
+  SharedImage image;
+  Resizable still;
+  Moving moving;
+
+  KeptImage(SharedImage frame, const FramePair& pair, const ImageSpec& spec,
+            const std::vector<Box>& boxes)
+      : image(std::move(frame)),
+        still(grey_if_first({image->size, image->bgr.data()}, spec)),
+        moving(still, pair, boxes) {}
+};
+
+template <class Moving>
+FramesBetween between_of(const std::shared_ptr<const KeptImage<Moving>>& kept,
+                         const ImageSpec& spec, const Placement& placement, PixelFlow* flow) {
   if (flow) *flow = flow_of(kept->moving, placement);
   return {[kept, spec, placement](double u) {
             return unless_refused([&] {
@@ -384,10 +405,22 @@ FramesBetween frames_between(const SharedImage& image, const FramePair& pair, co
   return unless_refused([&] {
     if (!pair.poses.empty()) {
       const Placement placement = place(clip_window(image->size).size, spec);
-      return between_of<ClipFrames>(image, pair, spec, boxes, placement, flow);
+      return between_of(std::make_shared<const KeptImage<ClipFrames>>(image, pair, spec, boxes),
+                        spec, placement, flow);
     }
     const Placement placement = place(image->size, spec, pair);
-    return between_of<MovingStill>(image, pair, spec, boxes, placement, flow);
+    const auto kept = std::make_shared<const KeptImage<MovingStill>>(image, pair, spec, boxes);
+    FramesBetween between = between_of(kept, spec, placement, flow);
+    const auto scaled =
+        std::make_shared<const ScaledLayers>(kept->moving.scaled(placement, kept->still.channels));
+    between.at = [end = std::move(between.at), kept, scaled, placement, spec](double u) {
+      if (u == 0 || u == 1) return end(u);
+      return unless_refused([&] {
+        return GreyImage{visible_part(placement).size,
+                         finished(kept->moving.frame(*scaled, u), placement, spec)};
+      });
+    };
+    return between;
   });
 }
 

@@ -221,7 +221,6 @@ void StillLayers::fill_layer(std::size_t number, const cv::Mat& image, const cv:
   cv::GaussianBlur(layer.mask != 0, layer.cover, {3, 3}, 0, 0, cv::BORDER_REPLICATE);
 }
 
-/// Where in the frame a layer can be seen.
 cv::Rect StillLayers::seen_in(const Layer& layer, const AffineMap& map) const {
   const double right = background_.cols - 1, bottom = background_.rows - 1;
   double beyond = 0;  // how far the frame looks over the image's border, where objects go on
@@ -254,14 +253,23 @@ cv::Mat StillLayers::frame(const AffineMap& background,
   cv::Mat frame = is_identity(background)
                       ? background_.clone()
                       : sampled(background_, {}, background, whole(background_), cv::INTER_CUBIC);
+  for (const Layer& layer : layers_) draw(layer, objects[layer.box], frame);
+  return frame;
+}
+
+cv::Mat StillLayers::resting_frame(const std::vector<AffineMap>& objects) const {
+  cv::Mat frame = background_.clone();
   for (const Layer& layer : layers_) {
-    const AffineMap& map = objects[layer.box];
-    const cv::Rect seen = seen_in(layer, map);
-    if (seen.empty()) continue;
-    lay_over(sampled(layer.colour, layer.area.tl(), map, seen, cv::INTER_CUBIC),
-             sampled(layer.cover, layer.area.tl(), map, seen, cv::INTER_LINEAR), frame(seen));
+    if (is_identity(objects[layer.box])) draw(layer, objects[layer.box], frame);
   }
   return frame;
+}
+
+void StillLayers::draw(const Layer& layer, const AffineMap& map, cv::Mat& frame) const {
+  const cv::Rect seen = seen_in(layer, map);
+  if (seen.empty()) return;
+  lay_over(sampled(layer.colour, layer.area.tl(), map, seen, cv::INTER_CUBIC),
+           sampled(layer.cover, layer.area.tl(), map, seen, cv::INTER_LINEAR), frame(seen));
 }
 
 cv::Mat StillLayers::seen(const std::vector<AffineMap>& objects) const {

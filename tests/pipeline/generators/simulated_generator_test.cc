@@ -132,23 +132,23 @@ TEST(SimulatedGenerator, EsimSeesWhatIsBetweenTheFramesIfThatIsKnown) {
     const auto level = static_cast<std::uint8_t>(u == 0.5 ? 200 : 50);
     return GreyImage{kSize, std::vector<std::uint8_t>(kSize.pixel_count(), level)};
   };
+  const std::vector<float> frames(2 * kSize.pixel_count(), (50 / 255.0f - 0.5f) * 2);
   const auto events = [&](double displacement_px) {
     between.displacement_px = displacement_px;
     asked.clear();
-    std::vector<float> frames(2 * kSize.pixel_count());
     std::vector<float> volume(VolumeShape{5, kSize}.value_count());
     generator->generate({frames, kSize, std::nullopt, &between}, volume);
     return sum(volume) / static_cast<double>(kSize.pixel_count());
   };
   EXPECT_NEAR(events(2), 12, 1e-3);
-  EXPECT_THAT(asked, ::testing::ElementsAre(0, 0.5, 1));
+  EXPECT_THAT(asked, ::testing::ElementsAre(0.5));
   EXPECT_NEAR(events(3.5), 12, 1e-3) << "no more than 1 px a step";
-  EXPECT_THAT(asked, ::testing::ElementsAre(0, 0.25, 0.5, 0.75, 1));
+  EXPECT_THAT(asked, ::testing::ElementsAre(0.25, 0.5, 0.75));
   EXPECT_NEAR(events(0), 0, 1e-3);
-  EXPECT_THAT(asked, ::testing::ElementsAre(0, 1));
+  EXPECT_THAT(asked, ::testing::IsEmpty());
   // So many that they are seen one by one.
   EXPECT_NEAR(events(200), 12, 1e-3);
-  EXPECT_EQ(asked.size(), 201u);
+  EXPECT_EQ(asked.size(), 199u);
   EXPECT_GE(generator->working_bytes({1000, 1000}), 64'000'000u);
 }
 

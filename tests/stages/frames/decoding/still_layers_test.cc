@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "manifests/values/counter_random.h"
@@ -291,6 +292,54 @@ TEST_F(StillObjects, BetweenTheFramesEverythingMovesSteadily) {
   pair_.motion = ImageMotion{.x_px = 2, .scale = 1.1};
   const FramesBetween between = frames_between(shared(), pair_, spec, boxes_);
   EXPECT_EQ(between.at(0.3).size, (ImageSize{30, 40}));
+}
+
+TEST_F(StillObjects, BetweenTheFramesAResizedPixelIsSampledWhereItLies) {
+  const Rectangle box{40, 30, 80, 70};
+  const Point of_box{59.5, 49.5}, of_image{79.5, 59.5};
+  draw({120, 160}, {box});
+  for_each_pixel([&](int x, int y) { set(x, y, inside(box, x, y) ? 60 + x : 20 + y); });
+  pair_.motion = ImageMotion{3.3, -5.7, 1.8, 1.02};
+  pair_.objects[0] = ImageMotion{-6.2, 4.1, 5, 0.95};
+  pair_.label_position = 0;
+  ImageSpec spec;
+  for (const auto& [size, grey, blur] : {std::tuple{ImageSize{55, 85}, GreyOrder::kAfterResize, 0},
+                                         {ImageSize{120, 160}, GreyOrder::kBeforeResize, 0},
+                                         {ImageSize{200, 300}, GreyOrder::kAfterResize, 3}}) {
+    SCOPED_TRACE(to_string(size));
+    spec.size = size;
+    spec.grey = grey;
+    spec.blur = blur;
+    const FramesBetween between = frames_between(shared(), pair_, spec, boxes_);
+    const AffineMap to_source = inverse(place(image_.size, spec, pair_).source_to_volume());
+    for (const double u : {0.3, 0.8}) {
+      const auto part = [&](const ImageMotion& motion) {
+        return ImageMotion{u * motion.x_px, u * motion.y_px, u * motion.angle_deg,
+                           std::pow(motion.scale, u)};
+      };
+      const GreyImage frame = between.at(u);
+      ASSERT_EQ(frame.size, size);
+      int on_object = 0, off_object = 0;
+      for (int y = 2; y < size.height - 2; ++y) {
+        for (int x = 2; x < size.width - 2; ++x) {
+          const Point p = mapped(to_source, {double(x), double(y)});
+          const Point image = backward(part(*pair_.motion), of_image, p);
+          const Point object = backward(part(*pair_.objects[0]), of_box, image);
+          const int level = frame.pixels[static_cast<std::size_t>(size.width * y + x)];
+          if (inside(box, object.x, object.y, -kEdge - 3)) {
+            ASSERT_NEAR(level, 60 + object.x, 1.1) << u << ": " << x << ", " << y;
+            ++on_object;
+          } else if (!inside(box, object.x, object.y, kEdge + 3) &&
+                     !inside(box, image.x, image.y, kFilled + 5)) {
+            ASSERT_NEAR(level, 20 + image.y, 1.1) << u << ": " << x << ", " << y;
+            ++off_object;
+          }
+        }
+      }
+      EXPECT_GT(on_object, size.height);
+      EXPECT_GT(off_object, 20 * size.height);
+    }
+  }
 }
 
 TEST_F(StillObjects, NoPointOfAnOutlineBeyondItsBoxMovesFarther) {

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "manifests/values/placement.h"
+#include "manifests/values/still_motion.h"
+#include "stages/frames/decoding/detail/still_layers.h"
+
+namespace eventgan {
+
+/// A photograph in layers as the volume shows it: StillLayers::frame, made grey and resized, for
+/// many frames between two. Each pixel is sampled once where it lies in the photograph, by the
+/// kernel of the motion and that of the resizing in one, so that nothing is rendered in the
+/// photograph's size. It differs from that frame by rounding, and a little more at the edges of
+/// what moves.
+class ScaledLayers {
+ public:
+  /// `resting`: the frame (grey, resized) of all that rests, if the background does: it is taken
+  /// where nothing moves. Else empty, and all is sampled.
+  ScaledLayers(const StillLayers& layers, const Placement& placement, cv::Mat resting);
+
+  /// The frame: [y, x] uint8 of placement.scaled; maps as StillLayers::frame has them, and what is
+  /// said to rest has none. Thread safe.
+  cv::Mat frame(const AffineMap& background, const std::vector<AffineMap>& objects) const;
+
+ private:
+  /// Of one of StillLayers::layers, with its border as far as a kernel reaches: [y, x] int16.
+  struct Planes {
+    cv::Mat covering;  ///< grey levels times what it covers, 128 a level
+    cv::Mat
+        cover;  ///< how much of what is behind it cannot be seen, as a grey level, 255 = nothing
+  };
+  /// The columns or the rows of the resized frame in the photograph, each made of two pixels.
+  struct Axis {
+    std::vector<double> place_px;      ///< of the first of the two
+    std::vector<int> share;            ///< of the second, in 1/2048
+    std::vector<std::int32_t> shares;  ///< of both, the second's in the upper half
+  };
+  class Sampler;
+
+  static Axis axis(int border, int cut, int scaled);
+  cv::Rect seen_in(const StillLayers::Layer& layer, const AffineMap& map) const;
+
+  const StillLayers& layers_;
+  Axis columns_, rows_;
+  cv::Mat resting_;
+  cv::Mat background_;  ///< as Planes, 128 a level
+  std::vector<Planes> planes_;
+};
+
+}  // namespace eventgan
