@@ -238,7 +238,10 @@ class Extremes : public ::testing::TestWithParam<EngineCase> {
                       const std::vector<float>& frames, ImageSize size, Outcome expected,
                       const std::vector<float>& reference) const {
     SCOPED_TRACE(name);
-    const std::vector<float> volume = testing::generated(generator, frames, size);
+    const std::vector<float> made = testing::generated(generator, frames, size);
+    const auto next = frames.begin() + static_cast<std::ptrdiff_t>(size.pixel_count());
+    const bool is_same_image = std::equal(next, frames.end(), frames.begin());
+    const std::vector<float> volume = is_same_image ? std::vector<float>(made.size()) : made;
     for (const StoredType type : {StoredType::kFloat32, StoredType::kFloat16, StoredType::kUint8}) {
       const SampleMessage message = converted(generator, frames, size, type);
       ASSERT_EQ(message.failed(), expected == Outcome::kQuarantined) << message.sample.fault;
@@ -250,7 +253,7 @@ class Extremes : public ::testing::TestWithParam<EngineCase> {
       EXPECT_TRUE(expected != Outcome::kFlagged || (flags & kFlagBeyondCalibration));
       expect_sound_chunk(message, volume, type);
       if (expected == Outcome::kVolume && !(flags & kFlagBeyondCalibration)) {
-        expect_near(volume, reference);
+        expect_near(made, reference);
       }
     }
   }
