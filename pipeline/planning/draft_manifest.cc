@@ -151,7 +151,7 @@ class Draft {
     if (!is_network(sources)) {
       return fmt::format(
           R"(  // The motion of photographs is drawn, so a simulator can follow it: detectors of persons learn more
-  // from its events than from the network's, which take less time (manifests/guides/choose.md):
+  // from its events than from the network's (manifests/guides/choose.md):
   // "generator": {{ "weights": "shipped:8", "precision": "{}" }},
   "generator": {{ "kind": "esim" }},
 )",
