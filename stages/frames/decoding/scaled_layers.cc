@@ -268,10 +268,11 @@ cv::Mat ScaledLayers::frame(const AffineMap& background,
     for (const Drawn& layer : drawn) {
       if (y < layer.seen.y || y >= layer.seen.br().y) continue;
       cv::Range columns(layer.seen.x, layer.seen.br().x);
-      layer.sampler.row(layer.planes->cover, kLinear, y, columns, &cover[columns.start]);
+      layer.sampler.row(layer.planes->cover, kLinear, y, columns, cover.data() + columns.start);
       while (columns.start < columns.end && cover[columns.start] == 0) ++columns.start;
       while (columns.start < columns.end && cover[columns.end - 1] == 0) --columns.end;
-      layer.sampler.row(layer.planes->covering, kCubic, y, columns, &covering[columns.start]);
+      layer.sampler.row(layer.planes->covering, kCubic, y, columns,
+                        covering.data() + columns.start);
       for (int x = columns.start; x < columns.end; ++x) {
         if (layer.rests && row[x] == base[x]) continue;
         const int behind_it = (kWhite - cover[x]) * row[x] / kWhite;
