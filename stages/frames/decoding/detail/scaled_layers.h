@@ -29,8 +29,7 @@ class ScaledLayers {
   /// Of one of StillLayers::layers, with its border as far as a kernel reaches: [y, x] int16.
   struct Planes {
     cv::Mat covering;  ///< grey levels times what it covers, 128 a level
-    cv::Mat
-        cover;  ///< how much of what is behind it cannot be seen, as a grey level, 255 = nothing
+    cv::Mat cover;     ///< how much of what is behind it cannot be seen: as a grey level, 255 all
   };
   /// The columns or the rows of the resized frame in the photograph, each made of two pixels.
   struct Axis {
