@@ -92,14 +92,10 @@ class Aedat3File {
     return camera == cameras_.end() ? std::nullopt : std::optional(camera->second);
   }
 
-  /// Runs `read`; an EventFault in it is of what lies at `byte`.
+  /// As RecordingFile::at.
   template <class Read>
   auto at(std::int64_t byte, Read read) const {
-    try {
-      return read();
-    } catch (const EventFault& fault) {
-      refuse(fault.what(), byte);
-    }
+    return file_.at(byte, read);
   }
 
   /// Adds the invalid ones to `left_out`.
@@ -161,7 +157,7 @@ class Aedat3File {
   }
 
   [[noreturn]] void refuse(const std::string& fault, std::int64_t byte) const {
-    throw InputError(fmt::format("{}, in {} (byte {})", fault, name(), byte));
+    file_.refuse(fault, byte);
   }
 
  private:

@@ -153,7 +153,7 @@ Aedat4File::Aedat4File(const std::filesystem::path& path) : file_(path) {
 }
 
 void Aedat4File::refuse(const std::string& fault, std::int64_t byte) const {
-  throw InputError(fmt::format("{}, in {} (byte {})", fault, name(), byte));
+  file_.refuse(fault, byte);
 }
 
 std::string Aedat4File::read(std::int64_t begin, std::int64_t end) const {

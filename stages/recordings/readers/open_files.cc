@@ -23,4 +23,8 @@ RecordingFile::RecordingFile(const std::filesystem::path& path)
   end_byte_ = file_.get()->end_byte();
 }
 
+void RecordingFile::refuse(const std::string& fault, std::int64_t byte) const {
+  throw InputError(fault + ", in " + name_ + " (byte " + std::to_string(byte) + ")");
+}
+
 }  // namespace eventgan

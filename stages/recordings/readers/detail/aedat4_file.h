@@ -62,14 +62,10 @@ class Aedat4File {
   /// The frame of a packet, which must be of this size; its time is the middle of its exposure.
   PlacedFrame frame(const PacketPlace& packet, ImageSize size) const;
 
-  /// Runs `read`; an EventFault in it is of what lies at `byte`.
+  /// As RecordingFile::at.
   template <class Read>
   auto at(std::int64_t byte, Read read) const {
-    try {
-      return read();
-    } catch (const EventFault& fault) {
-      refuse(fault.what(), byte);
-    }
+    return file_.at(byte, read);
   }
   [[noreturn]] void refuse(const std::string& fault, std::int64_t byte) const;
 

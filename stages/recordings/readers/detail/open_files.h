@@ -9,6 +9,7 @@
 
 #include "manifests/files/input_file.h"
 #include "manifests/values/recently_used.h"
+#include "stages/recordings/order/event_check.h"
 
 namespace eventgan {
 
@@ -50,6 +51,18 @@ class RecordingFile {
   std::string read_between(std::int64_t begin, std::int64_t end) const {
     return file_.get()->read_between(begin, end);
   }
+
+  /// Runs `read`; an EventFault in it is of what lies at `byte`.
+  template <class Read>
+  auto at(std::int64_t byte, Read read) const {
+    try {
+      return read();
+    } catch (const EventFault& fault) {
+      refuse(fault.what(), byte);
+    }
+  }
+  /// Throws InputError "FAULT, in PATH (byte 4567)".
+  [[noreturn]] void refuse(const std::string& fault, std::int64_t byte) const;
 
  private:
   std::string name_;

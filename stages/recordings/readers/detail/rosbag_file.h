@@ -74,14 +74,10 @@ class RosbagFile {
   /// Takes each message of a chunk; an EventFault of `take` is of the chunk.
   void for_each_message(std::int64_t byte, std::string_view content, const TakeMessage& take) const;
 
-  /// Runs `read`; an EventFault in it is of what lies at `byte`.
+  /// As RecordingFile::at.
   template <class Read>
   auto at(std::int64_t byte, Read read) const {
-    try {
-      return read();
-    } catch (const EventFault& fault) {
-      throw InputError(fmt::format("{}, in {} (byte {})", fault.what(), name(), byte));
-    }
+    return file_.at(byte, read);
   }
 
  private:
