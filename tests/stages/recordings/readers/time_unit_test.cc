@@ -75,11 +75,10 @@ TEST(TimeUnit, IsTheTrueOneOrAskedFor) {
                                      {kNs, 1000.0},
                                      {kNs, 0.0},
                                      {kS, 1.0}}) {
-    for (const double rate : {1e2, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7}) {
+    for (const double rate : {1e2, 1e3, 1e4, 3e4, 1e5, 3e5, 1e6, 1e7}) {
       for (const double span_s : {0.01, 0.04, 0.1, 0.33, 1.0, 8.0, 60.0, 600.0}) {
-        for (const ImageSize sensor :
-             {ImageSize{128, 128}, {180, 240}, {260, 346}, {480, 640}, {720, 1280}}) {
-          if (rate * span_s < 100 || rate * span_s > 1e5) continue;
+        for (const ImageSize sensor : {ImageSize{128, 128}, {260, 346}, {720, 1280}}) {
+          if (rate * span_s < 100 || rate * span_s > 3e4) continue;
           if (rate / static_cast<double>(sensor.pixel_count()) > 500) continue;  // no camera has it
           // Of whole ms or s there are many in a recording, and more events than these.
           if (step * tick_s >= kMs && (step * tick_s * 1000 > span_s || rate < 1e3)) continue;
