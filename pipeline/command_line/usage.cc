@@ -1,5 +1,7 @@
 #include "pipeline/command_line/usage.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
@@ -12,6 +14,7 @@
 #include "manifests/documents/document_schemas.h"
 #include "manifests/values/faults.h"
 #include "pipeline/runtime/errors.h"
+#include "stages/events/representation.h"
 
 namespace eventgan {
 namespace {
@@ -175,17 +178,29 @@ std::string cluster_page() {
                    (folder.parent_path() / "share/eventgan/docker").string());
 }
 
+std::string representations_page() {
+  std::string page =
+      "How events become arrays, by their word and number, such as histogram:10.\n"
+      "t1 and tN: the interval's ends; p: polarity; H, W: height and width in pixels.\n";
+  for (const RepresentationRow& row : representations()) {
+    page += fmt::format("\n{}{}{}  {} {}\n    {}\n    for {}\n", row.word,
+                        row.number.empty() ? "" : ":", row.number, row.dtype, row.shape,
+                        row.equation, row.readers);
+  }
+  return page;
+}
+
 }  // namespace
 
 void add_help_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "help",
       "Show the help of the program or of a command\n`help keys` lists every key of the "
-      "manifests, with its values and its default, `help cluster` says where the scripts for Slurm "
-      "and Kubernetes are.");
+      "manifests, with its values and its default, `help representations` how "
+      "events become arrays, `help cluster` says where the scripts for Slurm and Kubernetes are.");
   const auto name = std::make_shared<std::string>();
   command->add_option("COMMAND", *name,
-                      "The command, keys, or cluster; default: list all commands");
+                      "The command, keys, representations, or cluster; default: list all commands");
   command->callback([&app, name, &exit_code] {
     const auto known =
         app.get_subcommands([&](const CLI::App* one) { return one->get_name() == *name; });
@@ -194,6 +209,8 @@ void add_help_command(CLI::App& app, int& exit_code) {
       std::cout << app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal);
     } else if (*name == "keys") {
       std::cout << keys_page();
+    } else if (*name == "representations") {
+      std::cout << representations_page();
     } else if (*name == "cluster") {
       std::cout << cluster_page();
     } else if (!known.empty()) {

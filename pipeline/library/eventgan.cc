@@ -13,7 +13,9 @@
 #include <new>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,6 +26,7 @@
 #include "pipeline/library/pair_engine.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/memory.h"
+#include "stages/events/representation.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/exports/sampled_events.h"
 #include "stages/shards/codec/volume_codec.h"
@@ -344,6 +347,50 @@ int eventgan_sample_events(const float* volume, int32_t bins, int32_t height, in
 }
 
 void eventgan_free_events(eventgan_event* events) { delete[] events; }
+
+const char* eventgan_representations(void) {
+  static const std::string kText = [] {
+    std::string text;
+    for (const RepresentationRow& row : representations()) {
+      text += fmt::format("{}\t{}\t{}\t{}\t{}\t{}\n", row.word, row.number, row.shape, row.dtype,
+                          row.equation, row.readers);
+    }
+    return text;
+  }();
+  return kText.c_str();
+}
+
+int eventgan_represent(const eventgan_event* events, uint64_t count, const char* representation,
+                       int32_t height, int32_t width, const double* times, int32_t* channels,
+                       int32_t* number, void* values, uint64_t size) {
+  return result_of([&] {
+    const CallGate::Pass pass;
+    const Representation how = parse_representation(required(representation, "a representation"));
+    *required(channels, "a place for the channels") = channels_of(how);
+    *required(number, "a place for the type") =
+        number_bytes(how) == 1 ? EVENTGAN_UINT8 : EVENTGAN_FLOAT32;
+    if (height < 1 || width < 1 ||
+        1.0 * std::max(channels_of(how), 1) * height * width > kMostVolumeValues) {
+      throw UsageError(
+          fmt::format("expected a size of 1 x 1 or more, and at most {} values, got {} "
+                      "channels of {} x {}",
+                      kMostVolumeValues, channels_of(how), height, width));
+    }
+    if (values == nullptr) return;
+    if (count > 0) required(events, "events");
+    std::vector<Event> given(count);
+    std::transform(events, events + count, given.begin(), [](const eventgan_event& event) {
+      return Event{event.x, event.y, event.t, event.p > 0};
+    });
+    std::optional<std::array<double, 2>> times_s;
+    if (times != nullptr) times_s = {times[0], times[1]};
+    try {
+      represent(given, how, {height, width}, times_s, {static_cast<std::byte*>(values), size});
+    } catch (const std::invalid_argument& error) {
+      throw UsageError(error.what());
+    }
+  });
+}
 
 int eventgan_decode(const void* chunk, uint64_t chunk_size, int32_t number_size,
                     int32_t is_deflated, float scale, float* volume, uint64_t size) {

@@ -143,6 +143,20 @@ EVENTGAN_API int eventgan_sample_events(const float* volume, int32_t bins, int32
 
 EVENTGAN_API void eventgan_free_events(eventgan_event* events);
 
+/* The representations that eventgan_represent knows, one a line, with tabs between: word, symbol of
+ * its number (or nothing), shape, type, equation with its source, whose networks read it. */
+EVENTGAN_API const char* eventgan_representations(void);
+
+/* Writes events in time order as an array: max(1, channels) x height x width numbers, in C order,
+ * at `values`, of `size` bytes. `representation` is a word, with ":" and its number:
+ * "histogram:10". `times`: the interval's begin and end, seconds, NULL: the first and the last
+ * event's. values NULL: only `channels` (0: an array [height, width]) and `number`, an
+ * eventgan_number, are given. */
+EVENTGAN_API int eventgan_represent(const eventgan_event* events, uint64_t count,
+                                    const char* representation, int32_t height, int32_t width,
+                                    const double* times, int32_t* channels, int32_t* number,
+                                    void* values, uint64_t size);
+
 /* Decodes a volume of a shard: `chunk` is what events/volume holds of it (H5Dread_chunk), stored as
  * numbers of 1 byte (uint8), 2 (float16) or 4 (float32) that went through HDF5's filters shuffle,
  * deflate (if `is_deflated`) and fletcher32. volume[i] = scale * number i; `size`: how many there

@@ -18,12 +18,11 @@ namespace {
                               " as event " + std::to_string(number));
 }
 
-inline void check_event(const Event& event, std::size_t number, const VolumeShape& shape) {
-  const bool inside =
-      event.x >= 0 && event.x < shape.size.width && event.y >= 0 && event.y < shape.size.height;
+inline void check_event(const Event& event, std::size_t number, ImageSize size) {
+  const bool inside = event.x >= 0 && event.x < size.width && event.y >= 0 && event.y < size.height;
   if (!inside || !std::isfinite(event.t_s)) {
     refuse_event(event, number,
-                 "an event with a finite time inside " + to_string(shape.size) + " pixels");
+                 "an event with a finite time inside " + to_string(size) + " pixels");
   }
 }
 
@@ -82,6 +81,14 @@ struct ScaledTime {
 
 }  // namespace
 
+void check_events(std::span<const Event> events, ImageSize size,
+                  const std::array<double, 2>& times_s) {
+  if (events.empty()) return;
+  for (std::size_t i = 0; i < events.size(); ++i) check_event(events[i], i, size);
+  check_order(events, times_s);
+  check_span(times_s, 1);
+}
+
 std::vector<float> event_volume(std::span<const Event> events, const VolumeShape& shape,
                                 std::optional<std::array<double, 2>> times_s) {
   // In double: a sum of ones in float32 stays at 2^24.
@@ -91,8 +98,7 @@ std::vector<float> event_volume(std::span<const Event> events, const VolumeShape
   const std::size_t plane = shape.size.pixel_count();
   const auto [first, last] = times_s.value_or(std::array{events.front().t_s, events.back().t_s});
   const int last_bin = shape.bins - 1;
-  for (std::size_t i = 0; i < events.size(); ++i) check_event(events[i], i, shape);
-  check_order(events, {first, last});
+  check_events(events, shape.size, {first, last});
   check_span({first, last}, last_bin);
   const ScaledTime time{first, last - first, last_bin};
   for (const Event& event : events) {
@@ -112,11 +118,11 @@ void pixel_event_volume(std::span<const Event> events, const VolumeShape& shape,
 
   double first = events.front().t_s;
   double last = first;
-  check_event(events.front(), 0, shape);
+  check_event(events.front(), 0, shape.size);
   for (std::size_t i = 1; i < events.size(); ++i) {
     const Event& before = events[i - 1];
     const Event& event = events[i];
-    check_event(event, i, shape);
+    check_event(event, i, shape.size);
     const bool same_pixel = event.y == before.y && event.x == before.x;
     const bool ordered = same_pixel
                              ? event.t_s >= before.t_s

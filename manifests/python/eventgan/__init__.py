@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from . import evaluate, shards, torch
-    from .generator import Generator, sample_events
+    from .generator import Generator, represent, sample_events
     from .open_shards import Sample, open_shard
     from .outlines import mask, rings
     from .plotting import show
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 __version__ = "1.0.0"
 
 _MODULE_OF = {
-    "Generator": "generator", "sample_events": "generator", "FIELDS": "shards", "InvalidSample": "shards",
+    "Generator": "generator", "represent": "generator", "sample_events": "generator", "FIELDS": "shards", "InvalidSample": "shards",
     "Sample": "open_shards", "Shards": "shards", "open_shard": "open_shards", "read_description": "shards",
     "ProgramError": "program", "convert": "program", "init": "program", "open": "program", "mask": "outlines",
     "rings": "outlines", "show": "plotting", "signed_channel": "representations",

@@ -50,6 +50,8 @@ for _name, _result, _arguments in [
         ("sample", _I32, (_P, _P, _P, _P, _I32, _U64, _P, _U64, _P)),
         ("prepare", _I32, (_P, _P, _P, _U64)),
         ("sample_events", _I32, (_P, _I32, _I32, _I32, _F64, _U64, _I32, _P, _P)), ("free_events", None, (_P,)),
+        ("representations", ctypes.c_char_p, ()),
+        ("represent", _I32, (_P, _U64, ctypes.c_char_p, _I32, _I32, _P, _P, _P, _P, _U64)),
         ("decode", _I32, (ctypes.c_char_p, _U64, _I32, _I32, ctypes.c_float, _P, _U64)), ("end", None, ())]:
     _function = getattr(lib, f"eventgan_{_name}")
     _function.restype, _function.argtypes = _result, _arguments

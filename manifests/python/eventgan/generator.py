@@ -349,6 +349,84 @@ def sample_events(volume: npt.ArrayLike, *, duration_s: float = 1.0, seed: int =
         _engine.lib.eventgan_free_events(events)
 
 
+def represent(events: Any, representation: str, *, size: tuple[int, int],
+              window_s: tuple[float, float] | None = None) -> np.ndarray:
+    """Events, a camera's or drawn ones, as the array that a network takes.
+
+    Parameters
+    ----------
+    events : structured array, or dictionary of arrays, in time order
+        x and y in pixels; p (also pol, polarity), positive if above 0; t (also ts, timestamp), seconds if
+        floating-point, microseconds if whole.
+    representation : str
+        "histogram:10". Of these, where B, T, K are whole numbers and TAU is in seconds:
+
+{table}
+    size : (int, int)
+        Height and width of the array, pixels. Events outside are an error.
+    window_s : (float, float), optional
+        t1 and tN in seconds on the events' clock; only events from t1 to tN count. None: the first and the last
+        event's times.
+
+    Returns
+    -------
+    numpy.ndarray
+        Zeros where there are no events.
+
+    Raises
+    ------
+    ValueError
+        Not events in time order within the image, or another representation.
+    """
+    height, width = (_whole(side, "a side of size") for side in sides(size))
+    columns = [_event_column(events, names) for names in
+               (("t", "ts", "timestamp"), ("x",), ("y",), ("p", "pol", "polarity"))]
+    times = columns[0]
+    unit = 1.0 if times.dtype.kind == "f" else 1e-6
+    if window_s is not None:
+        begin, end = (float(side) for side in window_s)
+        within = slice(np.searchsorted(times, begin / unit), np.searchsorted(times, end / unit, side="right"))
+        columns = [column[within] for column in columns]
+    rows = np.zeros(len(columns[0]), _engine.EVENT)
+    # A clock of the day in microseconds has more digits than seconds in float64, so times count from the first one.
+    first = columns[0][0] if len(rows) else 0
+    rows["t"] = (columns[0] - first) * unit
+    for name, column in zip("xy", columns[1:]):
+        rows[name] = column
+    rows["p"] = columns[3] > 0
+    ends = None if window_s is None else (ctypes.c_double * 2)(begin - first * unit, end - first * unit)
+    channels, number = ctypes.c_int32(), ctypes.c_int32()
+
+    def call(values: int | None, nbytes: int) -> None:
+        _engine.check(_engine.lib.eventgan_represent(
+            _engine.address(rows), len(rows), str(representation).encode(), height, width, ends,
+            ctypes.byref(channels), ctypes.byref(number), values, nbytes))
+
+    call(None, 0)
+    shape = (channels.value, height, width) if channels.value else (height, width)
+    array = np.empty(shape, np.float32 if number.value else np.uint8)
+    call(_engine.address(array), array.nbytes)
+    return array
+
+
+represent.__doc__ = (represent.__doc__ or "").replace("{table}", "\n".join(
+    f"        {word}{number and ':' + number} : {dtype} {shape}\n            {equation}; for {readers}"
+    for word, number, shape, dtype, equation, readers in (
+        row.split("\t") for row in _engine.lib.eventgan_representations().decode().splitlines())))
+
+
+def _event_column(events: Any, names: tuple[str, ...]) -> np.ndarray:
+    """[N], the numbers of the first of these names that there is."""
+    known = getattr(getattr(events, "dtype", None), "names", None) or getattr(events, "keys", tuple)()
+    name = next((name for name in names if name in known), None)
+    if name is None:
+        raise ValueError(f"expected events with {' or '.join(names)}, got {', '.join(known) or type(events).__name__}")
+    column = np.asarray(events[name])
+    if column.ndim != 1 or column.dtype.kind not in "biuf":
+        raise ValueError(f"expected numbers [N], got {column.dtype} {_engine.shape_text(column)} for {name}")
+    return column
+
+
 def _weights(given: PathLike | None) -> str | None:
     """A name unchanged; a file by its absolute path, so that a worker spawned in another folder finds it."""
     if given is None or isinstance(given, str) and re.fullmatch("(shipped|untrained)(:.*)?", given):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import collections
 import copy
+import functools
+import hashlib
 import html
 import json
 import os
@@ -155,6 +157,25 @@ class Shards(Sequence):
         changed = copy.copy(self)
         changed._changes = (*self._changes, volume_of)
         return changed
+
+    def represent(self, representation: str, *, counts: str = "poisson", seed: int = 0) -> Shards:
+        """The same samples with another representation of their events as `volume`, float32; events are drawn from the
+        volumes.
+
+        Parameters
+        ----------
+        representation : str
+            "histogram:10": of `eventgan.represent`. The interval is the pair's.
+        counts : {"poisson", "rounded"}
+            Of `eventgan.sample_events`.
+        seed : int, default 0
+            A sample's events depend on it and on its id alone.
+
+        Returns
+        -------
+        Shards
+        """
+        return self.changed(functools.partial(_represented, representation=representation, counts=counts, seed=seed))
 
     def labels(self, index: int) -> Sample:
         """Sample `index` without its volume, which is not read."""
@@ -703,3 +724,13 @@ def _is_done(path: pathlib.Path) -> bool:
     except (OSError, ValueError):
         return False
     return record.get("shard") == path.name and record.get("size_bytes") == path.stat().st_size
+
+
+def _represented(sample: Sample, representation: str, counts: str, seed: int) -> np.ndarray:
+    from .generator import represent, sample_events
+
+    pair, volume = sample["pair"], sample["volume"]
+    digest = hashlib.sha256(f"{seed} {pair['dataset']} {pair['sample_id']}".encode()).digest()
+    duration_s = pair["gap_s"] if pair["gap_s"] > 0 else 1.0
+    events = sample_events(volume, duration_s=duration_s, seed=int.from_bytes(digest[:7], "big"), counts=counts)
+    return represent(events, representation, size=volume.shape[1:], window_s=(0, duration_s))
