@@ -47,7 +47,7 @@ struct ExportArguments {
   std::string folder;
   std::size_t format = 0;  ///< in export_formats()
   std::string out;
-  std::string classes;
+  std::string classes, representation;
   bool keep_ignored = false;
   bool is_float32 = false;
   ExportOptions options;
@@ -69,6 +69,7 @@ int run(const CLI::App& command, const ExportArguments& arguments) {
   }
   options.out = arguments.out;
   if (command.count("--classes") > 0) options.classes = arguments.classes;
+  if (command.count("--representation") > 0) options.representation = arguments.representation;
   if (command.count("--ignored") > 0) options.keep_ignored = arguments.keep_ignored;
   if (arguments.is_float32) options.dtype = StoredType::kFloat32;
   const StopSignal signal(stopping_line("finishing the current samples"));
@@ -133,6 +134,9 @@ void add_export_command(CLI::App& app, int& exit_code) {
   take_one_of(add("--layout", options.event_file,
                   "lines of text, t x y p (default), or HDF5 as MVSEC has it"),
               kEventFiles);
+  add("--representation", arguments->representation,
+      "histogram:T (default: histogram:10), RVT's of 50 ms, or volume, that of each sample")
+      ->option_text("WORD");
   add("--frames-per-second", options.frames_per_second,
       "frames a second of images whose times are not known; default: 1")
       ->check(CLI::Range(1e-3, 1e6))

@@ -36,8 +36,8 @@ bool fits(std::string_view name, std::string_view pattern) {
     const std::string_view rest = pattern.substr(end + 1);
     return fits(name, rest) || fits(name, inner + std::string(rest));
   }
-  static constexpr std::array<std::string_view, 7> kAnyText{"SPLIT", "NAME",      "SET", "SHARD",
-                                                            "BINS",  "RECORDING", "N"};
+  static constexpr std::array<std::string_view, 6> kAnyText{"SPLIT", "NAME",      "SET",
+                                                            "SHARD", "RECORDING", "N"};
   const auto any = std::ranges::find_if(
       kAnyText, [&](std::string_view word) { return pattern.starts_with(word); });
   if (any == kAnyText.end()) {

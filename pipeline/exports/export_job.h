@@ -30,7 +30,7 @@ struct ExportFormat {
   std::string_view title;  ///< what it writes, in a line
   LabelNeed need = LabelNeed::kNone;
   std::vector<std::string> options;  ///< those that it takes of the ones that not all formats take
-  /// The names of its files below the export's folder. SPLIT, NAME, SET, SHARD, RECORDING and BINS
+  /// The names of its files below the export's folder. SPLIT, NAME, SET, SHARD, RECORDING and N
   /// stand for any text without a slash, and what is in brackets may be missing.
   std::vector<std::string_view> files;
   std::unique_ptr<Exporter> (*make)(const ExportInput&, const ExportOptions&) = nullptr;
@@ -57,6 +57,8 @@ struct ExportOptions {
   StoredType dtype = StoredType::kFloat16;  ///< or kFloat32
   EventCounts counts = EventCounts::kPoisson;
   EventFile event_file = EventFile::kText;
+  /// Of `rvt`: histogram:T, or volume; unset: histogram:10.
+  std::optional<std::string> representation;
   std::filesystem::path frames;  ///< where frame paths start; empty: as recorded by convert
   double frames_per_second = 1;  ///< of images whose times are not known, 1e-3..1e6
   std::uint64_t seed = 0;

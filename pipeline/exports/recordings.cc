@@ -257,7 +257,8 @@ std::vector<RecordingGroup> RecordingsExporter::lay_recordings(
 void RecordingsExporter::finish(const ExportWork& work,
                                 const std::vector<const ExportShard*>& shards) const {
   LastReaders readers(work.input);
-  unlabelled_ = untimed_ = 0;
+  left_out_.clear();
+  untimed_ = 0;
   for (const RecordingGroup& group : lay_recordings(work, shards)) {
     ExportFolder::Step step(work.folder, group.step, hash_of(group));
     if (!step.is_done()) {
@@ -285,9 +286,8 @@ void RecordingsExporter::finish(const ExportWork& work,
       step.finish();
     }
     for (const OutgoingRecording& recording : group.recordings) {
-      const auto count = static_cast<std::int64_t>(recording.windows.size());
-      if (!recording.is_labelled()) unlabelled_ += count;
-      work.advance(count);
+      account_recording(recording, left_out_);
+      work.advance(std::ssize(recording.windows));
     }
   }
   if (numbers_ && !numbers_->names().empty()) write_classes(work, shards);
@@ -310,10 +310,13 @@ void RecordingsExporter::account(const OutgoingSample& sample, LeftOut& left_out
       [&](const std::string& why) { ++left_out[why]; });
 }
 
-LeftOut RecordingsExporter::whole_samples_left_out() const {
-  if (unlabelled_ == 0) return {};
-  return {{"samples of recordings without boxes (in raw alone)", unlabelled_}};
+void RecordingsExporter::account_recording(const OutgoingRecording& recording,
+                                           LeftOut& left_out) const {
+  if (recording.is_labelled()) return;
+  left_out["samples of recordings without boxes (in raw alone)"] += std::ssize(recording.windows);
 }
+
+LeftOut RecordingsExporter::whole_samples_left_out() const { return left_out_; }
 
 std::vector<std::string> RecordingsExporter::notes() const {
   if (untimed_ == 0) return {};
@@ -349,11 +352,11 @@ void number_tracks(std::vector<RecordedBox>& boxes, const OutgoingRecording& rec
   }
 }
 
-std::string prophesee_boxes(const std::vector<RecordedBox>& boxes) {
-  constexpr char kFields[] =
+std::string prophesee_boxes(const std::vector<RecordedBox>& boxes, bool is_padded) {
+  const std::string fields =
       "[('t', '<i8'), ('x', '<f4'), ('y', '<f4'), ('w', '<f4'), ('h', '<f4'), ('class_id', '<u4'), "
-      "('track_id', '<u4'), ('class_confidence', '<f4'), ('', '|V4')]";
-  constexpr std::size_t kBytes = 40;
+      "('track_id', '<u4'), ('class_confidence', '<f4')" +
+      std::string(is_padded ? ", ('', '|V4')]" : "]");
   std::string rows;
   for (const RecordedBox& box : boxes) {
     put(rows, box.t_us);
@@ -364,9 +367,9 @@ std::string prophesee_boxes(const std::vector<RecordedBox>& boxes) {
     put(rows, static_cast<std::uint32_t>(box.class_number));
     put(rows, static_cast<std::uint32_t>(box.track_id));
     put(rows, 1.0f);
-    put(rows, std::uint32_t{0});
+    if (is_padded) put(rows, std::uint32_t{0});
   }
-  return npy_records(kFields, kBytes, rows);
+  return npy_records(fields, is_padded ? 40 : 36, rows);
 }
 
 std::string name_before_bbox(const OutgoingRecording& recording) {

@@ -46,7 +46,7 @@ struct VolumeFile::File {
     set_filters(creation, kDeflateLevel, path);
     Dims dims = row;
     dims[0] = valid.size();
-    type = number_type(value_bytes, /*is_float=*/true, /*is_signed=*/true);
+    type = number_type(value_bytes, /*is_float=*/value_bytes > 1, /*is_signed=*/value_bytes > 1);
     // No chunk is made before it is written, and what is not there reads as zeros.
     volumes = create_dataset(hdf5.id(), path, type, space_of(dims, path), creation);
   }

@@ -16,14 +16,14 @@ enum class VolumeLayout {
   kRvt     ///< RVT's: `/data` [rows, 2 bins, H, W]
 };
 
-/// Writes an HDF5 file of float16 or float32 volumes, one row a chunk, shuffled and deflated. A row
-/// that is not given is zeros; `/davis/valid`, uint8, is 1 for those that are.
+/// Writes an HDF5 file of uint8, float16 or float32 volumes, one row a chunk, shuffled and
+/// deflated. A row that is not given is zeros; `/davis/valid`, uint8, is 1 for those that are.
 ///
 /// The file appears under its name on commit() only, whole. The same calls give the same bytes.
 /// Throws std::runtime_error naming the file. Thread safety: one writer is for one thread.
 class VolumeFile {
  public:
-  /// `value_bytes`: 2 for float16, 4 for float32.
+  /// `value_bytes`: 1 for uint8, 2 for float16, 4 for float32.
   VolumeFile(const std::filesystem::path& file, VolumeLayout layout, std::size_t rows,
              const VolumeShape& shape, std::size_t value_bytes);
   ~VolumeFile();

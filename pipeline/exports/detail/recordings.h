@@ -108,6 +108,9 @@ class RecordingsExporter : public Exporter {
   /// Whether a sample has a label that the format has a use for.
   virtual bool is_labelled(const OutgoingSample&) const { return true; }
 
+  /// What of a recording is not exported. Called one after the other.
+  virtual void account_recording(const OutgoingRecording& recording, LeftOut& left_out) const;
+
   /// None if no source has boxes.
   const ClassNumbers* numbers() const { return numbers_.get(); }
 
@@ -120,8 +123,8 @@ class RecordingsExporter : public Exporter {
   ExportOptions options_;
   std::unique_ptr<ClassNumbers> numbers_;
   // Of `finish`:
-  mutable std::int64_t unlabelled_ = 0;  ///< samples of recordings without labels
-  mutable std::int64_t untimed_ = 0;     ///< samples whose clock counts frames
+  mutable LeftOut left_out_;          ///< of whole recordings
+  mutable std::int64_t untimed_ = 0;  ///< samples whose clock counts frames
 };
 
 /// Throws UsageError for volumes of more than `most` pixels a side, which `word`'s files do not
@@ -140,8 +143,8 @@ std::string window_line(const SampleWindow& window, const RecordedSample& sample
                         std::int64_t clock_us);
 
 /// Boxes as Prophesee's programs and RVT read them, RECORDING_bbox.npy: BBOX_DTYPE of RVT's
-/// utils/evaluation/prophesee.
-std::string prophesee_boxes(const std::vector<RecordedBox>& boxes);
+/// utils/evaluation/prophesee, whose rows are padded to 40 bytes; NumPy packs a selection of them.
+std::string prophesee_boxes(const std::vector<RecordedBox>& boxes, bool is_padded = true);
 
 /// The name of a recording's files beside that: their readers cut a name at its first "bbox", so in
 /// it that is "%62box".
