@@ -374,7 +374,9 @@ ExportFormat rvt_format() {
                     "preprocessed/SPLIT/RECORDING/labels_v2/labels.npz",
                     "preprocessed/SPLIT/RECORDING/labels_v2/timestamps_us.npy",
                     "preprocessed/SPLIT/RECORDING/event_representations_v2/NAME/"
-                    "event_representations[_ds2_nearest].h5",
+                    "event_representations.h5",
+                    "preprocessed/SPLIT/RECORDING/event_representations_v2/NAME/"
+                    "event_representations_ds2_nearest.h5",
                     "preprocessed/SPLIT/RECORDING/event_representations_v2/NAME/"
                     "objframe_idx_2_repr_idx.npy",
                     "preprocessed/SPLIT/RECORDING/event_representations_v2/NAME/timestamps_us.npy",

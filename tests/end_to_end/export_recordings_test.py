@@ -17,7 +17,7 @@ import small_job
 from camera_files import volume_of
 from exported_demo import Export, of, read_samples
 from program import run
-from rvt_sequence import RvtSequence
+from rvt_sequence import GEN1, GEN4, RvtSequence, frame_times, kept_boxes, stacked_histogram
 
 setUpModule, tearDownModule = demo.set_up, demo.tear_down
 
@@ -245,12 +245,12 @@ class Recordings(Export):
         self.assertEqual([window[:2] for window in read_windows(recording / "windows.txt")],
                          [(50000 * k, 50000 * (k + 1)) for k in range(3)])
 
-    def test_rvt(self):
+    def test_rvt_has_the_volumes_of_samples(self):
         for source, known in ((self.source, {("train", key): sample for key, sample in self.samples.items()}),
                               (None, {(key[0], key[2]): sample for key, sample in of(dataset="kitti_object").items()})):
             with self.subTest(source=source):
                 self.out = pathlib.Path(tempfile.mkdtemp(dir=demo.folder)) / "export"
-                self.export("rvt", "--counts", "rounded", source=source)
+                self.export("rvt", "--counts", "rounded", "--representation", "volume", source=source)
                 self.check_rvt(known)
 
     def check_rvt(self, known):
@@ -300,6 +300,55 @@ class Recordings(Export):
         self.assertEqual(left_out.get("boxes within the last pixel, where RVT's frame ends (in raw alone)", 0),
                          kept - in_frame)
         self.assertEqual(left_out.get("samples of recordings without boxes (in raw alone)", 0), unlabelled)
+
+    def test_rvt_has_what_its_preprocessing_makes_of_the_recordings(self):
+        for size, words in (((0, 0), []), (GEN1, ["--representation", "histogram:4"]), (GEN4, [])):
+            with self.subTest(size=size):
+                out = pathlib.Path(tempfile.mkdtemp(dir=demo.folder))
+                source = self.source
+                if size[0]:
+                    job = json.loads((self.source.parent / "manifest.json").read_text())
+                    job["image"] = {**job["image"], "height": size[0], "width": size[1]}
+                    job["sources"][0] |= {"pairs": program.pairs([1]), "sequences": ["0000"]}
+                    job["output"]["directory"] = str(out / "shards")
+                    (out / "manifest.json").write_text(json.dumps(job))
+                    run("convert", out / "manifest.json", "--progress", "none")
+                    source = out / "shards"
+                self.export("rvt", *words, source=source, out=out / "export")
+                self.check_preprocessed(out / "export", 4 if words else 10)
+
+    def check_preprocessed(self, out, bins):
+        labels_without_frame, made = 0, 0
+        for path in sorted((out / "raw").glob("*/*_td*.h5")):
+            split, name = path.parent.name, path.name.split("_td")[0]
+            with h5py.File(path) as file:
+                size = file["events/height"][()].item(), file["events/width"][()].item()
+                t, x, y, p = (file[f"events/{column}"][:].astype("int64") for column in "txyp")
+            self.assertEqual(path.name, name + ("_td.dat.h5" if size == GEN1 else "_td.h5"))
+            boxes = path.with_name(f"{name}_bbox.npy")
+            boxes = kept_boxes(np.load(boxes), size, split) if boxes.exists() else np.empty(0, BBOX_DTYPE)
+            label_times = np.unique(boxes["t"])
+            frames, ends = frame_times(label_times, size)
+            labels_without_frame += len(label_times) - len(frames)
+            below = out / "preprocessed" / split / name
+            self.assertEqual(below.exists(), len(frames) > 0)
+            if not frames:
+                continue
+            made += 1
+            sequence = RvtSequence(below, f"stacked_histogram_dt=50_nbins={bins}", size)
+            self.assertEqual((list(sequence.frame_times), list(sequence.repr_times)), (frames, ends))
+            np.testing.assert_array_equal(sequence.repr_idx, np.searchsorted(ends, frames))
+            np.testing.assert_array_equal(sequence.labels, boxes[np.isin(boxes["t"], frames)])
+            self.assertEqual(sequence.labels.dtype, boxes.dtype)
+            self.assertEqual(sequence.data.dtype, np.uint8)
+            for data, end in zip(sequence.data, ends):
+                of_it = slice(np.searchsorted(t, end - 50000), np.searchsorted(t, end, side="right"))
+                expected = stacked_histogram(*(column[of_it] for column in (t, x, y, p)), size, bins)
+                np.testing.assert_array_equal(data, expected[:, 1::2, 1::2] if size == GEN4 else expected)
+        self.assertGreater(made, 0)
+        left_out = json.loads((out / "export.json").read_text())["left_out"]
+        self.assertEqual(left_out.get("labels of samples before 0.1 s or between RVT's (in raw alone)", 0),
+                         labels_without_frame)
 
     def test_raw_has_the_events_and_boxes_of_rvt(self):
         rvt, raw = self.out / "rvt", self.out / "raw"

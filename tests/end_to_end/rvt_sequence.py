@@ -1,8 +1,58 @@
-"""A preprocessed sequence as RVT's dataset classes read it (github.com/uzh-rpg/RVT, commit 515034c), with numpy and
-h5py; their assertions stay."""
+"""A preprocessed sequence as RVT's dataset classes read it (github.com/uzh-rpg/RVT, commit 515034c), and as its
+preprocessing makes it, with numpy and h5py; their assertions stay."""
 
 import h5py
 import numpy as np
+
+
+GEN1, GEN4 = (240, 304), (720, 1280)
+
+
+def kept_boxes(boxes, size, split):
+    """What scripts/genx/preprocess_dataset.py keeps of boxes, cut to where its frame ends."""
+    boxes = boxes[["t", "x", "y", "w", "h", "class_id", "track_id", "class_confidence"]].astype(
+        [(name, boxes.dtype[name]) for name in boxes.dtype.names])
+    if size == GEN4:
+        boxes = boxes[boxes["class_id"] <= 2]
+    for begin, extent, side in (("x", "w", size[1]), ("y", "h", size[0])):
+        end = np.clip(boxes[begin] + boxes[extent], 0, side - 1)
+        boxes[begin] = np.clip(boxes[begin], 0, side - 1)
+        boxes[extent] = end - boxes[begin]
+    w, h = boxes["w"], boxes["h"]
+    least, diagonal = (10, 30) if size == GEN1 else (5, 0)
+    kept = (w >= least) & (h >= least) & (w ** 2 + h ** 2 >= diagonal ** 2)
+    if split == "train":
+        kept &= w <= 9 * size[1] // 10
+    return boxes[kept]
+
+
+def frame_times(label_times, size):
+    """The times of object frames and the ends of representations, as the same script chooses them; of labels whose
+    interval it does not know, every so many that 98 ms lie between."""
+    step, between = 250000, 2
+    if size != GEN1 and len(label_times) > 1:
+        median = np.median(np.diff(label_times))
+        step = int(np.ceil(98000 / median) * median)
+        between = max(round(step / 50000), 1)
+    label_times = [int(time) for time in label_times if time >= 100000]
+    if not label_times:
+        return [], []
+    frames, ends = label_times[:1], list(reversed(range(label_times[0], 0, -50000)))[1:-1]
+    for time in label_times[1:]:
+        count = round((time - frames[-1]) / step)
+        if count and abs(time - frames[-1] - count * step) <= 2000:
+            ends += np.linspace(frames[-1], time, count * between + 1).astype(int)[:-1].tolist()
+            frames.append(time)
+    return frames, [*ends, frames[-1]]
+
+
+def stacked_histogram(t, x, y, p, size, bins=10):
+    """[2 T, H, W] of data/utils/representations.py, counts up to 10."""
+    histogram = np.zeros((2, bins, *size), int)
+    if len(t):
+        share = (t - t[0]).astype("float32") / np.float32(max(t[-1] - t[0], 1))
+        np.add.at(histogram, (p, np.minimum((share * np.float32(bins)).astype(int), bins - 1), y, x), 1)
+    return np.minimum(histogram, 10).reshape(-1, *size)
 
 
 class RvtSequence:
@@ -15,7 +65,7 @@ class RvtSequence:
         self.repr_idx = np.load(folder / "objframe_idx_2_repr_idx.npy")
         self.repr_times = np.load(folder / "timestamps_us.npy")
         self.frame_times = np.load(path / "labels_v2" / "timestamps_us.npy")
-        with h5py.File(folder / "event_representations.h5") as file:
+        with h5py.File(*folder.glob("event_representations*.h5")) as file:
             assert file["data"].chunks == (1, *file["data"].shape[1:])
             self.data = file["data"][:]
         assert len(self.label_idx) == len(np.unique(self.labels["t"])) == len(self.repr_idx) == len(self.frame_times)

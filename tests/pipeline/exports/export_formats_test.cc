@@ -98,7 +98,7 @@ TEST(ExportFormats, AFileIsOneOfThoseThatTheRowSays) {
                      "preprocessed/val/a/event_representations_v2/eventgan_nbins=18/"
                      "timestamps_us.npy"));
   EXPECT_FALSE(writes(format("rvt"),
-                      "preprocessed/val/a/event_representations_v2/eventgan_nbins=/"
+                      "preprocessed/val/a/event_representations_v2/"
                       "timestamps_us.npy"));
 }
 

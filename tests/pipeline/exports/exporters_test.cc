@@ -409,8 +409,24 @@ INSTANTIATE_TEST_SUITE_P(
         RecordingCase{"rvt", "raw/val/drive_0_bbox.npy", 200'000, "raw/val/drive_0_td.h5"}),
     [](const auto& format) { return format.param.word; });
 
+TEST_F(Exporters, RvtTakesHistogramsAndVolumesAlone) {
+  for (const auto& [word, message] :
+       {std::pair{"voxel:5", "--representation: expected histogram:T or volume, got voxel:5"},
+        {"histogram", "expected histogram:T, T from 1 to 64, got \"histogram\""},
+        {"volume:9", "--representation: expected histogram:T or volume, got volume:9"}}) {
+    ExportOptions options;
+    options.representation = word;
+    EXPECT_THAT([&] { exported("rvt", options); },
+                ::testing::ThrowsMessage<UsageError>(::testing::HasSubstr(message)));
+  }
+  // A box of 3 pixels is smaller than RVT takes.
+  EXPECT_FALSE(std::filesystem::exists(exported("rvt") / "preprocessed"));
+}
+
 TEST_F(Exporters, RvtHasTheVolumeWithTheNegativePolarityFirst) {
-  const std::filesystem::path drive = exported("rvt") / "preprocessed/val/drive_0";
+  ExportOptions options;
+  options.representation = "volume";
+  const std::filesystem::path drive = exported("rvt", options) / "preprocessed/val/drive_0";
   const std::filesystem::path volumes = drive / "event_representations_v2/eventgan_nbins=2";
   const Hdf5Arrays file = read_hdf5_arrays(volumes / "event_representations.h5");
   const TypedArray& data = file.arrays.at("data");
