@@ -309,7 +309,8 @@ class Recordings(Export):
                 if size[0]:
                     job = json.loads((self.source.parent / "manifest.json").read_text())
                     job["image"] = {**job["image"], "height": size[0], "width": size[1]}
-                    job["sources"][0] |= {"pairs": program.pairs([1]), "sequences": ["0000"]}
+                    job["sources"][0]["pairs"] = program.pairs([1])
+                    job["generator"]["sensor"] = {"positive_threshold": 4, "negative_threshold": 4}  # few events
                     job["output"]["directory"] = str(out / "shards")
                     (out / "manifest.json").write_text(json.dumps(job))
                     run("convert", out / "manifest.json", "--progress", "none")

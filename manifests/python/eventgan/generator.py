@@ -391,10 +391,13 @@ def represent(events: Any, representation: str, *, size: tuple[int, int],
     # A clock of the day in microseconds has more digits than seconds in float64, so times count from the first one.
     first = columns[0][0] if len(rows) else 0
     rows["t"] = (columns[0] - first) * unit
+    ends = None
+    if window_s is not None:
+        ends = (ctypes.c_double * 2)(begin - first * unit, end - first * unit)
+        np.clip(rows["t"], *ends, out=rows["t"])
     for name, column in zip("xy", columns[1:]):
         rows[name] = column
     rows["p"] = columns[3] > 0
-    ends = None if window_s is None else (ctypes.c_double * 2)(begin - first * unit, end - first * unit)
     channels, number = ctypes.c_int32(), ctypes.c_int32()
 
     def call(values: int | None, nbytes: int) -> None:

@@ -1,9 +1,16 @@
-"""eventgan.signed_channel: one scale for events of any source."""
+"""eventgan.signed_channel: one scale for events of any source; eventgan.represent: arrays of events."""
 
 import numpy as np
 import pytest
 
+import eventgan
 from eventgan import signed_channel
+
+try:
+    from eventgan import represent
+except ImportError:  # no libeventgan, or one with sanitizers
+    represent = None
+needs_library = pytest.mark.skipif(represent is None, reason="no libeventgan")
 
 
 def test_of_a_volume():
@@ -48,3 +55,102 @@ def test_where_few_pixels_or_none_have_events():
 def test_what_is_neither(shape):
     with pytest.raises(ValueError, match="expected a volume .* got an array of "):
         signed_channel(np.zeros(shape))
+
+
+def real_events(count, seed=1, clock_us=1_600_000_000_000_000):
+    """As a camera's file has them: microseconds of the day, uint16 places, on 40x30 pixels."""
+    random = np.random.default_rng(seed)
+    events = np.empty(count, [("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "i1")])
+    events["t"] = clock_us + np.sort(random.integers(0, 50_000, count))
+    events["x"], events["y"], events["p"] = (random.integers(0, most, count) for most in (40, 30, 2))
+    return events
+
+
+def histogram_of(events, bins, shape):
+    """RVT's, github.com/uzh-rpg/RVT, data/utils/representations.py."""
+    histogram, t = np.zeros((2, bins, *shape), int), events["t"] - events["t"][0]
+    share = t.astype("f4") / np.float32(max(t[-1], 1))
+    np.add.at(histogram, (events["p"], np.minimum((share * np.float32(bins)).astype(int), bins - 1), events["y"],
+                          events["x"]), 1)
+    return np.minimum(histogram, 10).reshape(2 * bins, *shape)
+
+
+@needs_library
+def test_histograms_are_rvts():
+    for seed in range(20):
+        events = real_events(3000, seed)
+        found = represent(events, "histogram:10", size=(30, 40))
+        assert found.dtype == np.uint8
+        np.testing.assert_array_equal(found, histogram_of(events, 10, (30, 40)))
+
+
+@needs_library
+def test_a_window_has_both_its_ends():
+    events = real_events(500)
+    begin, end = events["t"][100], events["t"][200]
+    found = represent(events, "count", size=(30, 40), window_s=(begin * 1e-6, end * 1e-6))
+    chosen = events[(events["t"] >= begin) & (events["t"] <= end)]
+    # A float64 of the day's seconds is exact to a quarter of a microsecond.
+    assert abs(found.sum() - len(chosen)) <= 2
+    small = events.copy()
+    small["t"] -= small["t"][0]
+    begin, end = small["t"][[100, 200]]
+    within = small[(small["t"] >= begin) & (small["t"] <= end)]
+    found = represent(small, "count", size=(30, 40), window_s=(begin * 1e-6, end * 1e-6))
+    assert found.sum() == len(within) and found[0].sum() == within["p"].sum()
+
+
+@needs_library
+@pytest.mark.parametrize("names", [("t", "x", "y", "p"), ("ts", "x", "y", "pol"), ("timestamp", "x", "y", "polarity")])
+def test_columns_may_have_any_type(names):
+    events = real_events(200, clock_us=0)
+    expected = represent(events, "voxel:5", size=(30, 40))
+    columns = dict(zip(names, (events["t"] * 1e-6, events["x"].astype("f4"), events["y"].astype("i8"),
+                               events["p"].astype(bool))))
+    np.testing.assert_allclose(represent(columns, "voxel:5", size=(30, 40)), expected, atol=1e-5)
+
+
+@needs_library
+def test_no_events_are_zeros():
+    empty = real_events(0)
+    for word, shape in [("volume:9", (18, 30, 40)), ("time_surface:0.1", (2, 30, 40)), ("eros:8", (30, 40))]:
+        found = represent(empty, word, size=(30, 40), window_s=(0, 1))
+        assert found.shape == shape and not found.any()
+
+
+@needs_library
+@pytest.mark.parametrize("change, message", [
+    (lambda events: events[::-1], "expected events in time order"),
+    (lambda events: {"x": events["x"], "y": events["y"], "p": events["p"]}, "expected events with t or ts or timestamp"),
+    (lambda events: [1, 2], "expected events with t or ts or timestamp, got list"),
+    (lambda events: {name: events[name].astype("S9") for name in "txyp"}, "expected numbers"),
+])
+def test_what_is_none_is_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        represent(change(real_events(9)), "count", size=(30, 40))
+
+
+@needs_library
+def test_events_outside_and_other_words_are_refused():
+    with pytest.raises(ValueError, match="inside 40x20 pixels"):
+        represent(real_events(500), "count", size=(20, 40))
+    with pytest.raises(ValueError, match="expected a representation of volume:B, voxel:B"):
+        represent(real_events(9), "stack:9", size=(30, 40))
+    with pytest.raises(ValueError, match="expected histogram:T, T from 1 to 64"):
+        represent(real_events(9), "histogram", size=(30, 40))
+    assert "histogram:T : uint8 [2 T, H, W]" in represent.__doc__
+
+
+@needs_library
+def test_shards_as_representations(example):
+    shards = eventgan.Shards(example.path("float32-0"))
+    counts = shards.represent("count", counts="rounded")
+    volume, found = shards[0]["volume"], counts[0]["volume"]
+    assert found.dtype == np.float32
+    half = len(volume) // 2
+    # Each value becomes the nearest number of events.
+    rounded = np.floor(volume + 0.5)
+    np.testing.assert_array_equal(found, np.stack([rounded[:half].sum(0), rounded[half:].sum(0)]))
+    np.testing.assert_array_equal(shards.represent("voxel:3", seed=4)[0]["volume"],
+                                  shards.represent("voxel:3", seed=4)[0]["volume"])
+    assert shards.represent("histogram:4")[0]["volume"].shape == (8, *volume.shape[1:])
