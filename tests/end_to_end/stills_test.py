@@ -287,8 +287,8 @@ class Stills(program.InFolder):
             _, warned = run("preview", self.folder / "out", "--out", self.folder / "preview", "--count", "3")
             self.assertEqual(warned, "")  # their frames are made again
             shutil.rmtree(self.folder / "rvt", ignore_errors=True)
-            run("export", self.folder / "out", "--to", "rvt", "--out", self.folder / "rvt", "--representation", "volume",
-                "--progress", "none")
+            run("export", self.folder / "out", "--to", "rvt", "--out", self.folder / "rvt",
+                "--representation", "volume", "--progress", "none")
             sequences = sorted((self.folder / "rvt" / "preprocessed").glob("*/*"))
             self.assertEqual(len(sequences), len(chosen))
             for path in sequences:

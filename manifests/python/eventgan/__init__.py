@@ -32,10 +32,11 @@ if TYPE_CHECKING:
 __version__ = "1.0.0"
 
 _MODULE_OF = {
-    "Generator": "generator", "represent": "generator", "sample_events": "generator", "FIELDS": "shards", "InvalidSample": "shards",
-    "Sample": "open_shards", "Shards": "shards", "open_shard": "open_shards", "read_description": "shards",
-    "ProgramError": "program", "convert": "program", "init": "program", "open": "program", "mask": "outlines",
-    "rings": "outlines", "show": "plotting", "signed_channel": "representations",
+    "Generator": "generator", "represent": "generator", "sample_events": "generator", "FIELDS": "shards",
+    "InvalidSample": "shards", "Sample": "open_shards", "Shards": "shards", "open_shard": "open_shards",
+    "read_description": "shards", "ProgramError": "program", "convert": "program", "init": "program",
+    "open": "program", "mask": "outlines", "rings": "outlines", "show": "plotting",
+    "signed_channel": "representations",
 }
 _MODULES = ("evaluate", "shards", "torch")
 

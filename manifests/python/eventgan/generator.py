@@ -393,8 +393,8 @@ def represent(events: Any, representation: str, *, size: tuple[int, int],
     rows["t"] = (columns[0] - first) * unit
     ends = None
     if window_s is not None:
-        ends = (ctypes.c_double * 2)(begin - first * unit, end - first * unit)
-        np.clip(rows["t"], *ends, out=rows["t"])
+        low, high = float(begin - first * unit), float(end - first * unit)
+        ends, rows["t"] = (ctypes.c_double * 2)(low, high), rows["t"].clip(low, high)  # what rounding put outside
     for name, column in zip("xy", columns[1:]):
         rows[name] = column
     rows["p"] = columns[3] > 0

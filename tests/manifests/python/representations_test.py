@@ -121,7 +121,7 @@ def test_no_events_are_zeros():
 @needs_library
 @pytest.mark.parametrize("change, message", [
     (lambda events: events[::-1], "expected events in time order"),
-    (lambda events: {"x": events["x"], "y": events["y"], "p": events["p"]}, "expected events with t or ts or timestamp"),
+    (lambda events: {name: events[name] for name in "xyp"}, "expected events with t or ts or timestamp, got x, y, p"),
     (lambda events: [1, 2], "expected events with t or ts or timestamp, got list"),
     (lambda events: {name: events[name].astype("S9") for name in "txyp"}, "expected numbers"),
 ])
