@@ -10,6 +10,7 @@ ExportFormat yolo_format();
 ExportFormat yolo_seg_format();
 ExportFormat coco_format();
 ExportFormat mpii_format();
+ExportFormat hpe_format();
 ExportFormat davis_format();
 ExportFormat webdataset_format();
 ExportFormat events_format();
@@ -20,9 +21,9 @@ ExportFormat aedat4_format();
 
 const std::vector<ExportFormat>& export_formats() {
   static const std::vector<ExportFormat> kFormats = {
-      yolo_format(),  yolo_seg_format(),   coco_format(),   mpii_format(),
-      davis_format(), webdataset_format(), events_format(), dsec_format(),
-      rvt_format(),   raw_format(),        aedat4_format()};
+      yolo_format(), yolo_seg_format(), coco_format(),       mpii_format(),
+      hpe_format(),  davis_format(),    webdataset_format(), events_format(),
+      dsec_format(), rvt_format(),      raw_format(),        aedat4_format()};
   return kFormats;
 }
 

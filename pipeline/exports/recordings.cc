@@ -191,7 +191,7 @@ std::string RecordingsExporter::settings() const {
 
 RecordedSample RecordingsExporter::recorded(const OutgoingSample& sample,
                                             const SampleWindow& window) const {
-  RecordedSample result{sample.labels.sample_id, {}, {}, {}, {}, {}};
+  RecordedSample result{sample.labels.sample_id, {}, {}, {}, {}, {}, {}};
   const std::int64_t length_us = window.end_us - window.begin_us;
   const auto events =
       drawn_events(sample, options_, static_cast<double>(length_us) / kMicroseconds);

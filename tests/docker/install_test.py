@@ -67,8 +67,8 @@ class Install(unittest.TestCase):
         self.assertEqual(complete("eventgan convert --gr"), {"--grace"})
         self.assertEqual(complete("eventgan convert --progress l"), {"lines"})
         self.assertEqual(complete("eventgan export --to "),
-                         {"yolo", "yolo-seg", "coco", "mpii", "davis", "webdataset", "events", "dsec", "rvt",
-                          "raw", "aedat4"})
+                         {"yolo", "yolo-seg", "coco", "mpii", "hpe", "davis", "webdataset", "events", "dsec",
+                          "rvt", "raw", "aedat4"})
         self.assertEqual(complete("eventgan convert he"), {"here.json"})
         for command in self.commands:
             options = set(re.findall(r"(?m)^  (?:-h,)?(--[a-z-]+)", run(self.program, command, "--help")))

@@ -216,7 +216,7 @@ class SizeLimit(program.InFolder):
         images = self.folder / "images"
         self.refused(500, images, "preview", self.out, "--out", images)
         run("finalize", self.out)
-        for to in ("yolo", "coco", "mpii", "davis", "webdataset", "events", "dsec", "rvt", "raw", "aedat4"):
+        for to in ("yolo", "coco", "mpii", "hpe", "davis", "webdataset", "events", "dsec", "rvt", "raw", "aedat4"):
             exported = self.folder / to
             self.refused(150, exported, "export", self.out, "--to", to, "--out", exported)
             self.refused(400, exported, "export", self.out, "--to", to, "--out", exported)

@@ -30,7 +30,7 @@ from program import run, text
 
 TRAINERS = program.SHARED.parent / "trainers"
 PIXELS = 0.01  # the largest error of a label that is mapped back
-FORMATS = ["yolo", "coco", "mpii", "davis", "webdataset", "events", "dsec", "rvt", "raw", "aedat4"]
+FORMATS = ["yolo", "coco", "mpii", "hpe", "davis", "webdataset", "events", "dsec", "rvt", "raw", "aedat4"]
 BY_POINT = ("joints", "joints_source", "joints3d_mm", "visible")  # null is said of each joint
 PAIR_UNKNOWN = {"prev_video_frame": -1, "next_video_frame": -1}
 LABEL_UNKNOWN = {"truncation": -1, "occlusion": -1, "alpha": -10, "box3d": [-1, -1, -1, -1000, -1000, -1000, -10],
@@ -69,7 +69,7 @@ def events_volume(rows, shape, gap):
 
 def split_for(to):
     """A small one: of persons there is but train."""
-    return "train" if to == "mpii" else "val"
+    return "train" if to in ("mpii", "hpe") else "val"
 
 
 class Formats(Export):

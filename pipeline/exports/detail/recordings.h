@@ -68,6 +68,7 @@ struct RecordedSample {
   std::vector<StampedEvent> events;  ///< within the window
   std::vector<RecordedBox> boxes;    ///< those that are exported, at label_us
   // Where the exporter keeps them:
+  std::string name;           ///< of the sample's own files
   std::vector<float> volume;  ///< [2 bins, H, W]
   /// Previous and next, [y, x] or [y, x, channel] uint8 (blue, green, red); empty: there is none.
   std::array<std::vector<std::uint8_t>, 2> frames;

@@ -317,8 +317,8 @@ def test_what_goes_wrong_in_ones_own_progress_ends_the_program(job, in_the_progr
 
 def test_an_interrupted_job_leaves_whole_shards_and_goes_on(job):
     job["output"]["samples_per_shard"] = 1
-    # half a second each
-    job["generator"], job["image"] = {"weights": "untrained:32"}, {"width": 1242, "height": 375, "preset": "mpii"}
+    # a tenth of a second or more each
+    job["generator"], job["image"] = {"weights": "untrained:16"}, {"width": 1242, "height": 375, "preset": "mpii"}
     job["sources"][0]["root"] = "demo/kitti/training"
 
     def interrupt(event):

@@ -19,6 +19,7 @@
 #include "stages/base/archives/hdf5_arrays.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/archives/zip_archive.h"
+#include "stages/base/images/image_file.h"
 #include "stages/recordings/readers/recording.h"
 #include "stages/shards/codec/quantization.h"
 #include "tests/pipeline/dataset/converted_folder.h"
@@ -201,6 +202,35 @@ TEST_F(Exporters, MpiiListsWhoHasACentreCountedFromOne) {
   EXPECT_EQ(list[0]["scale"], 0.875);
   EXPECT_EQ(list[0]["joints"], (std::vector<std::vector<double>>{{3.25, 3.875}, {4.25, 4.25}}));
   EXPECT_EQ(list[0]["joints_vis"], (std::vector<int>{1, 1}));
+}
+
+TEST_F(Exporters, HpeHasAnEntryForEachPersonWithAJoint) {
+  const std::filesystem::path out = exported("hpe") / "hpe/val";
+  const json poses = json::parse(testing::read_file(out / "poses.json"));
+  ASSERT_EQ(poses.size(), 3u);  // of 000000 two
+  EXPECT_EQ(poses[2]["img_name"], "000004.png");
+  // Of 8x6 pixels the wrists, left (2.25, 2.875) hidden and right (3.25, 3.25) of unknown
+  // visibility.
+  const json left{2.25 / 8, 2.875 / 6}, right{3.25 / 8, 3.25 / 6};
+  const json& both = poses[1];
+  EXPECT_EQ(both["img_name"], "000000.png");
+  ASSERT_EQ(both["keypoints"].size(), 39u);
+  for (std::size_t i = 0; i < 13; ++i) {
+    const json& at = i == 5 ? left : i == 6 ? right : json{0.0, 0.0};
+    const double visible = i == 5 ? 1 : i == 6 ? 2 : 0;
+    EXPECT_EQ(json({both["keypoints"][3 * i], both["keypoints"][3 * i + 1],
+                    both["keypoints"][3 * i + 2]}),
+              json({at[0], at[1], visible}))
+        << i;
+  }
+  EXPECT_EQ(both["center"], json({2.75 / 8, 6.125 / 2 / 6}));
+  // The other person has the left wrist alone.
+  EXPECT_EQ(both["other_centers"], json::array({left}));
+  EXPECT_EQ(both["other_keypoints"][5], json::array({left}));
+  EXPECT_EQ(both["other_keypoints"][6], json::array());
+  EXPECT_EQ(image_file_size(out / "eros/000000.png"), (ImageSize{6, 8}));
+  EXPECT_TRUE(std::filesystem::exists(out / "eros/000004.png"));
+  EXPECT_FALSE(std::filesystem::exists(out / "eros/000003.png"));  // no person
 }
 
 TEST_F(Exporters, DavisHasARowForEachPerson) {
