@@ -1,7 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "pipeline/exports/detail/exporter.h"
+#include "pipeline/preview/preview_reader.h"
 #include "stages/recordings/writers/event_columns_writer.h"
 
 namespace eventgan {
@@ -69,8 +69,7 @@ struct RecordedSample {
   std::vector<RecordedBox> boxes;    ///< those that are exported, at label_us
   // Where the exporter keeps them:
   std::vector<float> volume;  ///< [2 bins, H, W]
-  /// Previous and next, [y, x] or [y, x, channel] uint8 (blue, green, red); empty: there is none.
-  std::array<std::vector<std::uint8_t>, 2> frames;
+  SampleFrames frames;
   PixelFlow flow;  ///< empty: there is none
 };
 
