@@ -38,6 +38,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr char kNoSource[] =
+    "expected the shard's plan beside it, since its manifest has several such sources, got none";
+
 /// The frame of a recording of events, of `last` if it is that one; a fault names its file.
 /// `source`: that of the sample, if known. A path alone does not lead to it: two sources can be the
 /// two cameras of one file. `job`: the folder of its shard, which may know where its times lie.
@@ -45,12 +48,7 @@ Outcome<ColourFrame> decode_recorded(const fs::path& folder, const fs::path& job
                                      const SourceSpec* source, const FrameRef& frame,
                                      OpenRecording& last) try {
   const fs::path path = folder / frame.path;
-  if (source == nullptr) {
-    return SampleFault{
-        "expected the shard's plan beside it, since its manifest has several such "
-        "sources, got none, for a frame in " +
-        path.string()};
-  }
+  if (source == nullptr) return SampleFault{kNoSource + (", for a frame in " + path.string())};
   if (!last.recording || last.path != path || last.options != source->recording) {
     const EventIndexes indexes(job / kEventIndexFile);
     last = {path, source->recording, open_recording(path, {}, source->recording)};
@@ -98,7 +96,7 @@ std::vector<std::uint8_t> frame_image(const Outcome<ColourFrame>& decoded, const
 }  // namespace
 
 struct PreviewReader::State {
-  fs::path frames;
+  fs::path base;  ///< where relative frame paths start
   std::vector<std::string>& warnings;
   FrameDecoder decoder;
   OpenRecording recording{};
@@ -106,8 +104,8 @@ struct PreviewReader::State {
   std::optional<ShardReader> reader{};
   JobManifest manifest{};
   bool has_events = false;  ///< is made of a camera's events
-  /// Of events, and of stills whose objects move: the source that `shard` is of; null if nothing
-  /// tells.
+  /// Of events, of stills whose objects move, and where a labelled frame was asked for: the source
+  /// that `shard` is of; null if nothing tells.
   const SourceSpec* source = nullptr;
   std::vector<std::unique_ptr<Dataset>> datasets{};  ///< opened is that of one source
   std::pair<std::string, std::size_t> dataset_of{};  ///< the hash of its plan, its number there
@@ -117,10 +115,11 @@ struct PreviewReader::State {
   void open(const fs::path& file) {
     if (reader && shard == file) return;
     reader.reset();
+    source = nullptr;
     renew_time_limit();
     reader.emplace(file);
     lift_time_limit();
-    manifest = parse_job_manifest(reader->header().manifest_text, frames, file.string());
+    manifest = parse_job_manifest(reader->header().manifest_text, base, file.string());
     has_events = !needs_frames(manifest.generator.kind);
     shard = file;
     const auto has_moving_objects = [](const SourceSpec& spec) {
@@ -168,14 +167,74 @@ struct PreviewReader::State {
     return sample.annotation.boxes;
   }
 
+  /// Whether the pair's frames are those of a clip that is made of a still.
+  bool is_made(const ShardSample& sample) const {
+    const FramePair& pair = sample.pair;
+    return !has_events && !pair.motion && pair.previous.path == pair.next.path &&
+           pair.previous.video_frame == pair.next.video_frame &&
+           pair.previous.index != pair.next.index;
+  }
+
+  /// A frame of the sample, which a file or a recording holds; empty, with a warning, if it cannot
+  /// be had.
+  std::vector<std::uint8_t> stored_frame(const FrameRef& which, const ShardSample& sample,
+                                         const std::vector<Box>& boxes) {
+    // Of events there may be no frames, or none yet.
+    if (!sample.valid || (has_events && which.video_frame < 0)) return {};
+    const DatasetRow* const dataset = find_dataset(reader->header().dataset);
+    const ImageOrientation orientation =
+        dataset == nullptr ? ImageOrientation::kStored : orientation_of(dataset->value);
+    return frame_image(
+        has_events
+            ? decode_recorded(base, shard.parent_path(), source, which, recording)
+            : decoder.decode(which, sample.pair.video_stride(), orientation, manifest.image.range),
+        which, sample, boxes, manifest.image, warnings);
+  }
+
+  SampleFrames frames_of(const ShardSample& sample) {
+    const FramePair& pair = sample.pair;
+    const std::vector<Box> boxes =
+        sample.valid && pair.motion ? boxes_of(sample) : std::vector<Box>();
+    SampleFrames frames;
+    if (!sample.valid || !is_made(sample)) {
+      frames.previous_bgr = stored_frame(pair.previous, sample, boxes);
+      frames.next_bgr = stored_frame(pair.next, sample, boxes);
+      return frames;
+    }
+    Outcome<std::array<ColourFrame, 2>> made = made_frames(sample);
+    if (is_fault(made)) {
+      warnings.push_back(made.fault().reason + " (" + sample.sample_id + ")");
+      return frames;
+    }
+    const auto laid = [&](ColourFrame& image, const FrameRef& which) {
+      return frame_image(std::move(image), which, sample, boxes, manifest.image, warnings);
+    };
+    frames.previous_bgr = laid((*made)[0], pair.previous);
+    frames.next_bgr = laid((*made)[1], pair.next);
+    return frames;
+  }
+
+  /// The labelled frame, of which a shard has the number alone.
+  std::vector<std::uint8_t> labelled_image(const ShardSample& sample) {
+    std::string fault = kNoSource;
+    try {
+      if (source == nullptr) find_source();
+      if (source != nullptr) {
+        const LabelledFrame* const labelled = labelled_frame(sample);
+        if (labelled != nullptr) return stored_frame(labelled->frame, sample, {});
+        fault = "expected the labelled frame, got none, in " + source->root;
+      }
+    } catch (const std::runtime_error& error) {
+      fault = error.what();
+    }
+    warnings.push_back(fault + " (" + sample.sample_id + ")");
+    return {};
+  }
+
   /// The frames of a sample of a clip that is made of a still, made again: the shard has neither
   /// the still's boxes nor its poses, but the manifest that they follow from.
   Outcome<std::array<ColourFrame, 2>> made_frames(const ShardSample& sample) try {
-    if (source == nullptr) {
-      return SampleFault{
-          "expected the shard's plan beside it, since its manifest has several such "
-          "sources, got none"};
-    }
+    if (source == nullptr) return SampleFault{kNoSource};
     const Dataset& dataset = labels();
     const LabelledFrame* const labelled = labelled_frame(sample);
     if (labelled == nullptr) {
@@ -233,6 +292,19 @@ PreviewReader::PreviewReader(const fs::path& frames, std::vector<std::string>& w
 PreviewReader::~PreviewReader() = default;
 PreviewReader::PreviewReader(PreviewReader&&) noexcept = default;
 
+SampleFrames PreviewReader::frames(const fs::path& shard, int slot, bool with_labelled) {
+  state_->open(shard);
+  renew_time_limit();
+  const ShardSample sample = state_->reader->sample(slot);
+  lift_time_limit();
+  SampleFrames frames = state_->frames_of(sample);
+  const double position = sample.pair.label_position;
+  if (with_labelled && sample.valid && position > 0 && position < 1) {
+    frames.labelled_bgr = state_->labelled_image(sample);
+  }
+  return frames;
+}
+
 PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
   state_->open(shard);
   const ShardReader& reader = *state_->reader;
@@ -243,44 +315,10 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
   content.shape = header.volume;
   if (sample.valid) content.volume = reader.volume(slot);
   lift_time_limit();
-  const DatasetRow* const dataset = find_dataset(header.dataset);
-  const ImageOrientation orientation =
-      dataset == nullptr ? ImageOrientation::kStored : orientation_of(dataset->value);
-  const FramePair& frames = sample.pair;
-  const bool is_made = !state_->has_events && !frames.motion &&
-                       frames.previous.path == frames.next.path &&
-                       frames.previous.video_frame == frames.next.video_frame &&
-                       frames.previous.index != frames.next.index;
-  const std::vector<Box> boxes =
-      sample.valid && frames.motion ? state_->boxes_of(sample) : std::vector<Box>();
-  const auto frame = [&](const FrameRef& which) {
-    // Of events there may be no frames, or none yet.
-    if (!sample.valid || (state_->has_events && which.video_frame < 0)) {
-      return std::vector<std::uint8_t>();
-    }
-    return frame_image(state_->has_events
-                           ? decode_recorded(state_->frames, shard.parent_path(), state_->source,
-                                             which, state_->recording)
-                           : state_->decoder.decode(which, sample.pair.video_stride(), orientation,
-                                                    state_->manifest.image.range),
-                       which, sample, boxes, state_->manifest.image, state_->warnings);
-  };
-  if (is_made && sample.valid) {
-    Outcome<std::array<ColourFrame, 2>> made = state_->made_frames(sample);
-    if (is_fault(made)) {
-      state_->warnings.push_back(made.fault().reason + " (" + sample.sample_id + ")");
-    } else {
-      const auto laid = [&](ColourFrame& image, const FrameRef& which) {
-        return frame_image(std::move(image), which, sample, boxes, state_->manifest.image,
-                           state_->warnings);
-      };
-      content.previous_bgr = laid((*made)[0], frames.previous);
-      content.next_bgr = laid((*made)[1], frames.next);
-    }
-  } else {
-    content.previous_bgr = frame(frames.previous);
-    content.next_bgr = frame(frames.next);
-  }
+  SampleFrames frames = state_->frames_of(sample);
+  content.previous_bgr = std::move(frames.previous_bgr);
+  content.next_bgr = std::move(frames.next_bgr);
+  const bool is_made = state_->is_made(sample);
   const FramePair& pair = sample.pair;
   const auto moving = std::ranges::count_if(
       pair.objects, [](const auto& motion) { return motion && *motion != ImageMotion(); });

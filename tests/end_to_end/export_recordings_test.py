@@ -1,10 +1,14 @@
 """Exports of whole recordings, DSEC's, RVT's, Prophesee's and DV's, read as these read them: with numpy and h5py, or
 as their pages describe the bytes."""
 
+import importlib
 import json
 import pathlib
 import shutil
+import sys
 import tempfile
+import types
+import unittest.mock
 
 import h5py
 import numpy as np
@@ -15,11 +19,13 @@ import exported_demo as demo
 import program
 import small_job
 from camera_files import volume_of
+from dsec_sequence import DsecSequence, half_size
 from exported_demo import Export, of, read_samples
 from program import run
 from rvt_sequence import GEN1, GEN4, RvtSequence, frame_times, kept_boxes, stacked_histogram
 
 setUpModule, tearDownModule = demo.set_up, demo.tear_down
+READERS = program.SHARED.parent / "readers"
 
 # Prophesee's boxes, as RVT's utils/evaluation/prophesee/io/box_loading.py has them.
 BBOX_DTYPE = np.dtype({"names": ["t", "x", "y", "w", "h", "class_id", "track_id", "class_confidence"],
@@ -148,15 +154,36 @@ class Recordings(Export):
                     self.assertLess(before[2], after[2])
                 for window in windows:
                     self.check_volume(slice_dsec(file, *window[:2]), window, known[path.parent.name, window[4]])
-            tracks = path / "object_detections" / "left" / "tracks.npy"
-            if tracks.exists():
-                rows = np.load(tracks)
-                self.assertEqual(rows.dtype, TRACKS_DTYPE)
+                size = file.attrs["height"], file.attrs["width"]
+            self.assertEqual(size, known[path.parent.name, windows[0][4]]["volume"].shape[1:])
+            self.check_half_size(path / "events" / "left", size)
+            images = sorted((path / "images" / "left" / "distorted").iterdir())
+            self.assertEqual([image.name for image in images], [f"{i:06d}.png" for i in range(len(times))])
+            for image in images:
+                with PIL.Image.open(image) as opened:
+                    self.assertEqual((opened.height, opened.width, opened.mode), (*size, "RGB"))
+            if (path / "object_detections").exists():
+                sequence = DsecSequence(path)
+                self.assertEqual(sequence.tracks.dtype, TRACKS_DTYPE)
+                self.assertEqual(sum(sequence.counts), len(sequence.tracks))
                 for window in windows:
-                    self.check_boxes(rows[rows["t"] == window[2]], known[path.parent.name, window[4]], window[2])
+                    boxes = sequence.boxes(list(times).index(window[2]))
+                    self.check_boxes(boxes, known[path.parent.name, window[4]], window[2])
             seen += [(path.parent.name, window[4]) for window in windows]
         self.assertEqual(len(seen), len(set(seen)))
         return seen
+
+    def check_half_size(self, folder, size):
+        """events_2x.h5 against events.h5, whose index it has for its own events."""
+        columns, half = (read_columns(folder / name) for name in ("events.h5", "events_2x.h5"))
+        for found, expected in zip(half, half_size(columns, size)):
+            np.testing.assert_array_equal(found, expected)
+        with h5py.File(folder / "events.h5") as file, h5py.File(folder / "events_2x.h5") as half_file:
+            self.assertEqual((half_file.attrs["height"], half_file.attrs["width"]), (size[0] // 2, size[1] // 2))
+            self.assertEqual(half_file["t_offset"][()], file["t_offset"][()])
+            self.assertEqual(len(half_file["ms_to_idx"]), len(file["ms_to_idx"]))
+            np.testing.assert_array_equal(half_file["ms_to_idx"][:], np.searchsorted(
+                half_file["events/t"][:], np.arange(len(file["ms_to_idx"])) * 1000))
 
     def test_dsec(self):
         self.export("dsec", "--counts", "rounded")
@@ -188,6 +215,8 @@ class Recordings(Export):
                 pairs = self.samples[sample_id]["pairs"]
                 self.assertEqual((begin, end, label), tuple(int(pairs[key]) * 10 ** 5
                                                             for key in ("prev_index", "next_index", "label_index")))
+            for time, image in self.images_of(self.out / "dsec" / "train" / name):
+                np.testing.assert_array_equal(image, self.frame(name, time))
         # There are no more recordings than windows at one time.
         most = max(sum(begin < time < end for name, windows in recordings.items() if name.startswith("0000")
                        for begin, end, *_ in windows)
@@ -199,6 +228,81 @@ class Recordings(Export):
         self.assertEqual(left_out["boxes to ignore"],
                          sum((s["boxes"]["ignore"] == 1).sum() for s in self.samples.values()))
         self.assertEqual(len(self.described()["quarantined"]), 6)
+
+    @staticmethod
+    def images_of(recording):
+        """Each line of timestamps.txt with its image."""
+        times = (recording / "images" / "timestamps.txt").read_text().split()
+        for time, path in zip(times, sorted((recording / "images" / "left" / "distorted").iterdir())):
+            with PIL.Image.open(path) as image:
+                yield int(time), np.asarray(image)
+
+    def frame(self, recording, time_us, drive=None):
+        """The drive's, in three equal channels."""
+        folder = (drive or self.drive) / "image_02" / recording.split("~")[0]
+        with PIL.Image.open(folder / f"{time_us // 100_000:06d}.png") as image:
+            return np.asarray(image.convert("RGB"))
+
+    def test_dsec_has_the_labelled_frame_where_it_lies_between_a_pair(self):
+        drive = self.out.parent / "drive"
+        shutil.copytree(self.drive, drive)
+        source = {"dataset": "kitti_tracking", "root": "drive", "pairs": program.pairs([2], side="around")}
+        source = self.converted(source, errors=small_job.LENIENT)
+        _, err = self.export("dsec", "--counts", "rounded", source=source, expect=66)
+        self.assertIn("image_02/0000/000008.png", err)  # others that have it are in quarantine
+        small_job.save_image(drive / "image_02" / "0000" / "000008.png", np.random.default_rng(8))
+        self.export("dsec", "--counts", "rounded", source=source)
+        known = {(key[0], key[2]): sample for key, sample in read_samples(source).items()}
+        self.assertEqual(sorted(self.check_dsec(known)), sorted(known))
+        for recording in (self.out / "dsec" / "train").iterdir():
+            for begin, end, label, _, _ in read_windows(recording / "windows.txt"):
+                self.assertEqual((label - begin, end - label), (100_000, 100_000))
+            for time, image in self.images_of(recording):
+                np.testing.assert_array_equal(image, self.frame(recording.name, time, drive))
+
+    def test_dsec_goes_without_frames_that_are_gone(self):
+        frames = self.converted_frames("", range(4))
+        moved = self.out.parent / "elsewhere"
+        moved.mkdir()
+        (self.out.parent / "clip").rename(moved / "clip")
+        said, _ = self.export("dsec", source=frames)
+        self.assertRegex(said, r"note: no images of frames in split train: .*clip/\d{4}\.png.*--frames names the")
+        recording = self.out / "dsec" / "train" / "clip"
+        self.assertEqual({path.name for path in (recording / "images").iterdir()}, {"timestamps.txt"})
+        self.export("dsec", "--frames", moved, "--overwrite", source=frames)
+        times = [time for time, _ in self.images_of(recording)]
+        self.assertEqual(times, [0, 1_000_000, 2_000_000, 3_000_000])
+        # A source that has its frames does not lose one in silence.
+        (moved / "clip" / "0002.png").unlink()
+        shutil.rmtree(self.out)
+        _, err = self.export("dsec", "--frames", moved, source=frames, expect=66)
+        self.assertIn("clip/0002.png", err)
+
+    def test_dsec_det_reads_it(self):
+        if not READERS.is_dir():
+            self.skipTest("no ../shared/readers")
+        self.export("dsec", source=self.source)
+        stubs = {name: types.ModuleType(name) for name in ("hdf5plugin", "numba", "seaborn")}
+        stubs["numba"].jit = lambda **_: lambda function: function
+        stubs["seaborn"].color_palette = lambda _, count: np.linspace([0, 0, 0], [1, 1, 1], count)
+        path = [str(READERS / "dsec_det" / "src"), *sys.path]
+        with unittest.mock.patch.dict(sys.modules, stubs), unittest.mock.patch.object(sys, "path", path):
+            dataset = importlib.import_module("dsec_det.dataset")
+            opened = dataset.DSECDet(self.out / "dsec", "train", "back", debug=True)
+            boxes = place = 0
+            for folder in opened.subsequence_directories:
+                sequence = DsecSequence(folder)
+                self.assertEqual(len(sequence.images), len(sequence.times))
+                for i in range(len(sequence.times) - 1):
+                    sample, place = opened[place], place + 1
+                    self.assertEqual(sample["tracks"].tobytes(), sequence.boxes(i).tobytes())
+                    for name, column in zip("txyp", sequence.events(i)):
+                        np.testing.assert_array_equal(sample["events"][name], column)
+                    np.testing.assert_array_equal(sample["image"], self.frame(folder.name, sequence.times[i]))
+                    boxes += len(sample["tracks"])
+                boxes += len(sequence.boxes(len(sequence.times) - 1))  # which begins no sample
+            self.assertEqual(place, len(opened))
+        self.assertEqual(boxes, sum((sample["boxes"]["ignore"] == 0).sum() for sample in self.samples.values()))
 
     def converted(self, source, **changes):
         """The finalized folder of a job of one source."""

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "pipeline/exports/detail/exporter.h"
+#include "pipeline/preview/preview_reader.h"
 #include "stages/recordings/writers/event_columns_writer.h"
 
 namespace eventgan {
@@ -70,8 +70,7 @@ struct RecordedSample {
   // Where the exporter keeps them:
   std::string name;           ///< of the sample's own files
   std::vector<float> volume;  ///< [2 bins, H, W]
-  /// Previous and next, [y, x] or [y, x, channel] uint8 (blue, green, red); empty: there is none.
-  std::array<std::vector<std::uint8_t>, 2> frames;
+  SampleFrames frames;
   PixelFlow flow;  ///< empty: there is none
 };
 

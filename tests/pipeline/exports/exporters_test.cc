@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -34,9 +35,12 @@ namespace eventgan {
 namespace {
 
 using nlohmann::json;
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::DoubleNear;
+using ::testing::Each;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::Pointwise;
 using ::testing::UnorderedElementsAre;
 
@@ -48,6 +52,8 @@ constexpr char kManifest[] = R"({
   "output": {"directory": "out", "samples_per_shard": 5}})";
 constexpr std::size_t kChannels = 4;
 constexpr std::size_t kPixels = 6 * 8;
+constexpr int kLevel = 100;
+constexpr float kTimes = 8;
 
 std::vector<double> numbers(const TypedArray& array) {
   std::vector<double> values;
@@ -93,7 +99,11 @@ std::string tar_content(const std::filesystem::path& tar, const std::string& nam
 class Exporters : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    converted_ = std::make_unique<testing::ConvertedFolder>();
+    converted_ = std::make_unique<testing::ConvertedFolder>(0);
+    for (int shard = 0; shard < 4; ++shard) {
+      converted_->add(
+          shard, [](testing::ExampleShard& example) { example.header.manifest_text = kManifest; });
+    }
     finalize(converted_->path(), {});
   }
   static void TearDownTestSuite() { converted_.reset(); }
@@ -108,6 +118,38 @@ class Exporters : public ::testing::Test {
     options.threads = 2;
     run_export(converted.path(), options);
     return options.out;
+  }
+
+  /// The same of samples of kTimes as many events whose frames are there, kLevel all over, and as
+  /// large as the volumes.
+  std::filesystem::path exported_with_frames(std::string_view word) {
+    // No still, which would be moved again.
+    testing::ConvertedFolder converted(0);
+    for (int shard = 0; shard < 4; ++shard) {
+      converted.add(shard, [](testing::ExampleShard& example) {
+        example.header.manifest_text = kManifest;
+        for (std::vector<float>& volume : example.volumes) {
+          for (float& value : volume) value *= kTimes;
+        }
+        for (ShardSample& sample : example.samples) {
+          sample.source_size = {6, 8};
+          sample.pair.previous.video_frame = sample.pair.next.video_frame = FrameRef().video_frame;
+          if (!sample.pair.motion) continue;
+          sample.pair.motion.reset();
+          sample.pair.previous.path = "kitti/prev_2/000004_02.png";
+        }
+      });
+    }
+    finalize(converted.path(), {});
+    ExportOptions options;
+    options.frames = folder_ / "frames";
+    for (const char* image :
+         {"prev_2/000000_02", "image_2/000000", "prev_2/000001_02", "image_2/000001",
+          "prev_2/000003_02", "image_2/000003", "prev_2/000004_02", "image_2/000004"}) {
+      testing::write_flat_image(options.frames / "kitti" / (std::string(image) + ".png"), {6, 8},
+                                kLevel);
+    }
+    return exported(word, options, converted);
   }
 
   /// The volume of a sample, [kChannels * kPixels].
@@ -135,9 +177,9 @@ class Exporters : public ::testing::Test {
   }
 
   /// Of a volume whose values are rounded to counts, the positive channels first.
-  static std::int64_t event_count(std::size_t slot) {
+  static std::int64_t event_count(std::size_t slot, float times = 1) {
     std::int64_t count = 0;
-    for (const float value : volume(slot)) count += std::lround(value);
+    for (const float value : volume(slot)) count += std::lround(times * value);
     return count;
   }
 
@@ -388,31 +430,7 @@ class RecordingExporters : public Exporters, public ::testing::WithParamInterfac
 
 TEST_P(RecordingExporters, HaveTheBoxOfTheSequenceAndItsEvents) {
   const RecordingCase& format = GetParam();
-  // Frames are scaled to the volume, as the manifest says, and no still, which would be moved
-  // again.
-  testing::ConvertedFolder converted(0);
-  for (int shard = 0; shard < 4; ++shard) {
-    converted.add(shard, [](testing::ExampleShard& example) {
-      example.header.manifest_text = kManifest;
-      for (ShardSample& sample : example.samples) {
-        sample.source_size = {6, 8};
-        sample.pair.previous.video_frame = sample.pair.next.video_frame = FrameRef().video_frame;
-        if (!sample.pair.motion) continue;
-        sample.pair.motion.reset();
-        sample.pair.previous.path = "kitti/prev_2/000004_02.png";
-      }
-    });
-  }
-  finalize(converted.path(), {});
-  ExportOptions options;
-  options.frames = folder_ / "frames";
-  for (const char* image :
-       {"prev_2/000000_02", "image_2/000000", "prev_2/000001_02", "image_2/000001",
-        "prev_2/000003_02", "image_2/000003", "prev_2/000004_02", "image_2/000004"}) {
-    testing::write_flat_image(options.frames / "kitti" / (std::string(image) + ".png"), {6, 8},
-                              100);
-  }
-  const std::filesystem::path out = exported(format.word, options, converted);
+  const std::filesystem::path out = exported_with_frames(format.word);
   // The pair lies between 1.0 s and 1.2 s, where its label is.
   EXPECT_THAT(records(out / format.boxes, {"t", "x", "y", "w", "h", "class_id", "track_id"}),
               ElementsAre(ElementsAre(format.t_us), ElementsAre(1), ElementsAre(1),
@@ -420,11 +438,11 @@ TEST_P(RecordingExporters, HaveTheBoxOfTheSequenceAndItsEvents) {
   const std::filesystem::path events = out / format.events;
   if (events.extension() == ".h5") {
     EXPECT_EQ(read_hdf5_arrays(events).arrays.at("events/x").size(),
-              static_cast<std::size_t>(event_count(0)));
+              static_cast<std::size_t>(event_count(0, kTimes)));
   } else {
     const auto recording = open_recording(events);
     const std::vector<Event> all = recording->events_in(-1, 10);
-    EXPECT_EQ(std::ssize(all), event_count(0));
+    EXPECT_EQ(std::ssize(all), event_count(0, kTimes));
   }
 }
 
@@ -451,6 +469,57 @@ TEST_F(Exporters, RvtTakesHistogramsAndVolumesAlone) {
   }
   // A box of 3 pixels is smaller than RVT takes.
   EXPECT_FALSE(std::filesystem::exists(exported("rvt") / "preprocessed"));
+}
+
+TEST_F(Exporters, DsecHasAnImageForEachTimeAndTheEventsAtHalfTheSize) {
+  const std::filesystem::path drive = exported_with_frames("dsec") / "dsec/val/drive_0";
+  EXPECT_EQ(testing::read_file(drive / "images/timestamps.txt"), "1000000\n1200000\n");
+  for (const char* name : {"000000.png", "000001.png"}) {
+    const ColourFrame image = decode_image_file(drive / "images/left/distorted" / name);
+    EXPECT_EQ(image.size, (ImageSize{6, 8}));
+    EXPECT_THAT(image.bgr, Each(kLevel));
+  }
+  EXPECT_FALSE(std::filesystem::exists(drive / "images/left/distorted/000002.png"));
+
+  const Hdf5Arrays all = read_hdf5_arrays(drive / "events/left/events.h5");
+  const Hdf5Arrays half = read_hdf5_arrays(drive / "events/left/events_2x.h5");
+  const auto column = [](const Hdf5Arrays& file, const std::string& name) {
+    return numbers(file.arrays.at(name));
+  };
+  // Where the sum of polarities of 2 x 2 pixels is 4 more, or less, than at the last such event.
+  std::map<std::pair<double, double>, int> sums;
+  std::vector<std::vector<double>> expected(4);
+  for (std::size_t i = 0; i < column(all, "events/t").size(); ++i) {
+    const auto at = [&](const char* name) { return column(all, name)[i]; };
+    const std::pair place(std::floor(at("events/x") / 2), std::floor(at("events/y") / 2));
+    sums[place] += at("events/p") == 1 ? 1 : -1;
+    if (sums[place] % 4 != 0 || sums[place] == 0) continue;
+    sums[place] = 0;
+    const double row[] = {place.first, place.second, at("events/t"), at("events/p")};
+    for (std::size_t k = 0; k < 4; ++k) expected[k].push_back(row[k]);
+  }
+  EXPECT_FALSE(expected[0].empty());
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(column(half, std::string("events/") + "xytp"[k]), expected[k]);
+  }
+  EXPECT_EQ(column(half, "t_offset"), column(all, "t_offset"));
+  EXPECT_EQ(column(half, "ms_to_idx").size(), column(all, "ms_to_idx").size());
+  EXPECT_EQ(column(half, "ms_to_idx").back(), static_cast<double>(expected[0].size()));
+}
+
+TEST_F(Exporters, DsecGoesWithoutFramesThatAreGoneAndSaysSo) {
+  ExportOptions options;
+  options.to = &*std::ranges::find(export_formats(), "dsec", &ExportFormat::word);
+  options.out = folder_ / "out";
+  options.splits = {"val"};
+  for (int turn = 0; turn < 2; ++turn) {  // what is done already says it, too
+    EXPECT_THAT(run_export(converted_->path(), options).notes,
+                Contains(AllOf(HasSubstr("no images of kitti_object in split val: "),
+                               HasSubstr("prev_2/000000_02.png"), HasSubstr("--frames names"))));
+  }
+  const std::filesystem::path images = folder_ / "out/dsec/val/drive_0/images";
+  EXPECT_FALSE(std::filesystem::exists(images / "left"));
+  EXPECT_EQ(testing::read_file(images / "timestamps.txt"), "1000000\n1200000\n");
 }
 
 TEST_F(Exporters, RvtHasTheVolumeWithTheNegativePolarityFirst) {
