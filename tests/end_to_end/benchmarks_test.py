@@ -118,6 +118,9 @@ def folded(state):
 
 
 if __name__ == "__main__":
+    if "EVENTGAN_NIGHTLY" not in os.environ:
+        print("skipped: of .ci/run nightly (EVENTGAN_NIGHTLY)")
+        raise SystemExit(program.SKIPPED)
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
         print(f"skipped: no {', '.join(missing)} (docker/bootstrap.sh packages benchmark)")

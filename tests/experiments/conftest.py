@@ -11,6 +11,9 @@ EXPERIMENTS = pathlib.Path(__file__).resolve().parent
 SOURCE = EXPERIMENTS.parents[1]
 DATA = pathlib.Path(os.environ.get("EVENTGAN_TEST_DATA", SOURCE.parent / "shared" / "data"))
 
+# What trains networks takes minutes.
+nightly = pytest.mark.skipif("EVENTGAN_NIGHTLY" not in os.environ, reason="of .ci/run nightly (EVENTGAN_NIGHTLY)")
+
 
 def part_of_data(folder, count):
     """A folder as labelled_frames with the first images of each set."""

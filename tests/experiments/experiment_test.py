@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import EXPERIMENTS, SOURCE
+from conftest import EXPERIMENTS, SOURCE, nightly
 
 from eventgan import Shards
 
@@ -49,6 +49,7 @@ def cars(tmp_path_factory):
     return out, run("detection", YOLO, out)
 
 
+@nightly
 @pytest.mark.parametrize(("what", "score", "names"), [("detection", "ap_voc", DETECTORS), ("pose", "pckh", POSES)])
 def test_the_experiments_in_small(tmp_path, request, what, score, names):
     out, said = request.getfixturevalue("cars") if what == "detection" else (tmp_path, run(what, POSE, tmp_path))
@@ -82,6 +83,7 @@ def test_the_experiments_in_small(tmp_path, request, what, score, names):
                                        atol=0.51)
 
 
+@nightly
 def test_the_trade_in_small(cars):
     out, before = cars
     said = run("trade", YOLO, out)

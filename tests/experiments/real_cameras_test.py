@@ -11,7 +11,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import DATA, EXPERIMENTS, part_of_data
+from conftest import DATA, EXPERIMENTS, nightly, part_of_data
 
 torch = pytest.importorskip("torch")
 cv2 = pytest.importorskip("cv2")
@@ -208,6 +208,7 @@ def test_rows_are_those_of_one_thing_each():
     assert {name for row in rows for name in row.sources} == known
 
 
+@nightly
 def test_a_detector_that_learnt_from_photographs_finds_persons_in_real_events(tmp_path):
     if not (DATA / "labelled_frames").is_dir() or not (DATA / "real_labels").is_dir():
         pytest.skip("no ../shared/data")

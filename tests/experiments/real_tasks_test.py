@@ -14,7 +14,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import DATA, EXPERIMENTS, part_of_data
+from conftest import DATA, EXPERIMENTS, nightly, part_of_data
 
 torch = pytest.importorskip("torch")
 cv2 = pytest.importorskip("cv2")
@@ -274,6 +274,7 @@ def test_only_the_last_layer_is_tuned_and_parts_are_what_they_say(tmp_path, monk
     assert changed == {"maps.weight", "maps.bias"}
 
 
+@nightly
 @pytest.mark.parametrize("task", ["cars", "joints"])
 def test_what_learnt_from_photographs_finds_something_in_real_events(tmp_path, task):
     if not (DATA / "labelled_frames").is_dir() or not (DATA / "real_labels").is_dir():

@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import DATA, EXPERIMENTS
+from conftest import DATA, EXPERIMENTS, nightly
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("cv2")
@@ -173,6 +173,7 @@ def test_no_scene_is_learnt_from_and_tested_on(tmp_path):
         self_supervised.halves_of([tmp_path / "b_1.hdf5", tmp_path / "b_2.hdf5"])
 
 
+@nightly
 def test_a_small_run_fills_the_table_and_goes_on(recording_folder, tmp_path):
     def run(*more, expect=0):
         done = subprocess.run([sys.executable, EXPERIMENTS / "self_supervised.py", "--program",

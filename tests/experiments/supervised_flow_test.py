@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import EXPERIMENTS
+from conftest import EXPERIMENTS, nightly
 
 pytest.importorskip("torch")
 pytest.importorskip("matplotlib")
@@ -16,6 +16,7 @@ pytest.importorskip("h5py")
 cv2 = pytest.importorskip("cv2")
 
 
+@nightly
 def test_a_small_run_fills_the_table_and_goes_on(recording_folder, tmp_path):
     random, images = np.random.default_rng(1), tmp_path / "photos" / "images"
     images.mkdir(parents=True)
