@@ -67,6 +67,12 @@ class CommandLine(program.InFolder):
                      "| `recordings[].path` | path | required | ", "## eventgan sensor, version 1"]:
             self.assertIn(f"\n{line}", page)
 
+    def test_help_representations_has_a_row_for_each(self):
+        page, _ = run("help", "representations")
+        rows = re.findall(r"(?m)^(\w+)(?::([A-Z]+))?  (uint8|float32) (\[.*\])$", page)
+        self.assertIn(("histogram", "T", "uint8", "[2 T, H, W]"), rows)
+        self.assertEqual(len(rows), page.count("\n    for "))
+
     def test_version_names_the_libraries(self):
         version, libraries, engines, processor = run("--version")[0].splitlines()
         self.assertRegex(version, r"^eventgan \d+\.\d+\.\d+$")
