@@ -27,7 +27,7 @@ const RepresentationRow& row_of(RepresentationKind kind) {
 /// The least and the greatest number of a row.
 std::array<double, 2> numbers_allowed(std::string_view symbol) {
   if (symbol == "TAU") return {1e-6, 1e6};
-  return {1, symbol == "K" ? 49 : 64};
+  return {1, symbol == "K" ? 49.0 : 64.0};
 }
 
 std::size_t pixel_of(const Event& event, ImageSize size) {
