@@ -384,7 +384,10 @@ def represent(events: Any, representation: str, *, size: tuple[int, int],
     times = columns[0]
     unit = 1.0 if times.dtype.kind == "f" else 1e-6
     if window_s is not None:
-        begin, end = (float(side) for side in window_s)
+        ends_s = _numbers(window_s, "window_s")
+        if ends_s.shape != (2,):
+            raise ValueError(f"expected a window of two times, got {window_s!r} for window_s")
+        begin, end = ends_s.tolist()
         within = slice(np.searchsorted(times, begin / unit), np.searchsorted(times, end / unit, side="right"))
         columns = [column[within] for column in columns]
     rows = np.zeros(len(columns[0]), _engine.EVENT)

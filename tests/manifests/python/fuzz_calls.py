@@ -102,6 +102,28 @@ class Calls:
         return self.pick([None, numbers, np.sort(numbers), numbers.tolist(), numbers[:, :3], np.full((2, 4), np.nan),
                           np.full((1, 4), 1e308), "boxes", {}])
 
+    def represent(self):
+        """Events, mostly in time order and within the image."""
+        count = self.pick([0, 1, 5, 300])
+        events = np.zeros(count, [("t", self.pick(["f8", "i8", "f4", "u4"])), ("x", "i4"), ("y", "u2"), ("p", "i1")])
+        events["t"] = np.sort(self.random.integers(0, 10**6, count))
+        events["x"], events["y"] = self.random.integers(0, 20, count), self.random.integers(0, 16, count)
+        events["p"] = self.random.integers(-1, 2, count)
+        if count and self.random.random() < 0.2:
+            row = self.random.integers(count)
+            name, value = self.pick([("t", -1 if events["t"].dtype.kind == "i" else 0), ("x", -1), ("x", 2**31 - 1),
+                                     ("y", 65535), ("p", 127)])
+            events[name][row] = value
+        array = eventgan.represent(
+            self.pick([events] * 8 + [events[::2], events[["x", "y"]], {name: events[name] for name in "txyp"}, None,
+                                      3]),
+            self.pick(["histogram:10", "voxel:5", "voxel_normalized:3", "volume:2", "count", "time_surface:0.1",
+                       "eros:8", "eros:49", "histogram:0", "count:1", "", "a\0b", None]),
+            size=self.pick([(16, 20)] * 6 + [(1, 1), (15, 20), (0, 20), (2**31 - 1, 2**31 - 1), (16,), "16",
+                                             (16, 2.5)]),
+            window_s=self.pick([None, None, (0, 1), (0, 0), (1, 0), (-1e300, 1e300), (np.nan, 1), (0, np.inf), 5]))
+        assert np.isfinite(array).all()
+
     def settings(self):
         """Few of them wrong, so that some generators come to be."""
         keys = self.random.permutation(list(SETTINGS))[: self.random.integers(1, 5)]
@@ -120,6 +142,9 @@ class Calls:
             eventgan.sample_events(volume, duration_s=self.pick([1, 0.1, 0, -1, np.nan, 1e-300]),
                                    seed=self.pick([0, 1, 2**31, -1, "x"]),
                                    counts=self.pick(["poisson", "rounded", "x"]))
+            return
+        if kind == 2 and self.random.random() < 0.5:
+            self.represent()
             return
         if kind == 2:
             generator.source_to_volume(self.pick([1, 50, 0, -1, 1.5, 2**40]), self.pick([1, 50, 0, "x"]))

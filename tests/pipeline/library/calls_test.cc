@@ -194,6 +194,32 @@ TEST(SampledEvents, AreOfAVolumeThatFitsIntoMemory) {
   EXPECT_STREQ(eventgan_error(), "expected finite values >= 0, got -1e-45");
 }
 
+TEST(Represented, AreOfAsManyValuesAsFit) {
+  const eventgan_event events[] = {{0, 0, 0, 1}, {1, 1, 0, 0}};
+  std::int32_t channels = -1, number = -1;
+  std::array<std::uint8_t, 8> values{};
+  const auto represent = [&](const char* word, int height, void* to, std::uint64_t size) {
+    return eventgan_represent(events, 2, word, height, 2, nullptr, &channels, &number, to, size);
+  };
+  EXPECT_EQ(represent("histogram:2", 1, values.data(), 8), EVENTGAN_COMPLETE);
+  EXPECT_EQ(channels, 4);
+  EXPECT_EQ(number, EVENTGAN_UINT8);
+  // Negative bins first; the last event is in the last bin.
+  EXPECT_EQ(values, (std::array<std::uint8_t, 8>{0, 0, 0, 1, 1, 0, 0, 0}));
+  EXPECT_EQ(represent("eros:3", 1, nullptr, 0), EVENTGAN_COMPLETE);
+  EXPECT_EQ(channels, 0);
+  const std::tuple<const char*, int, std::uint64_t, const char*> refused[] = {
+      {"histogram:2", 1, 7, "expected room for 8 bytes, got 7"},
+      {"histogram:2", 0, 8, "expected a size of 1 x 1 or more"},
+      {"histogram:64", 1 << 24, 8, "and at most 1073741824 values"},
+      {"rows:2", 1, 8, "expected a representation of volume:B"},
+      {nullptr, 1, 8, "expected a representation, got NULL"}};
+  for (const auto& [word, height, size, message] : refused) {
+    EXPECT_EQ(represent(word, height, values.data(), size), EVENTGAN_USAGE);
+    EXPECT_THAT(eventgan_error(), ::testing::HasSubstr(message));
+  }
+}
+
 TEST_F(Calls, MakeNoMoreThanTheyAreAskedFor) {
   std::vector<float> made(expected_.size(), -1);
   std::int64_t next = 0;
