@@ -7,7 +7,6 @@ import errno
 import functools
 import json
 import os
-import pathlib
 import re
 import warnings
 from collections.abc import Iterable, Mapping
@@ -15,6 +14,8 @@ from typing import Any, Union
 
 import h5py
 import numpy as np
+
+from .remote import Place, RemotePath, close_at_exit, place
 
 FORMAT, FORMAT_VERSION = "eventgan-shard", "1.0"
 FEATURES = frozenset(("tiles", "times", "origin", "motion", "threshold", "projection", "flow", "difficulty",
@@ -49,7 +50,7 @@ def _engine_if_any() -> Any:
 class OpenShard:
     """A shard's open file, and the columns read from it."""
 
-    def __init__(self, path: pathlib.Path, kept: _Kept) -> None:
+    def __init__(self, path: Place, kept: _Kept) -> None:
         self.file = open_shard(path)
         self._kept = kept
         self._volume = self.file["events/volume"]
@@ -148,14 +149,14 @@ class OpenShards:
     """The shards open in this process, of which the least recently used is closed first,
     and the columns read from all of them."""
 
-    _open: collections.OrderedDict[pathlib.Path, OpenShard]
+    _open: collections.OrderedDict[Place, OpenShard]
     _process: int
 
     def __init__(self, most: int) -> None:
         self._most = most
         self._forget()
 
-    def __getitem__(self, path: pathlib.Path) -> OpenShard:
+    def __getitem__(self, path: Place) -> OpenShard:
         if self._process != os.getpid():  # HDF5's handles do not survive a fork; columns do
             self._open, self._process = collections.OrderedDict(), os.getpid()
         if path not in self._open:
@@ -181,16 +182,17 @@ class OpenShards:
 
     def _forget(self) -> None:
         self._open = collections.OrderedDict()
-        self._kept: dict[pathlib.Path, _Kept] = collections.defaultdict(_Kept)
+        self._kept: dict[Place, _Kept] = collections.defaultdict(_Kept)
         self._process = os.getpid()
 
 
-def open_shard(path: PathLike) -> h5py.File:
+def open_shard(path: PathLike | RemotePath) -> h5py.File:
     """Opens a shard.
 
     Parameters
     ----------
     path : str or path
+        A file, or a URL that fsspec knows.
 
     Returns
     -------
@@ -205,13 +207,19 @@ def open_shard(path: PathLike) -> h5py.File:
     ValueError
         It is of another kind or major version.
     """
-    if not os.path.exists(path):
+    path = place(path)
+    source: Any = path
+    if isinstance(path, RemotePath):
+        source = path.open()
+    elif not os.path.exists(path):
         raise FileNotFoundError(errno.ENOENT, "expected a folder of shards, or a shard, got no such file",
                                 os.fspath(path))
     try:
-        file = h5py.File(path, "r", rdcc_nbytes=0)  # each volume is one chunk: a cache is of no use
+        file = h5py.File(source, "r", rdcc_nbytes=0)  # each volume is one chunk: a cache is of no use
     except OSError as error:
         raise OSError(f"expected a shard, got what HDF5 does not open ({error}), in {path}") from error
+    if source is not path:
+        close_at_exit(file)
     try:
         check_version(file.attrs, "format_version", FORMAT, FORMAT_VERSION, path)
     except ValueError:
@@ -220,7 +228,7 @@ def open_shard(path: PathLike) -> h5py.File:
     return file
 
 
-def check_version(found: Mapping[str, Any], key: str, name: str, version: str, path: PathLike) -> None:
+def check_version(found: Mapping[str, Any], key: str, name: str, version: str, path: Place) -> None:
     """Takes every minor version of this major one, and warns once of each feature that is not known."""
     major = version.partition(".")[0]
     got = found.get("format"), found.get(key)

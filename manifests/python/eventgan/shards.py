@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import collections
+import concurrent.futures
+import contextlib
 import copy
 import functools
 import hashlib
 import html
 import json
 import os
-import pathlib
 import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -19,6 +20,7 @@ import numpy as np
 
 from .open_shards import OpenShard, OpenShards, PathLike, Sample, check_version
 from .outlines import mask
+from .remote import Place, RemotePath, place
 from .words import did_you_mean, path_of
 
 PLAN = "plan.json"
@@ -44,9 +46,10 @@ class Shards(Sequence):
     Parameters
     ----------
     paths : str, path or iterable of them
-        A folder, its dataset.h5, one shard, or a list of shards. Of a folder that `eventgan finalize` has completed:
-        the shards that its dataset.json lists, in the order of the plan. Of any other folder: all finished shards,
-        those with a commit record, by name.
+        A folder, its dataset.h5, one shard, or a list of shards, also as URLs that fsspec knows (a shard's ends in
+        .h5). Of a folder that `eventgan finalize` has completed: the shards that its dataset.json lists, in the order
+        of the plan. Of any other folder, of a URL only where the server lists it: all finished shards, those with a
+        commit record, by name.
     split : str, optional
         Only the shards of this split ("train"...).
     ids : str, path or iterable of str, optional
@@ -67,9 +70,12 @@ class Shards(Sequence):
         False leaves a volume as it is stored (uint8, float16 or float32) with its `scale` beside it, to be decoded
         elsewhere: value = stored number x scale.
     open_files : int, default 128
-        How many shards stay open at a time (about half a megabyte each).
+        How many shards stay open at a time (about half a megabyte each, of a URL one).
     partial : bool, default False
         True takes the finished shards of an incomplete folder.
+    cache : str or path, optional
+        Of URLs: a folder that keeps what was read, in blocks of 256 KiB, for all processes and for ever; it may be
+        deleted.
 
     Raises
     ------
@@ -78,22 +84,27 @@ class Shards(Sequence):
         name of a shard. Without `partial`: dataset.json or plan.json lists a shard that is missing, one has no commit
         record, or a commit record has no shard. A split, an id or a value that no sample (of the split) has, so that
         nothing is missing in silence; also a class that has a name but no box that counts.
+    OSError
+        Also while reading: what was read of a URL is not the whole of what was asked for, or of a file that has been
+        replaced since.
+    ImportError
+        fsspec is not there, or what it needs for this kind of URL.
     """
 
-    def __init__(self, paths: PathLike | Iterable[PathLike], *, split: str | None = None,
+    def __init__(self, paths: PathLike | RemotePath | Iterable[PathLike | RemotePath], *, split: str | None = None,
                  ids: PathLike | Iterable[str] | None = None, where: Mapping[str, Any] | None = None,
                  invalid: str = "skip", fields: Iterable[str] = FIELDS, decode: bool = True, open_files: int = 128,
-                 partial: bool = False) -> None:
+                 partial: bool = False, cache: PathLike | None = None) -> None:
         _one_of("invalid", [invalid], ("skip", "raise", "keep"))
         if open_files < 1:
             raise ValueError(f"expected open_files of at least 1, got {open_files}")
         self._invalid, self._fields, self._decode = invalid, _known_fields(fields), decode
         self._changes: tuple[Callable[[Sample], np.ndarray], ...] = ()
         self._files = OpenShards(open_files)
-        if not isinstance(paths, (str, os.PathLike)):
+        if not isinstance(paths, (str, os.PathLike, RemotePath)):
             paths = list(paths) if isinstance(paths, Iterable) else path_of(paths, "a folder of shards, or a shard")
         self._described_as = str(paths)
-        shards = _find_shards(paths, partial)
+        shards = _find_shards(paths, partial, cache)
         self._all_paths = [shard.path for shard in shards]
         if split is not None:
             splits = [self._split(shard) for shard in shards]
@@ -493,7 +504,7 @@ class Shards(Sequence):
         rows["quarantined"] = f"{self._quarantined:,} in these shards"
         return rows
 
-    def _place(self, index: int) -> tuple[pathlib.Path, int]:
+    def _place(self, index: int) -> tuple[Place, int]:
         if not -len(self) <= index < len(self):
             raise IndexError(f"expected a sample of {len(self)}, got number {index}, in {self._described_as}")
         return self.paths[self._shard[index]], int(self._slot[index])
@@ -532,8 +543,7 @@ class Shards(Sequence):
         source = "ids"
         if isinstance(ids, (str, os.PathLike)):
             source = str(ids)
-            ids = [line.strip() for line in pathlib.Path(ids).read_text(encoding="utf-8-sig").splitlines()
-                   if line.strip()]
+            ids = [line.strip() for line in place(ids).read_text(encoding="utf-8-sig").splitlines() if line.strip()]
         wanted = dict.fromkeys(ids)
         names = [(name, _frame_of(name)) for name in self.column("sample_id")]
         self._require_known(wanted, {name for pair in names for name in pair}, "sample ids", source)
@@ -592,13 +602,13 @@ def _first(texts: Iterable[str], most: int = 5) -> str:
     return ", ".join(texts[:most]) + (", ..." if texts[most:] else "")
 
 
-def _record(path: PathLike) -> pathlib.Path:
-    return pathlib.Path(path).with_suffix(".json")
+def _record(path: Place) -> Place:
+    return path.with_suffix(".json")
 
 
-def _reason(path: pathlib.Path, slot: int) -> str:
+def _reason(path: Place, slot: int) -> str:
     reason = "quarantined"
-    if _record(path).exists():
+    with contextlib.suppress(OSError):
         for sample in json.loads(_record(path).read_text(encoding="utf-8"))["quarantined"]:
             if sample["slot"] == slot:
                 reason = f"quarantined: {sample['reason']} ({sample['sample_id']})"
@@ -606,47 +616,54 @@ def _reason(path: pathlib.Path, slot: int) -> str:
 
 
 class _Shard(NamedTuple):
-    path: pathlib.Path
+    path: Place
     split: str | None = None  # None: the file says it
     valid: np.ndarray | None = None  # bool, of each slot
 
 
-def _find_shards(paths: PathLike | list[PathLike], partial: bool) -> list[_Shard]:
-    shards = _listed_shards(paths, partial)
+def _find_shards(paths: PathLike | RemotePath | list[PathLike | RemotePath], partial: bool,
+                 cache: PathLike | None) -> list[_Shard]:
+    if isinstance(paths, list):
+        shards = [_Shard(place(path, cache)) for path in paths]
+    else:
+        shards = _listed_shards(place(paths, cache), partial)
     if not shards:
         raise ValueError(f"expected finished shards, got none, in {paths}")
     return shards
 
 
-def _listed_shards(paths: PathLike | list[PathLike], partial: bool) -> list[_Shard]:
-    if isinstance(paths, list):
-        return [_Shard(pathlib.Path(path)) for path in paths]
-    paths = pathlib.Path(paths)
-    if paths.name == VIEW and paths.is_file():
-        paths = paths.parent
-        if not (paths / DESCRIPTION).exists():
-            raise ValueError(f"expected {DESCRIPTION} beside {VIEW}, got none, in {paths}")
-    if not paths.is_dir():
-        return [_Shard(paths)]
-    if (paths / DESCRIPTION).exists():
-        return _described_shards(paths, partial)
-    done = [path.name for path in sorted(paths.glob("*.h5")) if _is_done(path)]
+def _listed_shards(folder: Place, partial: bool) -> list[_Shard]:
+    is_view = folder.name == VIEW and folder.is_file()
+    if is_view:
+        folder = folder.parent
+    if not folder.is_dir():
+        return [_Shard(folder)]
+    try:
+        return _described_shards(folder, read_description(folder), partial)
+    except FileNotFoundError:
+        if is_view:
+            raise ValueError(f"expected {DESCRIPTION} beside {VIEW}, got none, in {folder}") from None
+    try:
+        done = sorted(path.name for path in folder.glob("*.h5") if _is_done(path))
+    except OSError as error:
+        raise ValueError(f"expected {DESCRIPTION}, which eventgan finalize writes, or a list of the files, got neither "
+                         f"({error}), in {folder}") from error
     if not partial:
-        _require_whole(done, sorted(_expected_shards(paths).difference(done)), paths)
-    return [_Shard(paths / name) for name in done]
+        _require_whole(done, sorted(_expected_shards(folder).difference(done)), folder)
+    return [_Shard(folder / name) for name in done]
 
 
-def _expected_shards(folder: pathlib.Path) -> set[str]:
+def _expected_shards(folder: Place) -> set[str]:
     """The names of shards that are there, or planned, or have a commit record."""
     names = {path.name for path in folder.glob("*.h5")} - {VIEW}
     names.update(path.with_suffix(".h5").name for path in folder.glob("*.json")
                  if path.with_suffix(".h5").name not in names and _is_commit_record(path))
-    if (folder / PLAN).exists():
+    with contextlib.suppress(FileNotFoundError):
         names.update(shard["name"] for shard in json.loads((folder / PLAN).read_text(encoding="utf-8"))["shards"])
     return names
 
 
-def _is_commit_record(path: pathlib.Path) -> bool:
+def _is_commit_record(path: Place) -> bool:
     try:
         record = {} if path.name == PLAN else json.loads(path.read_text(encoding="utf-8"))
         return record.get("shard") == path.with_suffix(".h5").name
@@ -654,18 +671,19 @@ def _is_commit_record(path: pathlib.Path) -> bool:
         return False
 
 
-def _require_whole(done: Sequence[str], missing: Sequence[str], folder: pathlib.Path) -> None:
+def _require_whole(done: Sequence[str], missing: Sequence[str], folder: Place) -> None:
     if missing:
         raise ValueError(f"expected {len(done) + len(missing)} finished shards, got {len(missing)} unfinished "
                          f"({_first(missing)}), in {folder} (partial=True uses the others)")
 
 
-def read_description(folder: PathLike) -> dict[str, Any]:
+def read_description(folder: PathLike | RemotePath) -> dict[str, Any]:
     """dataset.json of a finalized folder.
 
     Parameters
     ----------
     folder : str or path
+        Also a URL.
 
     Returns
     -------
@@ -674,54 +692,57 @@ def read_description(folder: PathLike) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        It is of another major version.
+        It is of another major version, or no JSON.
     """
-    path = pathlib.Path(folder, DESCRIPTION)
-    description = json.loads(path.read_text(encoding="utf-8"))
+    path = place(folder) / DESCRIPTION
+    try:
+        description = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"expected JSON, got {error}, in {path}") from error
     check_version(description, "version", DESCRIPTION_FORMAT, DESCRIPTION_VERSION, path)
     return description
 
 
-def _described_shards(folder: pathlib.Path, partial: bool) -> list[_Shard]:
-    description = read_description(folder)
+def _described_shards(folder: Place, description: Mapping[str, Any], partial: bool) -> list[_Shard]:
     if not partial:
         _require_whole(description["shards"], description.get("missing", ()), folder)
-    shards, valid = [], {}
-    for entry in description["shards"]:
+    entries = description["shards"]
+    for entry in entries:
         if not SHARD_NAME.fullmatch(str(entry["name"])):
             raise ValueError(f"expected the name of a shard beside it, got {entry['name']!r}, in "
                              f"{folder / DESCRIPTION}")
-        path = folder / entry["name"]
-        if not _is_same(path, entry):
-            raise ValueError(f"expected the shard that {DESCRIPTION} describes, got another or none, in {path} "
-                             "(run eventgan convert, then eventgan finalize)")
-        valid[path.name] = np.ones(entry["samples"], bool)
-        shards.append(_Shard(path, entry["split"], valid[path.name]))
+    paths = [folder / entry["name"] for entry in entries]
+    with concurrent.futures.ThreadPoolExecutor(folder.at_once if isinstance(folder, RemotePath) else 1) as pool:
+        for path, is_same in zip(paths, pool.map(_is_same, paths, entries)):
+            if not is_same:
+                raise ValueError(f"expected the shard that {DESCRIPTION} describes, got another or none, in {path} "
+                                 "(run eventgan convert, then eventgan finalize)")
+    valid = {entry["name"]: np.ones(entry["samples"], bool) for entry in entries}
     for sample in description["quarantined"]:
         valid[sample["shard"]][sample["slot"]] = False
-    return shards
+    return [_Shard(path, entry["split"], valid[entry["name"]]) for path, entry in zip(paths, entries)]
 
 
-def _is_same(path: pathlib.Path, entry: Mapping[str, Any]) -> bool:
+def _is_same(path: Place, entry: Mapping[str, Any]) -> bool:
     """Whether the shard is the one that was described: by its size, and by its commit record if there is one."""
     try:
         if path.stat().st_size != entry["size_bytes"]:
             return False
-    except OSError:
+    except FileNotFoundError:
         return False
     try:
         return json.loads(_record(path).read_text(encoding="utf-8"))["sha256"] == entry["sha256"]
     except FileNotFoundError:
         return True
-    except (OSError, ValueError, KeyError):
+    except (ValueError, KeyError):
         return False
 
 
-def _is_done(path: pathlib.Path) -> bool:
+def _is_done(path: Place) -> bool:
     """Whether the shard is finished: the commit record beside it names it and has its size."""
     try:
         record = json.loads(_record(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (FileNotFoundError, ValueError):
         return False
     return record.get("shard") == path.name and record.get("size_bytes") == path.stat().st_size
 
