@@ -291,8 +291,8 @@ def _fsspec(path: RemotePath) -> Any:
         import fsspec
         import fsspec.asyn
     except ImportError as error:
-        raise ImportError(f"expected the package fsspec (pip install fsspec aiohttp, or Debian's python3-fsspec and "
-                          f"python3-aiohttp), got none, for {path}") from error
+        raise ImportError("expected the package fsspec (pip install fsspec[http], or Debian's python3-fsspec, "
+                          f"python3-aiohttp and python3-requests), got none, for {path}") from error
     return fsspec
 
 
