@@ -70,7 +70,7 @@ class Shards(Sequence):
         False leaves a volume as it is stored (uint8, float16 or float32) with its `scale` beside it, to be decoded
         elsewhere: value = stored number x scale.
     open_files : int, default 128
-        How many shards stay open at a time (about half a megabyte each, of a URL one).
+        How many shards stay open at a time (about half a megabyte each, of a URL up to 1.5).
     partial : bool, default False
         True takes the finished shards of an incomplete folder.
     cache : str or path, optional
@@ -639,10 +639,12 @@ def _listed_shards(folder: Place, partial: bool) -> list[_Shard]:
     if not folder.is_dir():
         return [_Shard(folder)]
     try:
-        return _described_shards(folder, read_description(folder), partial)
+        description = read_description(folder)
     except FileNotFoundError:
         if is_view:
             raise ValueError(f"expected {DESCRIPTION} beside {VIEW}, got none, in {folder}") from None
+    else:
+        return _described_shards(folder, description, partial)
     try:
         done = sorted(path.name for path in folder.glob("*.h5") if _is_done(path))
     except OSError as error:
