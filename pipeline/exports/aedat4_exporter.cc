@@ -72,11 +72,14 @@ class Aedat4Exporter : public RecordingsExporter {
 
 ExportFormat aedat4_format() {
   return {.word = "aedat4",
-          .title = "the same events and the pairs' frames as AEDAT 4.0, for DV's viewer",
+          .title = "events and the pairs' frames as AEDAT 4.0, for DV's viewer",
           .need = LabelNeed::kNone,
+          .tasks = {"object-detection"},
           .options = {"--classes", "--counts", "--frames", "--frames-per-second", "--seed"},
-          .files = {"aedat4/SPLIT/RECORDING.aedat4", "aedat4/SPLIT/RECORDING_bbox.npy",
-                    "aedat4/SPLIT/RECORDING_windows.txt", "label_map_dictionary.json"},
+          .files = {{"aedat4/SPLIT/RECORDING.aedat4", "events and frames, AEDAT 4.0"},
+                    {"aedat4/SPLIT/RECORDING_bbox.npy", kBboxFile},
+                    {"aedat4/SPLIT/RECORDING_windows.txt", kWindowsFile, {{"", kWindowColumns}}},
+                    {"label_map_dictionary.json", kClassesFile}},
           .make = make_exporter<Aedat4Exporter>};
 }
 

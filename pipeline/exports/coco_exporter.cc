@@ -390,13 +390,27 @@ class CocoExporter : public Exporter {
 }  // namespace
 
 ExportFormat coco_format() {
-  return {.word = "coco",
-          .title = "COCO's JSON for boxes and for keypoints of persons, event volumes as .npy",
-          .need = LabelNeed::kBoxesOrJoints,
-          .options = {"--classes", "--ignored", "--full-scale", "--images"},
-          .files = {"instances_SPLIT.json", "person_keypoints_SPLIT.json", "volumes/SPLIT/NAME.npy",
-                    "images/SPLIT/NAME.png"},
-          .make = make_exporter<CocoExporter>};
+  static constexpr char kImages[] = "id:Integer file_name:Text width:Integer height:Integer";
+  return {
+      .word = "coco",
+      .title = "COCO's JSON for boxes and for keypoints of persons, event volumes as .npy",
+      .need = LabelNeed::kBoxesOrJoints,
+      .options = {"--classes", "--ignored", "--full-scale", "--images"},
+      .files = {{"volumes/SPLIT/NAME.npy", "the volume, [channels, H, W] float16"},
+                {"images/SPLIT/NAME.png", "the volume as an image of three channels"},
+                {"instances_SPLIT.json",
+                 "images and their boxes, as COCO's",
+                 {{"images", kImages},
+                  {"annotations",
+                   "id:Integer image_id:Integer category_id:Integer bbox:BoundingBox area:Float "
+                   "iscrowd:Integer"}}},
+                {"person_keypoints_SPLIT.json",
+                 "images and the joints of their persons, as COCO's",
+                 {{"images", kImages},
+                  {"annotations",
+                   "id:Integer image_id:Integer category_id:Integer bbox:BoundingBox area:Float "
+                   "iscrowd:Integer num_keypoints:Integer keypoints:Float*"}}}},
+      .make = make_exporter<CocoExporter>};
 }
 
 }  // namespace eventgan

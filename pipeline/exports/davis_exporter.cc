@@ -200,8 +200,11 @@ ExportFormat davis_format() {
   return {.word = "davis",
           .title = "the layout of the EventGAN authors' trainers, one HDF5 file",
           .need = LabelNeed::kNone,
+          .tasks = {"keypoint-detection"},
           .options = {"--dtype"},
-          .files = {"SET.hdf5", "SET.npz", "SET.txt"},
+          .files = {{"SET.hdf5", "the volumes, [N, H, W, channels]"},
+                    {"SET.npz", "persons: the row of their volume, centre, scale and joints"},
+                    {"SET.txt", "samples in the order of their rows", {{"", "sample_id:Text"}}}},
           .make = make_exporter<DavisExporter>};
 }
 

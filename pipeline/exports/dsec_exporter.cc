@@ -269,21 +269,30 @@ class DsecExporter : public RecordingsExporter {
 }  // namespace
 
 ExportFormat dsec_format() {
-  return {.word = "dsec",
-          .title = "the same events, frames and boxes in DSEC's layout, for DSEC-Det and DAGr",
-          .need = LabelNeed::kNone,
-          .options = {"--classes", "--counts", "--frames", "--frames-per-second", "--seed"},
-          .files = {"dsec/SPLIT/RECORDING/events/left/events.h5",
-                    "dsec/SPLIT/RECORDING/events/left/events_2x.h5",
-                    "dsec/SPLIT/RECORDING/images/timestamps.txt",
-                    "dsec/SPLIT/RECORDING/images/left/distorted/N.png",
-                    "dsec/SPLIT/RECORDING/object_detections/left/tracks.npy",
-                    "dsec/SPLIT/RECORDING/flow/forward/N.png",
-                    "dsec/SPLIT/RECORDING/flow/forward_timestamps.txt",
-                    "dsec/SPLIT/RECORDING/flow/backward/N.png",
-                    "dsec/SPLIT/RECORDING/flow/backward_timestamps.txt",
-                    "dsec/SPLIT/RECORDING/windows.txt", "label_map_dictionary.json"},
-          .make = make_exporter<DsecExporter>};
+  static constexpr char kFlowFile[] = "optical flow, 16 bits: 2^15 + 128 px, valid";
+  static constexpr char kFlowTimesFile[] = "from, to, microseconds";
+  return {
+      .word = "dsec",
+      .title = "events, frames and boxes in DSEC's layout, for DSEC-Det and DAGr",
+      .need = LabelNeed::kNone,
+      .tasks = {"object-detection"},
+      .options = {"--classes", "--counts", "--frames", "--frames-per-second", "--seed"},
+      .files = {{"dsec/SPLIT/RECORDING/events/left/events.h5",
+                 "events/{x, y, t, p}, ms_to_idx, t_offset"},
+                {"dsec/SPLIT/RECORDING/events/left/events_2x.h5", "the same at half the size"},
+                {"dsec/SPLIT/RECORDING/images/timestamps.txt",
+                 "the time of each image, microseconds",
+                 {{"", "time_us:Integer"}}},
+                {"dsec/SPLIT/RECORDING/images/left/distorted/N.png", "images of the events' view"},
+                {"dsec/SPLIT/RECORDING/object_detections/left/tracks.npy",
+                 "boxes: t, x, y, h, w, class_id, class_confidence, track_id"},
+                {"dsec/SPLIT/RECORDING/flow/forward/N.png", kFlowFile},
+                {"dsec/SPLIT/RECORDING/flow/forward_timestamps.txt", kFlowTimesFile},
+                {"dsec/SPLIT/RECORDING/flow/backward/N.png", kFlowFile},
+                {"dsec/SPLIT/RECORDING/flow/backward_timestamps.txt", kFlowTimesFile},
+                {"dsec/SPLIT/RECORDING/windows.txt", kWindowsFile, {{"", kWindowColumns}}},
+                {"label_map_dictionary.json", kClassesFile}},
+      .make = make_exporter<DsecExporter>};
 }
 
 }  // namespace eventgan

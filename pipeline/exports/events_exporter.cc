@@ -62,7 +62,10 @@ ExportFormat events_format() {
           .title = "events drawn from the volumes, as text or in MVSEC's layout",
           .need = LabelNeed::kNone,
           .options = {"--counts", "--layout", "--seed"},
-          .files = {"events/SPLIT/NAME.txt", "events/SPLIT/NAME.hdf5"},
+          .files = {{"events/SPLIT/NAME.txt",
+                     "an event a line: seconds, column, row, polarity 1 or 0",
+                     {{"", "t:Float x:Integer y:Integer p:Integer"}}},
+                    {"events/SPLIT/NAME.hdf5", "the same in MVSEC's layout"}},
           .make = make_exporter<EventsExporter>};
 }
 

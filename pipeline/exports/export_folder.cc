@@ -156,6 +156,16 @@ fs::path ExportFolder::journal(const std::string& step) const {
   return file;
 }
 
+void ExportFolder::for_each_file(const std::function<void(const std::string&)>& take) const {
+  std::set<fs::path> receipts;
+  for (const auto& entry : fs::directory_iterator(folder_ / kReceipts)) {
+    if (entry.path().extension() == ".json") receipts.insert(entry.path());
+  }
+  for (const fs::path& receipt : receipts) {
+    for (const std::string& name : files_of(receipt)) take(name);
+  }
+}
+
 void ExportFolder::make_folder(const fs::path& folder) {
   const std::lock_guard lock(mutex_);
   if (!made_.insert(folder).second) return;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <set>
@@ -64,6 +65,9 @@ class ExportFolder {
   };
 
   const std::filesystem::path& path() const { return folder_; }
+
+  /// Calls take(name) for each file of the steps that are done, in the order of the steps' names.
+  void for_each_file(const std::function<void(const std::string&)>& take) const;
 
  private:
   std::filesystem::path receipt(const std::string& step) const;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 
+#include "pipeline/exports/detail/dataset_card.h"
 #include "pipeline/exports/export_job.h"
 
 namespace eventgan {
@@ -29,6 +30,17 @@ const std::vector<ExportFormat>& export_formats() {
 
 namespace {
 
+/// The word that `pattern` begins with; empty: none.
+std::string_view leading_part(std::string_view pattern) {
+  static constexpr std::array<std::string_view, 6> kAnyText{"SPLIT", "NAME",      "SET",
+                                                            "SHARD", "RECORDING", "N"};
+  const auto any = std::ranges::find_if(
+      kAnyText, [&](std::string_view word) { return pattern.starts_with(word); });
+  return any == kAnyText.end() ? std::string_view() : *any;
+}
+
+}  // namespace
+
 bool fits(std::string_view name, std::string_view pattern) {
   if (pattern.empty()) return name.empty();
   if (pattern.front() == '[') {
@@ -37,26 +49,34 @@ bool fits(std::string_view name, std::string_view pattern) {
     const std::string_view rest = pattern.substr(end + 1);
     return fits(name, rest) || fits(name, inner + std::string(rest));
   }
-  static constexpr std::array<std::string_view, 6> kAnyText{"SPLIT", "NAME",      "SET",
-                                                            "SHARD", "RECORDING", "N"};
-  const auto any = std::ranges::find_if(
-      kAnyText, [&](std::string_view word) { return pattern.starts_with(word); });
-  if (any == kAnyText.end()) {
+  const std::string_view any = leading_part(pattern);
+  if (any.empty()) {
     return !name.empty() && name.front() == pattern.front() &&
            fits(name.substr(1), pattern.substr(1));
   }
   const std::size_t most = std::min(name.find('/'), name.size());
   for (std::size_t length = 1; length <= most; ++length) {
-    if (fits(name.substr(length), pattern.substr(any->size()))) return true;
+    if (fits(name.substr(length), pattern.substr(any.size()))) return true;
   }
   return false;
 }
 
-}  // namespace
+std::string spelled(std::string_view pattern,
+                    const std::function<std::string(std::string_view)>& any,
+                    const std::function<std::string(char)>& text) {
+  std::string result;
+  while (!pattern.empty()) {
+    const std::string_view part = leading_part(pattern);
+    result += part.empty() ? text(pattern.front()) : any(part);
+    pattern.remove_prefix(std::max<std::size_t>(part.size(), 1));
+  }
+  return result;
+}
 
 bool writes(const ExportFormat& format, std::string_view name) {
-  return std::ranges::any_of(format.files,
-                             [&](std::string_view pattern) { return fits(name, pattern); });
+  return name == kCardName || name == kCroissantName ||
+         std::ranges::any_of(format.files,
+                             [&](const ExportFile& file) { return fits(name, file.name); });
 }
 
 }  // namespace eventgan

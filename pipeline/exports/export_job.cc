@@ -12,6 +12,7 @@
 #include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
+#include "pipeline/exports/detail/dataset_card.h"
 #include "pipeline/exports/detail/exporter.h"
 #include "pipeline/runtime/threads.h"
 
@@ -139,6 +140,7 @@ ExportReport run_export(const std::filesystem::path& folder, const ExportOptions
     work.advance(shard->valid);
   }
   exporter->finish(work, shards);
+  write_dataset_card(work, *options.to, shards);
 
   // Of those left out too, since it counts their samples.
   std::vector<const ExportShard*> all;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "manifests/values/job.h"
@@ -23,23 +24,47 @@ struct ExportOptions;
 /// The labels that a source must have for a format to have a use for it.
 enum class LabelNeed { kNone, kBoxes, kJoints, kBoxesOrJoints };
 
+/// Records in a text file, one a line, or in a JSON file, the elements of a list.
+struct ExportRecords {
+  std::string_view list;  ///< of JSON: its name; empty: the file is the list
+  /// Separated by blanks, each with its type of schema.org, "t:Float x:Integer", `*` behind it for
+  /// a list of them, or BoundingBox: left, top, width, height. The last one of a line may have
+  /// blanks, if it is Text.
+  std::string_view columns;
+};
+
+/// A kind of files.
+struct ExportFile {
+  /// Below the export's folder. SPLIT, NAME, SET, SHARD, RECORDING and N stand for any text
+  /// without a slash, and what is in brackets may be missing.
+  std::string_view name;
+  std::string_view what;               ///< a line for a person
+  std::vector<ExportRecords> records;  ///< what is in it, where that can be said so
+
+  // NOLINTNEXTLINE(google-explicit-constructor): a row may be a name alone
+  ExportFile(const char* its_name, std::string_view is = {}, std::vector<ExportRecords> has = {})
+      : name(its_name), what(is), records(std::move(has)) {}
+};
+
 /// A format of exports, described by the file that makes it; manifests/guides/exports.md says what
 /// each consists of.
 struct ExportFormat {
   std::string_view word;   ///< of --to
   std::string_view title;  ///< what it writes, in a line
   LabelNeed need = LabelNeed::kNone;
+  /// The Hugging Face Hub's word for what its labels are for; empty: as `need` says.
+  std::vector<std::string_view> tasks = {};
   std::vector<std::string> options;  ///< those that it takes of the ones that not all formats take
-  /// The names of its files below the export's folder. SPLIT, NAME, SET, SHARD, RECORDING and N
-  /// stand for any text without a slash, and what is in brackets may be missing.
-  std::vector<std::string_view> files;
+  /// The first that an export has is the one a sample's data is in. Every export has README.md and
+  /// croissant.json, too.
+  std::vector<ExportFile> files;
   std::unique_ptr<Exporter> (*make)(const ExportInput&, const ExportOptions&) = nullptr;
 };
 
 /// All formats, in the order of the page.
 const std::vector<ExportFormat>& export_formats();
 
-/// Whether a file of the format may have this name.
+/// Whether a file of the format may have this name, or one of every export.
 bool writes(const ExportFormat& format, std::string_view name);
 
 enum class EventFile { kText, kMvsec };

@@ -167,10 +167,13 @@ class HpeExporter : public RecordingsExporter {
 
 ExportFormat hpe_format() {
   return {.word = "hpe",
-          .title = "EROS images of the same events with 13 joints, for hpe-core's MoveNet",
+          .title = "EROS images of events with 13 joints, for hpe-core's MoveNet",
           .need = LabelNeed::kJoints,
           .options = {"--counts", "--frames-per-second", "--seed"},
-          .files = {"hpe/SPLIT/eros/NAME.png", "hpe/SPLIT/poses.json"},
+          .files = {{"hpe/SPLIT/eros/NAME.png", "the EROS image of the events"},
+                    {"hpe/SPLIT/poses.json",
+                     "an entry for each person of an image",
+                     {{"", "img_name:Text keypoints:Float* center:Float*"}}}},
           .make = make_exporter<HpeExporter>};
 }
 

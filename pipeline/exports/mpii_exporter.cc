@@ -72,13 +72,18 @@ class MpiiExporter : public Exporter {
 }  // namespace
 
 ExportFormat mpii_format() {
-  return {.word = "mpii",
-          .title = "the annotation list for Microsoft's pose_resnet, and the ground truth for PCKh",
-          .need = LabelNeed::kJoints,
-          .options = {"--full-scale"},
-          .files = {"annot/SET.json", "annot/gt_SET.mat", "images/SPLIT/NAME.png",
-                    "images/SPLIT/NAME.npy"},
-          .make = make_exporter<MpiiExporter>};
+  return {
+      .word = "mpii",
+      .title = "the annotation list for Microsoft's pose_resnet, and the ground truth for PCKh",
+      .need = LabelNeed::kJoints,
+      .options = {"--full-scale"},
+      .files = {{"images/SPLIT/NAME.png", "the image of the events' average times"},
+                {"images/SPLIT/NAME.npy", "the volume, [H, W, channels] uint8"},
+                {"annot/SET.json",
+                 "the persons of a set",
+                 {{"", "image:Text center:Float* scale:Float joints:Float* joints_vis:Integer*"}}},
+                {"annot/gt_SET.mat", "the same for PCKh"}},
+      .make = make_exporter<MpiiExporter>};
 }
 
 }  // namespace eventgan

@@ -47,11 +47,14 @@ class RawExporter : public RecordingsExporter {
 
 ExportFormat raw_format() {
   return {.word = "raw",
-          .title = "the same events as Prophesee's RAW files (EVT 3.0), with its boxes",
+          .title = "events as Prophesee's RAW files (EVT 3.0), with its boxes",
           .need = LabelNeed::kNone,
+          .tasks = {"object-detection"},
           .options = {"--classes", "--counts", "--frames-per-second", "--seed"},
-          .files = {"raw/SPLIT/RECORDING.raw", "raw/SPLIT/RECORDING_bbox.npy",
-                    "raw/SPLIT/RECORDING_windows.txt", "label_map_dictionary.json"},
+          .files = {{"raw/SPLIT/RECORDING.raw", "events, EVT 3.0"},
+                    {"raw/SPLIT/RECORDING_bbox.npy", kBboxFile},
+                    {"raw/SPLIT/RECORDING_windows.txt", kWindowsFile, {{"", kWindowColumns}}},
+                    {"label_map_dictionary.json", kClassesFile}},
           .make = make_exporter<RawExporter>};
 }
 

@@ -290,7 +290,9 @@ void RecordingsExporter::finish(const ExportWork& work,
       work.advance(std::ssize(recording.windows));
     }
   }
-  if (numbers_ && !numbers_->names().empty()) write_classes(work, shards);
+  const bool has_classes =
+      std::ranges::find(options_.to->options, "--classes") != options_.to->options.end();
+  if (has_classes && numbers_ && !numbers_->names().empty()) write_classes(work, shards);
 }
 
 void RecordingsExporter::write_classes(const ExportWork& work,

@@ -365,22 +365,32 @@ class RvtExporter : public RecordingsExporter {
 }  // namespace
 
 ExportFormat rvt_format() {
+  static constexpr char kEventsFile[] = "events/{x, y, p, t, height, width}, microseconds";
+  static constexpr char kRepresentationFile[] = "representations of events, [N, channels, H, W]";
   return {.word = "rvt",
-          .title = "the same for RVT and eTraM, as events and as stacked histograms",
+          .title = "events for RVT and eTraM, as recordings and as stacked histograms",
           .need = LabelNeed::kBoxes,
           .options = {"--classes", "--counts", "--frames-per-second", "--representation", "--seed"},
-          .files = {"raw/SPLIT/RECORDING_td.h5", "raw/SPLIT/RECORDING_td.dat.h5",
-                    "raw/SPLIT/RECORDING_bbox.npy", "raw/SPLIT/RECORDING_windows.txt",
-                    "preprocessed/SPLIT/RECORDING/labels_v2/labels.npz",
-                    "preprocessed/SPLIT/RECORDING/labels_v2/timestamps_us.npy",
-                    "preprocessed/SPLIT/RECORDING/event_representations_v2/NAME/"
-                    "event_representations.h5",
-                    "preprocessed/SPLIT/RECORDING/event_representations_v2/NAME/"
-                    "event_representations_ds2_nearest.h5",
-                    "preprocessed/SPLIT/RECORDING/event_representations_v2/NAME/"
-                    "objframe_idx_2_repr_idx.npy",
-                    "preprocessed/SPLIT/RECORDING/event_representations_v2/NAME/timestamps_us.npy",
-                    "label_map_dictionary.json"},
+          .files = {{"raw/SPLIT/RECORDING_td.h5", kEventsFile},
+                    {"raw/SPLIT/RECORDING_td.dat.h5", kEventsFile},
+                    {"raw/SPLIT/RECORDING_bbox.npy", kBboxFile},
+                    {"raw/SPLIT/RECORDING_windows.txt", kWindowsFile, {{"", kWindowColumns}}},
+                    {"preprocessed/SPLIT/RECORDING/labels_v2/labels.npz",
+                     "boxes, and the first of each object frame"},
+                    {"preprocessed/SPLIT/RECORDING/labels_v2/timestamps_us.npy",
+                     "the time of each object frame"},
+                    {"preprocessed/SPLIT/RECORDING/event_representations_v2/NAME/"
+                     "event_representations.h5",
+                     kRepresentationFile},
+                    {"preprocessed/SPLIT/RECORDING/event_representations_v2/NAME/"
+                     "event_representations_ds2_nearest.h5",
+                     kRepresentationFile},
+                    {"preprocessed/SPLIT/RECORDING/event_representations_v2/NAME/"
+                     "objframe_idx_2_repr_idx.npy",
+                     "the representation of each object frame"},
+                    {"preprocessed/SPLIT/RECORDING/event_representations_v2/NAME/timestamps_us.npy",
+                     "the end of each representation"},
+                    {"label_map_dictionary.json", kClassesFile}},
           .make = make_exporter<RvtExporter>};
 }
 

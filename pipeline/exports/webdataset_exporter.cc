@@ -155,127 +155,7 @@ std::string tar_name(const ExportShard& shard) {
   return shard.outline.name.substr(0, shard.outline.name.rfind('.')) + ".tar";
 }
 
-// README.md, a dataset card as the Hugging Face Hub reads it: YAML between two lines of ---, then
-// Markdown.
-
-/// Text that is not ours as it may be in a line of Markdown: nothing of it is taken for markup.
-std::string markdown(const std::string& text) {
-  std::string escaped;
-  for (const char c : escape_controls(text)) {
-    if (std::string_view("\\`*_[]<>|~&$").find(c) != std::string_view::npos) {
-      escaped += '\\';
-    }
-    escaped += c;
-  }
-  return escaped;
-}
-
-/// Text between lines that it does not have.
-std::string fenced(const std::string& text) {
-  std::string fence = "```";
-  while (text.find(fence) != text.npos) fence += '`';
-  return fence + "\n" + text + (text.ends_with('\n') ? "" : "\n") + fence + "\n";
-}
-
-/// The Hub's classes of sizes.
-const char* size_category(std::int64_t samples) {
-  constexpr std::pair<std::int64_t, const char*> kCategories[] = {
-      {1'000, "n<1K"},          {10'000, "1K<n<10K"},     {100'000, "10K<n<100K"},
-      {1'000'000, "100K<n<1M"}, {10'000'000, "1M<n<10M"}, {100'000'000, "10M<n<100M"}};
-  for (const auto& [limit, category] : kCategories) {
-    if (samples < limit) return category;
-  }
-  return "100M<n<1B";
-}
-
-/// What a card counts, by split.
-struct CardCounts {
-  std::int64_t samples = 0;
-  std::map<std::string, std::int64_t> boxes;  ///< by class
-  std::int64_t boxes_to_ignore = 0;
-  std::int64_t persons = 0;
-};
-
-/// The card of these shards; `counts` by split.
-std::string card_text(const ExportWork& work, const std::vector<const ExportShard*>& shards,
-                      const std::map<std::string, CardCounts>& counts) {
-  const ExportInput& input = work.input;
-  bool has_boxes = false;
-  bool has_persons = false;
-  std::map<int, std::pair<std::int64_t, std::int64_t>> of_source;  // valid, quarantined
-  std::map<std::string, std::vector<std::string>> tars;            // by split
-  std::int64_t samples = 0;
-  for (const ExportShard* shard : shards) {
-    const ExportSource& source = input.source_of(*shard);
-    has_boxes |= source.has_boxes();
-    has_persons |= source.has_joints();
-    auto& [valid, quarantined] = of_source[shard->outline.source];
-    valid += shard->valid;
-    quarantined += std::ssize(shard->quarantined);
-    samples += shard->valid;
-    tars[source.split].push_back(tar_name(*shard));
-  }
-  const auto quoted = [](const std::string& text) { return dump_json(Json(text)); };
-  std::string text =
-      "---\nlicense: other\nlicense_name: to-be-filled-in\npretty_name: " + quoted(input.name()) +
-      "\n";
-  if (has_boxes || has_persons) text += "task_categories:\n";
-  if (has_boxes) text += "- object-detection\n";
-  if (has_persons) text += "- keypoint-detection\n";
-  text += fmt::format("size_categories:\n- {}\ntags:\n- event-camera\n- webdataset\n- eventgan\n",
-                      size_category(samples));
-  text += "configs:\n- config_name: default\n  data_files:\n";
-  for (const std::string& split : input.splits()) {
-    if (!tars.contains(split)) continue;
-    // The Hub's names of splits have no hyphens.
-    std::string name = split;
-    std::ranges::replace(name, '-', '_');
-    text += "  - split: " + quoted(name) + "\n    path:\n";
-    for (const std::string& tar : tars[split]) text += "    - " + quoted(tar) + "\n";
-  }
-  const ShardHeader header = input.open(*shards.front()).header();
-  const std::string title = markdown(input.name());
-  text += "---\n\n# " + title +
-          "\n\nEvent volumes for event cameras, made from labelled frames by eventgan. "
-          "`NAME.npz` is a sample's volume, `NAME.json` its labels.\n\n"
-          "## Licence\n\n**To be filled in.** The labels, and the volumes that were made from the "
-          "images, are subject to the licences of the sources below.\n\n"
-          "## Sources\n\n| source | split | samples | quarantined samples, left out |\n"
-          "|---|---|---|---|\n";
-  for (const auto& [index, count] : of_source) {
-    const ExportSource& source = input.sources().at(static_cast<std::size_t>(index));
-    text += fmt::format("| {} | {} | {} | {} |\n", markdown(source.dataset), markdown(source.split),
-                        count.first, count.second);
-  }
-  text += "\n## Counts\n\n| split | what | count |\n|---|---|---|\n";
-  for (const auto& [split, count] : counts) {
-    const auto row = [&, name = markdown(split)](const std::string& what, std::int64_t number) {
-      text += fmt::format("| {} | {} | {} |\n", name, what, number);
-    };
-    row("samples", count.samples);
-    for (const auto& [name, boxes] : count.boxes) row("boxes of class " + markdown(name), boxes);
-    if (count.boxes_to_ignore > 0) row("boxes to ignore", count.boxes_to_ignore);
-    if (count.persons > 0) row("persons with joints", count.persons);
-  }
-  if (!input.missing().empty()) {
-    text +=
-        "\n**Not complete**: without " + count_text(std::ssize(input.missing()), "shard") + ".\n";
-  }
-  const VolumeShape& shape = header.volume;
-  text += fmt::format(
-      "\n## How it was made\n\n| | |\n|---|---|\n| program | {} |\n| weights | {} |\n"
-      "| SHA-256 of the weights, or of a simulator's settings | {} |\n| generator | {} |\n"
-      "| volume, of the first shard | {} channels, {} x {} pixels |\n"
-      "| SHA-256 of the plan | {} |\n\n"
-      "The manifest (look through its paths before you share them):\n\n",
-      markdown(header.program_version),
-      header.weights.empty() ? "not named" : markdown(header.weights), header.weights_hash,
-      markdown(header.generator), shape.channels(), shape.size.width, shape.size.height,
-      header.plan_hash);
-  return text + fenced(header.manifest_text);
-}
-
-/// SHARD.tar with NAME.npz and NAME.json, and README.md.
+/// SHARD.tar with NAME.npz and NAME.json.
 class WebdatasetExporter : public Exporter {
  public:
   WebdatasetExporter(const ExportInput&, const ExportOptions&) {}
@@ -304,41 +184,19 @@ class WebdatasetExporter : public Exporter {
     file.write(tar_end());
     file.publish();
   }
-
-  void finish(const ExportWork& work,
-              const std::vector<const ExportShard*>& shards) const override {
-    const std::string input = fmt::format("{} {}", input_hash(shards), work.input.missing().size());
-    ExportFolder::Step step(work.folder, "card", input);
-    if (step.is_done()) return;
-    std::map<std::string, CardCounts> counts;
-    work.walk(shards, [&](const OutgoingSample& sample) {
-      CardCounts& count = counts[sample.source.split];
-      ++count.samples;
-      const ShardSample& labels = sample.labels;
-      for (std::size_t i = 0; i < labels.annotation.boxes.size(); ++i) {
-        const auto class_id = static_cast<std::size_t>(labels.annotation.boxes[i].class_id);
-        if (labels.labels.boxes.at(i).ignore) {
-          ++count.boxes_to_ignore;
-        } else {
-          ++count.boxes[sample.source.class_names.at(class_id)];
-        }
-      }
-      count.persons += std::ssize(labels.annotation.persons);
-    });
-    step.write("README.md", card_text(work, shards, counts));
-    step.finish();
-  }
 };
 
 }  // namespace
 
 ExportFormat webdataset_format() {
-  return {.word = "webdataset",
-          .title = "tar files with a .npz and a .json for each sample, and a dataset card",
-          .need = LabelNeed::kNone,
-          .options = {},
-          .files = {"SHARD.tar", "README.md"},
-          .make = make_exporter<WebdatasetExporter>};
+  return {
+      .word = "webdataset",
+      .title = "tar files with a .npz and a .json for each sample",
+      .need = LabelNeed::kNone,
+      .tasks = {"object-detection", "keypoint-detection"},
+      .options = {},
+      .files = {{"SHARD.tar", "NAME.npz with the volume and NAME.json with the labels of samples"}},
+      .make = make_exporter<WebdatasetExporter>};
 }
 
 }  // namespace eventgan

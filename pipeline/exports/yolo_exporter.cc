@@ -232,25 +232,53 @@ class YoloExporter : public Exporter {
 
 }  // namespace
 
+namespace {
+
+constexpr char kImage[] =
+    "the image of the events: of average times, or with --images png the volume";
+constexpr char kVolume[] = "the volume, [H, W, channels] uint8";
+constexpr char kList[] = "the images of the split";
+constexpr char kData[] = "lists of images, channels and names for Ultralytics";
+constexpr char kBox[] = "class:Integer x_center:Float y_center:Float width:Float height:Float";
+
+}  // namespace
+
 ExportFormat yolo_format() {
-  return {.word = "yolo",
-          .title = "YOLO's text files for boxes and poses, images, volumes as .npy",
-          .need = LabelNeed::kBoxesOrJoints,
-          .options = {"--classes", "--ignored", "--full-scale", "--images"},
-          .files = {"images/SPLIT/NAME.png", "images/SPLIT/NAME.npy", "labels/SPLIT/NAME.txt",
-                    "SPLIT.txt", "data.yaml", "pose[-N]/images/SPLIT/NAME.png",
-                    "pose[-N]/images/SPLIT/NAME.npy", "pose[-N]/labels/SPLIT/NAME.txt",
-                    "pose[-N]/SPLIT.txt", "pose[-N]/data.yaml"},
-          .make = make_exporter<YoloExporter<Lines::kBoxes>>};
+  return {
+      .word = "yolo",
+      .title = "YOLO's text files for boxes and poses, images, volumes as .npy",
+      .need = LabelNeed::kBoxesOrJoints,
+      .options = {"--classes", "--ignored", "--full-scale", "--images"},
+      .files = {{"images/SPLIT/NAME.png", kImage},
+                {"images/SPLIT/NAME.npy", kVolume},
+                {"labels/SPLIT/NAME.txt", "a box a line, in shares of the volume", {{"", kBox}}},
+                {"SPLIT.txt", kList, {{"", "image:Text"}}},
+                {"data.yaml", kData},
+                {"pose[-N]/images/SPLIT/NAME.png", kImage},
+                {"pose[-N]/images/SPLIT/NAME.npy", kVolume},
+                {"pose[-N]/labels/SPLIT/NAME.txt",
+                 "a person a line: box and joints, in shares of the volume",
+                 {{"",
+                   "class:Integer x_center:Float y_center:Float width:Float height:Float "
+                   "joints:Text"}}},
+                {"pose[-N]/SPLIT.txt", kList, {{"", "image:Text"}}},
+                {"pose[-N]/data.yaml", kData}},
+      .make = make_exporter<YoloExporter<Lines::kBoxes>>};
 }
 
 ExportFormat yolo_seg_format() {
   return {.word = "yolo-seg",
           .title = "YOLO's text files for segmentation, images, volumes as .npy",
           .need = LabelNeed::kBoxes,
+          .tasks = {"image-segmentation"},
           .options = {"--classes", "--ignored", "--full-scale", "--images"},
-          .files = {"images/SPLIT/NAME.png", "images/SPLIT/NAME.npy", "labels/SPLIT/NAME.txt",
-                    "SPLIT.txt", "data.yaml"},
+          .files = {{"images/SPLIT/NAME.png", kImage},
+                    {"images/SPLIT/NAME.npy", kVolume},
+                    {"labels/SPLIT/NAME.txt",
+                     "an outline a line, in shares of the volume",
+                     {{"", "class:Integer outline:Text"}}},
+                    {"SPLIT.txt", kList, {{"", "image:Text"}}},
+                    {"data.yaml", kData}},
           .make = make_exporter<YoloExporter<Lines::kOutlines>>};
 }
 

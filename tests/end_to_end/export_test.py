@@ -453,32 +453,6 @@ class Formats(Export):
                 seen += 1
         self.assertEqual(seen, len(demo.samples))
 
-    def test_webdataset_has_a_dataset_card(self):
-        self.out, _ = demo.exported("webdataset")
-        _, front, body = (self.out / "README.md").read_text().split("---\n", 2)
-        card = yaml.safe_load(front)
-        self.assertEqual((card["license"], card["pretty_name"], card["size_categories"]), ("other", "job", ["n<1K"]))
-        self.assertEqual(card["task_categories"], ["object-detection", "keypoint-detection"])
-        listed = {entry["split"]: entry["path"] for entry in card["configs"][0]["data_files"]}
-        self.assertEqual(list(listed), ["train", "val"])
-        self.assertEqual(sorted(sum(listed.values(), [])), sorted(path.name for path in self.out.glob("*.tar")))
-        rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in body.splitlines()
-                if line.startswith("|")]
-        for split in ("train", "val"):
-            self.assertIn([split, "samples", str(len(of(split)))], rows)
-            boxes = collections.Counter("boxes to ignore" if ignore else f"boxes of class {sample['classes'][i]}"
-                                        for sample in of(split).values()
-                                        for i, ignore in zip(sample["boxes"]["class_id"], sample["boxes"]["ignore"]))
-            boxes["persons with joints"] = sum(len(sample["poses"]["joints"]) for sample in of(split).values())
-            self.assertEqual({row[1]: int(row[2]) for row in rows if row[0] == split and row[1] != "samples"},
-                             {what.replace("_", "\\_"): count for what, count in boxes.items() if count})
-        self.assertIn(["kitti\\_object", "val", str(len(of("val"))), "1"], rows)
-        self.assertIn("To be filled in", body)
-        plan = json.loads((demo.finalized / "dataset.json").read_text())["plan_hash"]
-        self.assertIn(["SHA-256 of the plan", plan], rows)
-        manifest = json.loads(body.split("```\n")[1])
-        self.assertEqual(manifest["seed"], 7)
-
     def check_columns(self, entry, columns, unknown):
         """Each column of a shard's row is in the JSON, in its shape, with null for what is unknown."""
         for name, value in columns.items():

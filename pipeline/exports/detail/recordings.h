@@ -22,6 +22,14 @@ std::vector<Event> drawn_events(const OutgoingSample& sample, const ExportOption
 /// Seconds from a pair's previous frame to its next one; 1 where that is not known.
 double known_gap_s(const FramePair& pair);
 
+// Of the rows' tables of files.
+inline constexpr char kBboxFile[] =
+    "boxes: t, x, y, w, h, class_id, track_id, class_confidence, microseconds";
+inline constexpr char kWindowsFile[] = "a sample a line";
+inline constexpr char kWindowColumns[] =
+    "begin_us:Integer end_us:Integer label_us:Integer events:Integer sample_id:Text";
+inline constexpr char kClassesFile[] = "numbers of classes, and their names";
+
 /// A sample as a part of a recording: its events lie between begin_us and end_us. The label's time
 /// is that of the labelled frame. Times are on the recording's clock, >= 0.
 struct SampleWindow {

@@ -59,13 +59,31 @@ TEST(ExportFormats, ThePageHasTheRowsAndTheirFiles) {
                             " | " + options + (options.empty() ? "|" : " |") + "\n";
     EXPECT_NE(page.find(row), page.npos) << row;
     const std::string text = section(page, known.word);
-    for (const std::string_view file : known.files) {
-      const std::string_view name = file.substr(file.rfind('/') + 1);
+    for (const ExportFile& file : known.files) {
+      const std::string_view name = file.name.substr(file.name.rfind('/') + 1);
       EXPECT_NE(text.find(name), text.npos) << name;
     }
     const std::vector<std::string> files = listed_files(text);
     EXPECT_FALSE(files.empty());
     for (const std::string& file : files) EXPECT_TRUE(writes(known, file)) << file;
+  }
+}
+
+TEST(ExportFormats, EachFileIsDescribedAndItsColumnsHaveTypes) {
+  const std::set<std::string> types{"Text", "Integer", "Float", "BoundingBox"};
+  for (const ExportFormat& known : export_formats()) {
+    for (const ExportFile& file : known.files) {
+      SCOPED_TRACE(std::string(known.word) + ": " + std::string(file.name));
+      EXPECT_FALSE(file.what.empty());
+      for (const ExportRecords& records : file.records) {
+        std::istringstream columns{std::string(records.columns)};
+        for (std::string column; columns >> column;) {
+          std::string type = column.substr(column.find(':') + 1);
+          if (type.ends_with('*')) type.pop_back();
+          EXPECT_TRUE(types.contains(type)) << column;
+        }
+      }
+    }
   }
 }
 
@@ -89,7 +107,9 @@ TEST(ExportFormats, AFileIsOneOfThoseThatTheRowSays) {
   }
   EXPECT_TRUE(writes(format("mpii"), "annot/gt_train.mat"));
   EXPECT_FALSE(writes(format("mpii"), "annot/train.mat"));
-  EXPECT_TRUE(writes(format("webdataset"), "README.md"));
+  for (const char* name : {"README.md", "croissant.json"}) {
+    EXPECT_TRUE(writes(format("yolo"), name)) << name;
+  }
   EXPECT_FALSE(writes(format("webdataset"), "notes.md"));
   EXPECT_TRUE(writes(format("dsec"), "dsec/val/a/flow/backward/000000.png"));
   EXPECT_FALSE(writes(format("dsec"), "dsec/val/a/flow/000000.png"));
