@@ -348,7 +348,9 @@ class RvtExporter : public RecordingsExporter {
     std::vector<std::int64_t> first;
     for (const std::int64_t time_us : times_us) {
       first.push_back(std::ssize(seen));
-      for (RecordedBox box : std::ranges::equal_range(boxes, time_us, {}, &RecordedBox::t_us)) {
+      auto next = std::ranges::lower_bound(boxes, time_us, {}, &RecordedBox::t_us);
+      for (; next != boxes.end() && next->t_us == time_us; ++next) {
+        RecordedBox box = *next;
         if (why_not(box.box, box.class_number, recording.shape.size, recording.source->split) ==
             nullptr) {
           seen.push_back(box);
