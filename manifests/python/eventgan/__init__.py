@@ -27,14 +27,15 @@ if TYPE_CHECKING:
     from .plotting import show
     from .program import ProgramError, convert, init, open
     from .representations import signed_channel
-    from .shards import FIELDS, InvalidSample, Shards, read_description
+    from .shard_folder import read_description
+    from .shards import FIELDS, InvalidSample, Shards
 
 __version__ = "1.0.0"
 
 _MODULE_OF = {
     "Generator": "generator", "represent": "generator", "sample_events": "generator", "FIELDS": "shards",
     "InvalidSample": "shards", "Sample": "open_shards", "Shards": "shards", "open_shard": "open_shards",
-    "read_description": "shards", "ProgramError": "program", "convert": "program", "init": "program",
+    "read_description": "shard_folder", "ProgramError": "program", "convert": "program", "init": "program",
     "open": "program", "mask": "outlines", "rings": "outlines", "show": "plotting",
     "signed_channel": "representations",
 }

@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 import collections
-import concurrent.futures
-import contextlib
 import copy
 import functools
 import hashlib
 import html
-import json
 import os
 import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from .open_shards import OpenShard, OpenShards, PathLike, Sample, check_version
+from .open_shards import OpenShard, OpenShards, PathLike, Sample
 from .outlines import mask
 from .remote import Place, RemotePath, place
-from .words import did_you_mean, path_of
+from .shard_folder import FoundShard, find_shards, quarantine_reason
+from .words import did_you_mean, first_of, path_of
 
-PLAN = "plan.json"
-DESCRIPTION, DESCRIPTION_FORMAT, DESCRIPTION_VERSION = "dataset.json", "eventgan-dataset", "1.0"
-VIEW = "dataset.h5"
-SHARD_NAME = re.compile(r"\w[\w.-]*-\w[\w.-]*-\d{5,}-of-\d{5,}\.h5", re.ASCII)  # no path to another folder
 FIELDS = ("volume", "pair", "statistics", "boxes", "persons", "flow", "original")
 
 
@@ -104,7 +98,7 @@ class Shards(Sequence):
         if not isinstance(paths, (str, os.PathLike, RemotePath)):
             paths = list(paths) if isinstance(paths, Iterable) else path_of(paths, "a folder of shards, or a shard")
         self._described_as = str(paths)
-        shards = _find_shards(paths, partial, cache)
+        shards = find_shards(paths, partial, cache)
         self._all_paths = [shard.path for shard in shards]
         if split is not None:
             splits = [self._split(shard) for shard in shards]
@@ -228,7 +222,7 @@ class Shards(Sequence):
         file = self._files[path]
         valid = bool(file.column("valid")[slot])
         if self._invalid == "raise" and not valid:
-            raise InvalidSample(_reason(path, slot))
+            raise InvalidSample(quarantine_reason(path, slot))
         changes = self._changes if "volume" in fields and valid else ()
         if changes:
             fields |= {"pair"}
@@ -516,7 +510,7 @@ class Shards(Sequence):
                 chosen = chosen.astype(np.int64)
         self._shard, self._slot = self._shard[chosen], self._slot[chosen]
 
-    def _split(self, shard: _Shard) -> str:
+    def _split(self, shard: FoundShard) -> str:
         return shard.split or self._files[shard.path].file.attrs["split"]
 
     def _have(self, column: str) -> bool:
@@ -550,8 +544,8 @@ class Shards(Sequence):
         chosen = np.array([name in wanted or frame in wanted for name, frame in names], bool)
         skipped = [names[i][0] for i in np.flatnonzero(chosen & ~sound)]
         if skipped:
-            warnings.warn(f"{len(skipped)} samples named by {source} are quarantined and skipped ({_first(skipped)}), "
-                          f"in {self._described_as}", stacklevel=3)
+            warnings.warn(f"{len(skipped)} samples named by {source} are quarantined and skipped "
+                          f"({first_of(skipped)}), in {self._described_as}", stacklevel=3)
         return chosen
 
     def _with_values(self, key: str, values: Any) -> np.ndarray:
@@ -573,9 +567,9 @@ class Shards(Sequence):
     def _require_known(self, values: Iterable[Any], known: set, what: str, source: str) -> None:
         unknown = [value for value in values if value not in known]
         if unknown:
-            there = _first(map(repr, sorted(known)), 20) or "none"
+            there = first_of(map(repr, sorted(known)), 20) or "none"
             raise ValueError(f"expected {what} of {self._described_as} ({there}), got {len(unknown)} that it does not "
-                             f"have ({_first(map(repr, unknown))}), in {source}{did_you_mean(unknown, known)}")
+                             f"have ({first_of(map(repr, unknown))}), in {source}{did_you_mean(unknown, known)}")
 
 
 def _one_of(what: str, words: Iterable[str], known: Sequence[str]) -> None:
@@ -595,158 +589,6 @@ def _known_fields(fields: Iterable[str]) -> frozenset[str]:
 def _frame_of(sample_id: str) -> str:
     """The id of the labelled frame: 000005 for "000005@before1"."""
     return re.sub(r"@(before|after|around)\d+$", "", sample_id)
-
-
-def _first(texts: Iterable[str], most: int = 5) -> str:
-    texts = list(texts)
-    return ", ".join(texts[:most]) + (", ..." if texts[most:] else "")
-
-
-def _record(path: Place) -> Place:
-    return path.with_suffix(".json")
-
-
-def _reason(path: Place, slot: int) -> str:
-    reason = "quarantined"
-    with contextlib.suppress(OSError):
-        for sample in json.loads(_record(path).read_text(encoding="utf-8"))["quarantined"]:
-            if sample["slot"] == slot:
-                reason = f"quarantined: {sample['reason']} ({sample['sample_id']})"
-    return f"sample {slot} of {path} is {reason}"
-
-
-class _Shard(NamedTuple):
-    path: Place
-    split: str | None = None  # None: the file says it
-    valid: np.ndarray | None = None  # bool, of each slot
-
-
-def _find_shards(paths: PathLike | RemotePath | list[PathLike | RemotePath], partial: bool,
-                 cache: PathLike | None) -> list[_Shard]:
-    if isinstance(paths, list):
-        shards = [_Shard(place(path, cache)) for path in paths]
-    else:
-        shards = _listed_shards(place(paths, cache), partial)
-    if not shards:
-        raise ValueError(f"expected finished shards, got none, in {paths}")
-    return shards
-
-
-def _listed_shards(folder: Place, partial: bool) -> list[_Shard]:
-    is_view = folder.name == VIEW and folder.is_file()
-    if is_view:
-        folder = folder.parent
-    if not folder.is_dir():
-        return [_Shard(folder)]
-    try:
-        description = read_description(folder)
-    except FileNotFoundError:
-        if is_view:
-            raise ValueError(f"expected {DESCRIPTION} beside {VIEW}, got none, in {folder}") from None
-    else:
-        return _described_shards(folder, description, partial)
-    try:
-        done = sorted(path.name for path in folder.glob("*.h5") if _is_done(path))
-    except OSError as error:
-        raise ValueError(f"expected {DESCRIPTION}, which eventgan finalize writes, or a list of the files, got neither "
-                         f"({error}), in {folder}") from error
-    if not partial:
-        _require_whole(done, sorted(_expected_shards(folder).difference(done)), folder)
-    return [_Shard(folder / name) for name in done]
-
-
-def _expected_shards(folder: Place) -> set[str]:
-    """The names of shards that are there, or planned, or have a commit record."""
-    names = {path.name for path in folder.glob("*.h5")} - {VIEW}
-    names.update(path.with_suffix(".h5").name for path in folder.glob("*.json")
-                 if path.with_suffix(".h5").name not in names and _is_commit_record(path))
-    with contextlib.suppress(FileNotFoundError):
-        names.update(shard["name"] for shard in json.loads((folder / PLAN).read_text(encoding="utf-8"))["shards"])
-    return names
-
-
-def _is_commit_record(path: Place) -> bool:
-    try:
-        record = {} if path.name == PLAN else json.loads(path.read_text(encoding="utf-8"))
-        return record.get("shard") == path.with_suffix(".h5").name
-    except (OSError, ValueError, AttributeError):
-        return False
-
-
-def _require_whole(done: Sequence[str], missing: Sequence[str], folder: Place) -> None:
-    if missing:
-        raise ValueError(f"expected {len(done) + len(missing)} finished shards, got {len(missing)} unfinished "
-                         f"({_first(missing)}), in {folder} (partial=True uses the others)")
-
-
-def read_description(folder: PathLike | RemotePath) -> dict[str, Any]:
-    """dataset.json of a finalized folder.
-
-    Parameters
-    ----------
-    folder : str or path
-        Also a URL.
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    ValueError
-        It is of another major version, or no JSON.
-    """
-    path = place(folder) / DESCRIPTION
-    try:
-        description = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ValueError(f"expected JSON, got {error}, in {path}") from error
-    check_version(description, "version", DESCRIPTION_FORMAT, DESCRIPTION_VERSION, path)
-    return description
-
-
-def _described_shards(folder: Place, description: Mapping[str, Any], partial: bool) -> list[_Shard]:
-    if not partial:
-        _require_whole(description["shards"], description.get("missing", ()), folder)
-    entries = description["shards"]
-    for entry in entries:
-        if not SHARD_NAME.fullmatch(str(entry["name"])):
-            raise ValueError(f"expected the name of a shard beside it, got {entry['name']!r}, in "
-                             f"{folder / DESCRIPTION}")
-    paths = [folder / entry["name"] for entry in entries]
-    with concurrent.futures.ThreadPoolExecutor(folder.at_once if isinstance(folder, RemotePath) else 1) as pool:
-        for path, is_same in zip(paths, pool.map(_is_same, paths, entries)):
-            if not is_same:
-                raise ValueError(f"expected the shard that {DESCRIPTION} describes, got another or none, in {path} "
-                                 "(run eventgan convert, then eventgan finalize)")
-    valid = {entry["name"]: np.ones(entry["samples"], bool) for entry in entries}
-    for sample in description["quarantined"]:
-        valid[sample["shard"]][sample["slot"]] = False
-    return [_Shard(path, entry["split"], valid[entry["name"]]) for path, entry in zip(paths, entries)]
-
-
-def _is_same(path: Place, entry: Mapping[str, Any]) -> bool:
-    """Whether the shard is the one that was described: by its size, and by its commit record if there is one."""
-    try:
-        if path.stat().st_size != entry["size_bytes"]:
-            return False
-    except FileNotFoundError:
-        return False
-    try:
-        return json.loads(_record(path).read_text(encoding="utf-8"))["sha256"] == entry["sha256"]
-    except FileNotFoundError:
-        return True
-    except (ValueError, KeyError):
-        return False
-
-
-def _is_done(path: Place) -> bool:
-    """Whether the shard is finished: the commit record beside it names it and has its size."""
-    try:
-        record = json.loads(_record(path).read_text(encoding="utf-8"))
-    except (FileNotFoundError, ValueError):
-        return False
-    return record.get("shard") == path.name and record.get("size_bytes") == path.stat().st_size
 
 
 def _represented(sample: Sample, representation: str, counts: str, seed: int) -> np.ndarray:

@@ -36,3 +36,9 @@ def path_of(path: Any, what: str) -> str:
     if not isinstance(path, (str, bytes, os.PathLike)):
         raise ValueError(f"expected the path of {what}, got {path!r}")
     return os.fsdecode(path)
+
+
+def first_of(texts: Iterable[str], most: int = 5) -> str:
+    """ "a, b, ...": so many of them, and whether there are more."""
+    texts = list(texts)
+    return ", ".join(texts[:most]) + (", ..." if texts[most:] else "")
