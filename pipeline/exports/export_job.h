@@ -64,6 +64,14 @@ struct ExportFormat {
 /// All formats, in the order of the page.
 const std::vector<ExportFormat>& export_formats();
 
+/// Whether `pattern`, an ExportFile::name, means this name.
+bool fits(std::string_view name, std::string_view pattern);
+
+/// A pattern with `any` of each SPLIT, NAME ... in it, and `text` of each character besides.
+std::string spelled(std::string_view pattern,
+                    const std::function<std::string(std::string_view)>& any,
+                    const std::function<std::string(char)>& text);
+
 /// Whether a file of the format may have this name, or one of every export.
 bool writes(const ExportFormat& format, std::string_view name);
 

@@ -50,11 +50,6 @@ void check_span(const std::array<double, 2>& times_s, int last_bin) {
   }
 }
 
-std::size_t pixel_of(const Event& event, ImageSize size) {
-  return static_cast<std::size_t>(event.y) * static_cast<std::size_t>(size.width) +
-         static_cast<std::size_t>(event.x);
-}
-
 /// Adds an event at t* to its bin and the one above it; the bins of its pixel and polarity lie
 /// `stride` apart.
 void add_event(double star, int last_bin, double* bins, std::size_t stride) {

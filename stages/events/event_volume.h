@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
@@ -18,6 +19,12 @@ namespace eventgan {
 /// (B-1)(t_N - t_1) is not finite. Thread safe.
 std::vector<float> event_volume(std::span<const Event> events, const VolumeShape& shape,
                                 std::optional<std::array<double, 2>> times_s = std::nullopt);
+
+/// The place of an event's pixel in an image [y, x], which it lies in.
+inline std::size_t pixel_of(const Event& event, ImageSize size) {
+  return static_cast<std::size_t>(event.y) * static_cast<std::size_t>(size.width) +
+         static_cast<std::size_t>(event.x);
+}
 
 /// Throws std::invalid_argument for events that event_volume does not take; `times_s` are t_1 and
 /// t_N. Thread safe.

@@ -30,11 +30,6 @@ std::array<double, 2> numbers_allowed(std::string_view symbol) {
   return {1, symbol == "K" ? 49.0 : 64.0};
 }
 
-std::size_t pixel_of(const Event& event, ImageSize size) {
-  return static_cast<std::size_t>(event.y) * static_cast<std::size_t>(size.width) +
-         static_cast<std::size_t>(event.x);
-}
-
 /// 1 / s; 0 of no time, and of so little that this is infinite.
 double per(double duration_s) {
   const double frequency = 1 / duration_s;
@@ -228,7 +223,8 @@ void represent(std::span<const Event> events, const Representation& representati
   std::ranges::fill(values, std::byte{0});
   if (events.empty()) return;
   const auto times = times_s.value_or(std::array{events.front().t_s, events.back().t_s});
-  check_events(events, size, times);
+  // event_volume checks its events itself.
+  if (representation.kind != RepresentationKind::kVolume) check_events(events, size, times);
   const auto write = [&](const std::vector<float>& made) {
     std::memcpy(values.data(), made.data(), values.size());
   };

@@ -1,22 +1,12 @@
 #pragma once
 
-#include <functional>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "pipeline/exports/detail/exporter.h"
 
 namespace eventgan {
-
-/// Whether `pattern`, an ExportFile::name, means this name.
-bool fits(std::string_view name, std::string_view pattern);
-
-/// A pattern with `any` of each SPLIT, NAME ... in it, and `text` of each character besides.
-std::string spelled(std::string_view pattern,
-                    const std::function<std::string(std::string_view)>& any,
-                    const std::function<std::string(char)>& text);
 
 /// The files of a kind that an export has.
 struct FilesOfKind {
