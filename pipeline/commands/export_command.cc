@@ -49,6 +49,7 @@ struct ExportArguments {
   std::string out;
   std::string classes, representation;
   bool keep_ignored = false;
+  EventCounts counts = EventCounts::kPoisson;
   bool is_float32 = false;
   ExportOptions options;
   ProgressStyle progress = ProgressStyle::kAuto;
@@ -70,6 +71,7 @@ int run(const CLI::App& command, const ExportArguments& arguments) {
   options.out = arguments.out;
   if (command.count("--classes") > 0) options.classes = arguments.classes;
   if (command.count("--representation") > 0) options.representation = arguments.representation;
+  if (command.count("--counts") > 0) options.counts = arguments.counts;
   if (command.count("--ignored") > 0) options.keep_ignored = arguments.keep_ignored;
   if (arguments.is_float32) options.dtype = StoredType::kFloat32;
   const StopSignal signal(stopping_line("finishing the current samples"));
@@ -128,8 +130,9 @@ void add_export_command(CLI::App& app, int& exit_code) {
       kIsPng);
   take_one_of(add("--dtype", arguments->is_float32, "type of the values; default: float16"),
               kIsFloat32);
-  take_one_of(add("--counts", options.counts,
-                  "draw the number of events from a Poisson distribution (default) or round it"),
+  take_one_of(add("--counts", arguments->counts,
+                  "draw the number of events from a Poisson distribution (default) or round it; of "
+                  "recordings the camera's own are taken, unless this is given"),
               kCounts);
   take_one_of(add("--layout", options.event_file,
                   "lines of text, t x y p (default), or HDF5 as MVSEC has it"),

@@ -32,6 +32,7 @@ class Aedat4Exporter : public RecordingsExporter {
   }
 
   void check(const ExportInput& input, const std::function<void()>& check_stop) const override {
+    RecordingsExporter::check(input, check_stop);
     require_sides(input, check_stop, Aedat4Writer::kLargestSide, "aedat4");
   }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "pipeline/exports/detail/recordings.h"
+#include "pipeline/exports/detail/sample_events.h"
 #include "stages/exports/sampled_events.h"
 #include "stages/recordings/writers/mvsec_writer.h"
 
@@ -28,19 +28,21 @@ void write_recording(const std::filesystem::path& path, ImageSize size, std::vec
 /// events/SPLIT/NAME.txt or .hdf5.
 class EventsExporter : public Exporter {
  public:
-  EventsExporter(const ExportInput&, const ExportOptions& options) : options_(options) {}
+  EventsExporter(const ExportInput& input, const ExportOptions& options)
+      : options_(options), events_(input, options) {}
 
   std::string settings() const override {
-    return fmt::format("counts {}\nfile {}\nseed {}\n",
-                       options_.counts == EventCounts::kPoisson ? "poisson" : "rounded",
+    return fmt::format("{}file {}\nseed {}\n", events_.settings(),
                        options_.event_file == EventFile::kText ? "text" : "mvsec", options_.seed);
   }
+
+  void check(const ExportInput&, const std::function<void()>&) const override { events_.open(); }
 
   void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
                    ExportFolder::Step& step) const override {
     work.for_each_sample(shard, reader, [&](const OutgoingSample& sample) {
       const double gap_s = known_gap_s(sample.labels.pair);
-      const std::vector<Event> events = drawn_events(sample, options_, gap_s);
+      const std::vector<Event> events = events_.of(sample, gap_s);
       const std::string name = "events/" + sample.source.split + "/" + sample.name;
       if (options_.event_file == EventFile::kText) {
         step.write(name + ".txt", events_text(events));
@@ -53,13 +55,14 @@ class EventsExporter : public Exporter {
 
  private:
   ExportOptions options_;
+  SampleEvents events_;
 };
 
 }  // namespace
 
 ExportFormat events_format() {
   return {.word = "events",
-          .title = "events drawn from the volumes, as text or in MVSEC's layout",
+          .title = "events, as text or in MVSEC's layout",
           .need = LabelNeed::kNone,
           .options = {"--counts", "--layout", "--seed"},
           .files = {{"events/SPLIT/NAME.txt",

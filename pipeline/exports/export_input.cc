@@ -15,6 +15,7 @@
 #include "manifests/files/input_file.h"
 #include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/generators.h"
 #include "manifests/values/pair_key.h"
 #include "pipeline/dataset/dataset_description.h"
 #include "pipeline/folder/output_folder.h"
@@ -96,6 +97,7 @@ void ExportInput::read_description(const std::vector<std::string>& splits) {
   missing_ = json.at("missing");
   const JobManifest manifest =
       parse_job_manifest(frozen.plan.manifest_text, folder_, (folder_ / "plan.json").string());
+  has_recordings_ = !needs_frames(manifest.generator.kind);
   Sha256 sources;
   for (const SourceSpec& spec : manifest.sources) {
     sources.update(fmt::format("{}\n{}\n{}\n", to_string(spec.dataset), spec.root, spec.split));

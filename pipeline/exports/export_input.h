@@ -64,6 +64,7 @@ class ExportInput {
   const std::vector<std::string>& splits() const { return splits_; }  ///< chosen, plan's order
   const std::vector<ExportSource>& sources() const { return sources_; }
   const std::vector<ExportShard>& shards() const { return shards_; }    ///< in plan order
+  bool has_recordings() const { return has_recordings_; }  ///< made of a camera's events
   const std::vector<std::string>& missing() const { return missing_; }  ///< finalize --partial
 
   const ExportSource& source_of(const ExportShard& shard) const {
@@ -90,6 +91,7 @@ class ExportInput {
   std::vector<std::string> splits_, missing_;
   std::vector<ExportSource> sources_;
   std::vector<ExportShard> shards_;
+  bool has_recordings_ = false;
   mutable std::mutex mutex_;
   mutable std::set<std::string> hashed_;
 };

@@ -88,7 +88,8 @@ struct ExportOptions {
   double full_scale = 1;   ///< the value that becomes 255, > 0
   bool as_images = false;  ///< volumes as PNG images of three channels
   StoredType dtype = StoredType::kFloat16;  ///< or kFloat32
-  EventCounts counts = EventCounts::kPoisson;
+  /// How many events are drawn of a volume; unset: kPoisson, and of recordings the camera's own.
+  std::optional<EventCounts> counts;
   EventFile event_file = EventFile::kText;
   /// Of `rvt`: histogram:T, or volume; unset: histogram:10.
   std::optional<std::string> representation;

@@ -15,6 +15,7 @@ class RawExporter : public RecordingsExporter {
   using RecordingsExporter::RecordingsExporter;
 
   void check(const ExportInput& input, const std::function<void()>& check_stop) const override {
+    RecordingsExporter::check(input, check_stop);
     require_sides(input, check_stop, Evt3Writer::kLargestSide, "raw");
   }
 

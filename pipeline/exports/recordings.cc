@@ -16,12 +16,10 @@
 #include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
-#include "manifests/values/pair_key.h"
 #include "manifests/values/recently_used.h"
 #include "manifests/values/text.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/archives/numpy_arrays.h"
-#include "stages/exports/sampled_events.h"
 
 namespace eventgan {
 namespace {
@@ -160,21 +158,8 @@ class LastReaders {
 
 }  // namespace
 
-double known_gap_s(const FramePair& pair) {
-  const double gap_s = pair.gap_s();
-  return gap_s > 0 ? gap_s : 1;
-}
-
-std::vector<Event> drawn_events(const OutgoingSample& sample, const ExportOptions& options,
-                                double duration_s) {
-  const PairKey key{options.seed, sample.source.dataset, sample.labels.sample_id,
-                    sample.source.key};
-  return sample_events(sample.reader.volume(sample.slot), sample.reader.header().volume, duration_s,
-                       options.counts, key.pair());
-}
-
 RecordingsExporter::RecordingsExporter(const ExportInput& input, const ExportOptions& options)
-    : options_(options) {
+    : options_(options), events_(input, options) {
   if (std::ranges::any_of(input.sources(), &ExportSource::has_boxes)) {
     numbers_ = std::make_unique<ClassNumbers>(input, options, 0);
   } else if (options.classes) {
@@ -183,23 +168,29 @@ RecordingsExporter::RecordingsExporter(const ExportInput& input, const ExportOpt
 }
 
 std::string RecordingsExporter::settings() const {
-  return fmt::format("classes {}\ncounts {}\nframes_per_second {:g}\nseed {}\n",
-                     numbers_ ? numbers_->text() : "none",
-                     options_.counts == EventCounts::kPoisson ? "poisson" : "rounded",
+  return fmt::format("classes {}\n{}frames_per_second {:g}\nseed {}\n",
+                     numbers_ ? numbers_->text() : "none", events_.settings(),
                      options_.frames_per_second, options_.seed);
+}
+
+void RecordingsExporter::check(const ExportInput&, const std::function<void()>&) const {
+  events_.open();
 }
 
 RecordedSample RecordingsExporter::recorded(const OutgoingSample& sample,
                                             const SampleWindow& window) const {
   RecordedSample result{sample.labels.sample_id, {}, {}, {}, {}, {}, {}};
   const std::int64_t length_us = window.end_us - window.begin_us;
-  const auto events =
-      drawn_events(sample, options_, static_cast<double>(length_us) / kMicroseconds);
+  const auto events = events_.of(sample, static_cast<double>(length_us) / kMicroseconds);
   result.events.reserve(events.size());
   for (const Event& event : events) {
-    // At neither end of the window, since some readers count the begin to it and others the end.
-    const auto t_us = static_cast<std::int64_t>(event.t_s * kMicroseconds);
-    const std::int64_t last_us = length_us - 1;
+    // Drawn ones at neither end of the window, since some readers count the begin to it and others
+    // the end; a camera's at their own times, which a window's begin is not.
+    const bool is_recorded = events_.are_recorded();
+    const double time_us = event.t_s * kMicroseconds;
+    const std::int64_t t_us =
+        is_recorded ? std::llround(time_us) : static_cast<std::int64_t>(time_us);
+    const std::int64_t last_us = is_recorded ? length_us : length_us - 1;
     result.events.push_back(
         {window.begin_us + std::clamp(t_us, std::min<std::int64_t>(1, last_us), last_us),
          static_cast<std::uint16_t>(event.x), static_cast<std::uint16_t>(event.y), event.positive});

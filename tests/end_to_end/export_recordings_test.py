@@ -18,7 +18,7 @@ import aedat4
 import exported_demo as demo
 import program
 import small_job
-from camera_files import volume_of
+from camera_files import random_events, volume_of, whole_microseconds, write_mvsec
 from dsec_sequence import DsecSequence, half_size
 from exported_demo import Export, of, read_samples
 from program import run
@@ -632,6 +632,88 @@ class Recordings(Export):
         classes.write_text(json.dumps({"Car": 256}))
         _, err = self.export("dsec", "--classes", classes, source=source, expect=64)
         self.assertIn("at most 255", err)
+
+
+class EventsOfACamera(Export):
+    """A recording of 32x24, converted at twice the size, has the camera's own events in every format."""
+    FRAMES = [10.0 + 0.05 * k for k in range(5)]
+    COUNTS = "run eventgan convert with the manifest again if recordings have moved; --counts draws events"
+
+    def setUp(self):
+        super().setUp()
+        self.job = self.out.parent
+        self.rows = whole_microseconds(random_events(3000, 9.98, 10.3, seed=5))[0]
+        write_mvsec(self.job / "walk.hdf5", self.rows, self.FRAMES)
+        (self.job / "walk.csv").write_text("time_s,left,top,right,bottom,class\n" + "".join(
+            f"{time:.6f},4,6,20,22,person\n" for time in self.FRAMES[1:]))
+
+    def convert(self, **changes):
+        source = {"dataset": "recording", "root": str(self.job / "walk.hdf5"), **changes.pop("source", {})}
+        manifest = self.job / "manifest.json"
+        manifest.write_text(json.dumps(program.manifest(
+            [source], generator={"kind": "events"}, image={"width": 64, "height": 48}, **changes)))
+        run("convert", manifest, "--progress", "none")
+        return self.job / "out"
+
+    def expected(self, begin, end):
+        """t in microseconds, x, y and p of the recording's events after `begin`, up to `end`."""
+        ticks = np.round(self.rows[:, 2] * 1e6).astype(np.int64)
+        of_window = (ticks > begin) & (ticks <= end)
+        x, y, _, p = self.rows[of_window].astype(np.int64).T
+        return np.stack([ticks[of_window], 2 * x + 1, 2 * y + 1, p > 0])
+
+    def test_every_format_has_them(self):
+        source = self.convert()
+        begin, end = (int(self.FRAMES[k] * 1e6) for k in (0, -1))
+        for to, read, clock in (
+                ("dsec", lambda at: read_columns(at / "dsec/train/walk/events/left/events.h5"), 0),
+                ("rvt", lambda at: read_columns(at / "raw/train/walk_td.h5"), begin),
+                ("raw", lambda at: decode_evt3((at / "raw/train/walk.raw").read_bytes())[1], begin),
+                ("aedat4", lambda at: aedat4.read(at / "aedat4/train/walk.aedat4")[1], 0)):
+            with self.subTest(to=to):
+                self.export(to, source=source, out=self.out / to)
+                np.testing.assert_array_equal(np.stack(read(self.out / to)) + [[clock], [0], [0], [0]],
+                                              self.expected(begin, end))
+                self.assertIn("counts recorded\n", self.described(self.out / to)["settings"])
+        self.export("events", source=source, out=self.out / "events")
+        for first, last in zip(self.FRAMES, self.FRAMES[1:]):
+            name = f"walk+{last:017.6f}".replace(".", "%2E")
+            t, *others = np.loadtxt(self.out / "events/events/train" / f"{name}.txt").T
+            expected = self.expected(int(first * 1e6), int(last * 1e6))
+            np.testing.assert_allclose(first + t, expected[0] * 1e-6, atol=1e-8)
+            np.testing.assert_array_equal(others, expected[1:])
+
+    def test_windows_of_so_many_events(self):
+        self.export("dsec", source=self.convert(source={"window_events": 100}))
+        seen = 0
+        for path in self.out.glob("dsec/train/*"):
+            t, *others = read_columns(path / "events/left/events.h5")
+            for begin, end, _, count, _ in read_windows(path / "windows.txt"):
+                inside = (begin <= t) & (t <= end)
+                self.assertEqual((inside.sum(), count), (100, 100))
+                # The window begins with its first event, which is not at the begin of a recording's.
+                np.testing.assert_array_equal(np.stack([np.maximum(t, begin), *others])[1:, inside],
+                                              self.expected(begin - 1, end)[1:])
+                seen += 1
+        self.assertEqual(seen, 4)
+
+    def test_other_recordings_than_were_converted(self):
+        source = self.convert()
+        with h5py.File(self.job / "walk.hdf5", "r+") as file:
+            del file["davis/left/events"]
+            file["davis/left/events"] = self.rows[self.rows[:, 2] != self.rows[1500, 2]]
+        _, err = self.export("raw", source=source, expect=66)
+        self.assertRegex(err, r"expected \d+ positive and \d+ negative events, of which the volume is made, got \d+ and "
+                              r"\d+, in .*walk.hdf5 \(walk/0+10.\d+\)")
+        self.assertIn(self.COUNTS, err)
+        (self.job / "walk.hdf5").unlink()
+        _, err = self.export("raw", source=source, out=self.out / "gone", expect=66)
+        self.assertIn("walk.hdf5", err)
+        self.assertIn(self.COUNTS, err)
+        self.assertFalse((self.out / "gone").exists())
+        self.export("raw", "--counts", "rounded", source=source, out=self.out / "drawn")
+        _, (t, *_) = decode_evt3((self.out / "drawn/raw/train/walk.raw").read_bytes())
+        self.assertGreater(len(t), 1000)
 
 
 if __name__ == "__main__":

@@ -9,18 +9,11 @@
 #include <vector>
 
 #include "pipeline/exports/detail/exporter.h"
+#include "pipeline/exports/detail/sample_events.h"
 #include "pipeline/preview/preview_reader.h"
 #include "stages/recordings/writers/event_columns_writer.h"
 
 namespace eventgan {
-
-/// The events of a sample, from 0 to `duration_s`: drawn by the options' seed, the dataset and the
-/// sample's id, the same in all formats.
-std::vector<Event> drawn_events(const OutgoingSample& sample, const ExportOptions& options,
-                                double duration_s);
-
-/// Seconds from a pair's previous frame to its next one; 1 where that is not known.
-double known_gap_s(const FramePair& pair);
 
 // Of the rows' tables of files.
 inline constexpr char kBboxFile[] =
@@ -95,6 +88,7 @@ class RecordingsExporter : public Exporter {
   RecordingsExporter(const ExportInput& input, const ExportOptions& options);
 
   std::string settings() const override;
+  void check(const ExportInput& input, const std::function<void()>& check_stop) const override;
   bool works_by_shard() const override { return false; }
   void finish(const ExportWork& work, const std::vector<const ExportShard*>& shards) const override;
   void account(const OutgoingSample& sample, LeftOut& left_out) const override;
@@ -129,6 +123,7 @@ class RecordingsExporter : public Exporter {
   RecordedSample recorded(const OutgoingSample& sample, const SampleWindow& window) const;
 
   ExportOptions options_;
+  SampleEvents events_;
   std::unique_ptr<ClassNumbers> numbers_;
   // Of `finish`:
   mutable LeftOut left_out_;          ///< of whole recordings
