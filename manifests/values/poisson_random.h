@@ -28,6 +28,7 @@ inline double poisson(double mean, const CounterRandom& random, std::uint64_t fi
   constexpr double kLargestInverted = 16;
   if (mean <= kLargestInverted) {
     const double uniform = random.uniform(first);
+    if (uniform < 1 - mean) return 0;  // as a rule; exp(-mean) is more
     double probability = std::exp(-mean);
     double sum = probability;
     double count = 0;

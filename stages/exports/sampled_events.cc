@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -21,16 +22,29 @@ class Sampling {
   Sampling(const VolumeShape& shape, double duration_s, const CounterRandom& random)
       : shape_(shape), duration_s_(duration_s), offsets_(random.keyed("offsets")) {}
 
-  /// `counts`: of each value of the volume.
-  std::vector<Event> run(const std::vector<int>& counts) {
+  /// `count_of(place)`: how many events the value there becomes.
+  std::vector<Event> run(const auto& count_of) {
+    constexpr std::size_t kTogether = 1024;  // pixels, so that memory is read in its order
     const std::size_t plane = shape_.size.pixel_count();
     std::vector<int> bins(static_cast<std::size_t>(shape_.bins));
+    std::vector<int> counts(bins.size() * kTogether);
     for (std::size_t polarity = 0; polarity < 2; ++polarity) {
-      for (std::size_t pixel = 0; pixel < plane; ++pixel) {
+      for (std::size_t first = 0; first < plane; first += kTogether) {
+        const std::size_t pixels = std::min(kTogether, plane - first);
+        std::array<int, kTogether> any{};  // of a pixel's bins: most pixels are silent
         for (std::size_t bin = 0; bin < bins.size(); ++bin) {
-          bins[bin] = counts[(polarity * bins.size() + bin) * plane + pixel];
+          const std::size_t place = (polarity * bins.size() + bin) * plane + first;
+          for (std::size_t i = 0; i < pixels; ++i) {
+            any[i] |= counts[bin * kTogether + i] = count_of(place + i);
+          }
         }
-        take_pixel(pixel, polarity == 0, bins);
+        for (std::size_t i = 0; i < pixels; ++i) {
+          if (any[i] == 0) continue;
+          for (std::size_t bin = 0; bin < bins.size(); ++bin) {
+            bins[bin] = counts[bin * kTogether + i];
+          }
+          take_pixel(first + i, polarity == 0, bins);
+        }
       }
     }
     std::ranges::stable_sort(events_, {}, &Event::t_s);
@@ -47,7 +61,6 @@ class Sampling {
 
   /// `bins` are counts, and are used up.
   void take_pixel(std::size_t pixel, bool positive, std::vector<int>& bins) {
-    if (std::ranges::all_of(bins, [](int count) { return count == 0; })) return;
     const std::size_t last = bins.size() - 1;
     // The first pixel with events in an outermost bin leaves them there.
     const bool anchors_first = !has_first_ && bins.front() > 0;
@@ -95,13 +108,13 @@ std::vector<Event> sample_events(std::span<const float> volume, const VolumeShap
                                  kMostSampledEvents, sum));
   }
   const CounterRandom draws = random.keyed("counts");
-  std::vector<int> drawn(volume.size());
-  for (std::size_t i = 0; i < volume.size(); ++i) {
-    drawn[i] = counts == EventCounts::kRounded
-                   ? static_cast<int>(std::lround(volume[i]))
-                   : static_cast<int>(poisson(volume[i], draws, i, volume.size()));
-  }
-  return Sampling(shape, duration_s, random).run(drawn);
+  const auto count_of = [&](std::size_t i) {
+    if (volume[i] == 0) return 0;
+    return counts == EventCounts::kRounded
+               ? static_cast<int>(std::lround(volume[i]))
+               : static_cast<int>(poisson(volume[i], draws, i, volume.size()));
+  };
+  return Sampling(shape, duration_s, random).run(count_of);
 }
 
 std::string events_text(std::span<const Event> events) {
