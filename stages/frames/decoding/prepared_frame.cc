@@ -413,8 +413,9 @@ FramesBetween frames_between(const SharedImage& image, const FramePair& pair, co
     FramesBetween between = between_of(kept, spec, placement, flow);
     const auto scaled =
         std::make_shared<const ScaledLayers>(kept->moving.scaled(placement, kept->still.channels));
-    between.at = [end = std::move(between.at), kept, scaled, placement, spec](double u) {
-      if (u == 0 || u == 1) return end(u);
+    between.at = [end = std::move(between.at), label = pair.label_position, kept, scaled, placement,
+                  spec](double u) {
+      if (u == label) return end(u);
       return unless_refused([&] {
         return GreyImage{visible_part(placement).size,
                          finished(kept->moving.frame(*scaled, u), placement, spec)};

@@ -107,9 +107,10 @@ std::array<PreparedFrame, 2> prepare_still(const ColourView& image, const FrameP
 ColourFrame move_still(const ColourFrame& image, const FramePair& pair,
                        const std::vector<Box>& boxes = {});
 
-/// What prepare_still makes the two ends of: at label_position it is that image, at the other end
-/// the moved one, and between them image and objects move steadily
-/// (manifests/values/still_motion.h). `flow` is as prepare_still has it. Throws as prepare_still.
+/// At label_position prepare_still's image; from there to the other end image and objects move
+/// steadily (manifests/values/still_motion.h), and these frames are sampled in the volume's size
+/// (detail/scaled_layers.h), those of clips (FramePair::poses) in the photograph's. `flow` is as
+/// prepare_still has it. Throws as prepare_still.
 FramesBetween frames_between(const SharedImage& image, const FramePair& pair, const ImageSpec& spec,
                              const std::vector<Box>& boxes, PixelFlow* flow = nullptr);
 
