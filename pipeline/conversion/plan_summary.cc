@@ -22,19 +22,30 @@ struct Place {
   int slot = 0;
 };
 
-/// The first `most` + 1 samples of each source without known faults: a video can only be decoded
-/// from its start, and so costs what it will in the run.
-std::vector<Place> first_of_each_source(const Plan& plan, int most) {
-  std::vector<Place> places;
-  std::map<int, int> taken;  // by source
+/// Of each source, samples without known faults and one more to warm up: up to four from its start,
+/// since a video can only be decoded from there and neighbours share frames, and so cost what they
+/// will in the run; or of stills, which share nothing and differ much, `most` spread over it.
+std::vector<Place> places_to_try(const Plan& plan, int most) {
+  constexpr int kNeighbours = 4;
+  const auto first_count = static_cast<std::size_t>(1 + std::min(most, kNeighbours));
+  const auto still_count = static_cast<std::size_t>(1 + most);
+  std::map<int, std::vector<Place>> places, stills;  // by source
   for (const PlannedShard& shard : plan.shards) {
-    for (std::size_t slot = 0; slot < shard.samples.size() && taken[shard.source] <= most; ++slot) {
-      if (!shard.samples[slot].fault.empty()) continue;
-      places.push_back({&shard, static_cast<int>(slot)});
-      ++taken[shard.source];
+    for (std::size_t slot = 0; slot < shard.samples.size(); ++slot) {
+      const PlannedSample& sample = shard.samples[slot];
+      if (!sample.fault.empty()) continue;
+      auto& of_source = (sample.pair.motion ? stills : places)[shard.source];
+      if (!sample.pair.motion && of_source.size() == first_count) break;
+      of_source.push_back({&shard, static_cast<int>(slot)});
     }
   }
-  return places;
+  std::vector<Place> tried;
+  for (const auto& [source, all] : stills) {
+    const std::size_t count = std::min(still_count, all.size());
+    for (std::size_t i = 0; i < count; ++i) tried.push_back(all[i * all.size() / count]);
+  }
+  for (const auto& [source, first] : places) tried.insert(tried.end(), first.begin(), first.end());
+  return tried;
 }
 
 /// What some pairs cost together.
@@ -62,7 +73,7 @@ TrialEstimate measure_trial(const JobManifest& manifest, const PlannedJob& job,
   const SampleStages stages(manifest, job.datasets, generator, 1);
   std::map<int, Cost> costs, first_costs;  // by source
   int warm_source = -1;
-  for (const Place& place : first_of_each_source(job.plan, most)) {
+  for (const Place& place : places_to_try(job.plan, most)) {
     const SampleMessage message = run(stages, place);
     // In the first pair of a source libraries prepare, a video is opened.
     const int source = place.shard->source;

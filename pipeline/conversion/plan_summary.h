@@ -17,11 +17,12 @@ struct TrialEstimate {
   double stored_bytes = 0;      ///< compressed volumes
 };
 
-/// Runs up to `most` pairs from the start of each source through reading, generating and encoding
-/// on the calling thread (after one more, which counts only where no other could be tried), and
-/// scales by source and image size. Pairs that fail are left out.
+/// Runs up to four pairs from the start of each source, or of stills up to `most` spread over it
+/// (fewer than four are the most of others, too), through reading, generating and encoding on the
+/// calling thread (after one more, which counts only where no other could be tried), and scales by
+/// source and image size. Pairs that fail are left out.
 TrialEstimate measure_trial(const JobManifest& manifest, const PlannedJob& job,
-                            const Generator& generator, int threads, int most = 4);
+                            const Generator& generator, int threads, int most = 16);
 
 /// What `eventgan plan` prints: for each source its labelled frames, pairs by gap, what is missing,
 /// its shards; then the estimate for the whole.

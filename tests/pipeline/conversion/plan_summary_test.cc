@@ -116,6 +116,26 @@ TEST(MeasureTrial, ScalesAFewPairsToTheWholePlan) {
   EXPECT_GT(estimate.stored_bytes, 0);
 }
 
+TEST(MeasureTrial, OfStillsItTriesSomeSpreadOverTheSource) {
+  const testing::TemporaryFolder folder;
+  const JobManifest manifest = testing::make_small_job(folder, 41);
+  PlannedJob job = make_plan(manifest, "w", "e");
+  std::set<std::string> first;
+  for (PlannedShard& shard : job.plan.shards) {
+    for (PlannedSample& sample : shard.samples) {
+      sample.pair.previous = sample.pair.next;
+      sample.pair.motion = ImageMotion{.x_px = 1};
+      if (first.size() == 10) continue;
+      first.insert(sample.sample_id);
+      testing::write_file(folder / sample.pair.next.path, "");
+    }
+  }
+  // 17 of 40, of which the first ten cannot be read: one in four, and the one that warms up.
+  const TrialEstimate estimate = measure_trial(manifest, job, testing::FakeGenerator(), 1);
+  EXPECT_EQ(estimate.pairs_measured, 12);
+  EXPECT_EQ(measure_trial(manifest, job, testing::FakeGenerator(), 1, 1).pairs_measured, 1);
+}
+
 TEST(MeasureTrial, LeavesOutPairsThatFail) {
   const testing::TemporaryFolder folder;
   const JobManifest manifest = testing::make_small_job(folder, 3);
