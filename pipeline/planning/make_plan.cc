@@ -186,7 +186,7 @@ int samples_per_shard(const JobManifest& manifest, const SourceSpec& source, Ima
   constexpr double kShard_s = 20;
   // Of one core; they err towards smaller shards. EventGAN in float32 (manifests/guides/speed.md),
   // simulators and cameras' events, and the cutting out of a photograph's objects.
-  constexpr double kPerPixelAndWidth2_s = 2.4e-9, kPerPixel_s = 1e-7, kCutOut_s = 1;
+  constexpr double kPerPixelAndWidth2_s = 2.4e-9, kPerPixel_s = 1e-7, kCutOut_s = 0.3;
   constexpr int kPublishedWidth = 32, kShippedWidth = 16;
   const GeneratorSpec& generator = manifest.generator;
   double per_pixel_s = kPerPixel_s;
