@@ -129,6 +129,12 @@ Precision choose_precision(std::optional<Engine> engine, Device device,
   return is_good ? Precision::kBfloat16 : Precision::kFloat32;
 }
 
+Precision precision_of(const GeneratorSpec& spec) {
+  if (spec.precision) return *spec.precision;
+  return choose_precision(spec.engine, spec.device,
+                          engine_support(Precision::kBfloat16, spec.device));
+}
+
 EngineChoice choose_engine(const EngineRequest& request, const EngineSupport& support) {
   if (request.device == Device::kCuda) return on_cuda(request, support);
   EngineChoice choice = request.engine ? asked(*request.engine, request.precision, support)

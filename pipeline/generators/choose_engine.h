@@ -45,6 +45,9 @@ EngineChoice choose_engine(const EngineRequest& request, const EngineSupport& su
 Precision choose_precision(std::optional<Engine> engine, Device device,
                            const EngineSupport& support);
 
+/// The manifest's precision, of "auto" what the processor that runs this takes.
+Precision precision_of(const GeneratorSpec& spec);
+
 /// What runs a precision on the processor that runs this, as oneDNN sees it
 /// (ONEDNN_MAX_CPU_ISA minded), and, only for Device::kCuda, on the CUDA device (cuda_support).
 EngineSupport engine_support(Precision precision, Device device = Device::kCpu);

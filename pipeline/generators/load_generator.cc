@@ -183,10 +183,7 @@ LoadedGenerator load_generator(const JobManifest& manifest) {
   if (!has_weights(spec.kind)) return load_without_weights(manifest);
   LoadedWeights loaded = load_weights(manifest);
   check_threshold(loaded.weights, loaded.hash, spec);
-  const Precision precision =
-      spec.precision ? *spec.precision
-                     : choose_precision(spec.engine, spec.device,
-                                        engine_support(Precision::kBfloat16, spec.device));
+  const Precision precision = precision_of(spec);
   const EngineSupport support = engine_support(precision, spec.device);
   EngineChoice choice = choose_engine(
       {spec.engine, precision, loaded.weights.calibration != nullptr, spec.weights, spec.device},

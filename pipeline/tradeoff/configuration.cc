@@ -8,8 +8,19 @@
 #include "manifests/documents/job_manifest.h"
 #include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
+#include "pipeline/generators/choose_engine.h"
+#include "stages/generator/shipped_weights.h"
 
 namespace eventgan {
+
+Configuration own_configuration(const JobManifest& manifest) {
+  const GeneratorSpec& generator = manifest.generator;
+  if (!has_weights(generator.kind)) return {{.method = generator.kind}, manifest.output.dtype};
+  return {{.weights = shipped_weights_name(generator.weights),
+           .precision = precision_of(generator),
+           .scope = generator.scope.scope},
+          manifest.output.dtype};
+}
 
 std::vector<Computation> computations(const TradeoffAxes& axes) {
   std::vector<Computation> all;

@@ -27,6 +27,9 @@ struct Configuration {
   bool operator==(const Configuration&) const = default;
 };
 
+/// The one that a manifest says; of precision "auto" what this processor takes.
+Configuration own_configuration(const JobManifest& manifest);
+
 /// What is compared: every combination. Simulators have no weights, precision and scope.
 struct TradeoffAxes {
   std::vector<GeneratorKind> methods;

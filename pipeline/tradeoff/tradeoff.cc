@@ -143,6 +143,7 @@ Computation Comparison::choose_reference() const {
 }
 
 void Comparison::choose_trials() {
+  report_.own = own_configuration(manifest_);
   const Able reference = look_at(report_.reference);
   if (!reference.reason.empty()) {
     throw UsageError("--reference: expected a configuration that can be run, got " +

@@ -69,6 +69,7 @@ struct TradeoffReport {
   std::int64_t pairs = 0;  ///< that could be read
   Computation reference;
   StoredType reference_dtype = StoredType::kFloat16;  ///< with which its cost is measured
+  Configuration own;                                  ///< the manifest's, one of the trials or none
   std::vector<std::string> skipped;                   ///< "SAMPLE: reason" of the other pairs
   std::vector<Trial> trials;
   std::vector<RefusedComputation> refused;

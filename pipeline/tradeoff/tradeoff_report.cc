@@ -92,7 +92,10 @@ namespace {
 /// What all three forms of the report are made from.
 struct Digest {
   explicit Digest(const TradeoffReport& report) {
-    for (const Trial& trial : report.trials) trials.push_back(summary_of(trial));
+    for (const Trial& trial : report.trials) {
+      if (trial.configuration == report.own) own = trials.size();
+      trials.push_back(summary_of(trial));
+    }
     front = pareto_front(trials);
   }
   bool on_front(std::size_t trial) const { return std::ranges::count(front, trial) > 0; }
@@ -103,6 +106,7 @@ struct Digest {
 
   std::vector<TrialSummary> trials;
   std::vector<std::size_t> front;
+  std::optional<std::size_t> own;  ///< the manifest's
 };
 
 constexpr const char* kNotes[] = {
@@ -208,7 +212,24 @@ struct Answer {
   std::optional<std::size_t> trial;
 };
 
-std::vector<Answer> recommendations(const Digest& digest) {
+/// The manifest's own configuration, and what the front has next to it.
+std::vector<Answer> around_own(const Digest& digest) {
+  if (!digest.own) return {};
+  const TrialSummary& own = digest.trials[*digest.own];
+  std::optional<std::size_t> faster, nearer;
+  for (const std::size_t i : digest.front) {  // from the slowest to the fastest
+    const TrialSummary& trial = digest.trials[i];
+    if (!faster && trial.speedup.median > own.speedup.median) faster = i;
+    if (trial.loss.relative_l2 < own.loss.relative_l2) nearer = i;
+  }
+  std::vector<Answer> answers{{"The manifest's own", digest.own}};
+  if (faster) answers.push_back({"The next faster", faster});
+  if (nearer) answers.push_back({"The next nearer to the reference", nearer});
+  return answers;
+}
+
+/// Measured against the reference.
+std::vector<Answer> near_and_fast(const Digest& digest) {
   const auto best = [&](const TradeoffDemand& demand) { return best_trial(digest.trials, demand); };
   constexpr double kNear = 0.03, kFast = 2;
   std::vector<Answer> answers{
@@ -221,6 +242,12 @@ std::vector<Answer> recommendations(const Digest& digest) {
     answers[1] = {"None is twice as fast as the reference; the fastest",
                   best({.at_most_error = std::numeric_limits<double>::infinity()})};
   }
+  return answers;
+}
+
+std::vector<Answer> recommendations(const Digest& digest) {
+  std::vector<Answer> answers = around_own(digest);
+  std::ranges::move(near_and_fast(digest), std::back_inserter(answers));
   return answers;
 }
 

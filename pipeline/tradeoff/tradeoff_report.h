@@ -42,9 +42,9 @@ std::optional<std::size_t> best_trial(const std::vector<TrialSummary>& trials,
                                       const TradeoffDemand& demand);
 
 /// A table for a person, not wider than 80 columns, the front marked; what could not be run with
-/// the reasons; and with their lines for the manifest: the fastest within 3 % of the reference
-/// (else the nearest), the nearest at twice its speed (else the fastest), and what serves the
-/// demand. UTF-8.
+/// the reasons; and with their lines for the manifest: the manifest's own, the next faster and the
+/// next nearer on the front, the fastest within 3 % of the reference (else the nearest), the
+/// nearest at twice its speed (else the fastest), and what serves the demand. UTF-8.
 std::string to_text(const TradeoffReport& report, const TradeoffDemand& demand);
 
 /// The same as Markdown, with all that was measured.

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -135,6 +136,30 @@ TEST(TradeoffText, AlwaysRecommends) {
   EXPECT_THAT(to_markdown(report, {}), HasSubstr("the nearest:\n\n    near float32"));
   report.trials.clear();
   EXPECT_THAT(to_text(report, {}), HasSubstr("the fastest:\n    no configuration\n"));
+}
+
+TEST(TradeoffJson, SaysWhatIsNextToTheManifestsOwn) {
+  TradeoffReport report = small_report();
+  const auto recommended = [&](const std::string& reason) -> std::string {
+    const auto json = nlohmann::json::parse(to_json(report, {}));
+    for (const auto& entry : json["recommended"]) {
+      if (entry["reason"] == reason) return std::string(entry["name"]).substr(0, 1);
+    }
+    return "none";
+  };
+  for (const auto& [own, faster, nearer] :
+       std::vector<std::array<std::string, 3>>{{"a", "c", "none"},  // b is slower and no nearer
+                                               {"b", "c", "a"},
+                                               {"c", "d", "a"},
+                                               {"d", "none", "c"}}) {
+    report.own = {{GeneratorKind::kNetwork, own}, StoredType::kFloat16};
+    EXPECT_EQ(recommended("The manifest's own"), own);
+    EXPECT_EQ(recommended("The next faster"), faster) << own;
+    EXPECT_EQ(recommended("The next nearer to the reference"), nearer) << own;
+  }
+  EXPECT_THAT(to_text(report, {}), HasSubstr("\nThe manifest's own:\n    d float32"));
+  report.own.dtype = StoredType::kUint8;  // which is not compared
+  EXPECT_EQ(recommended("The manifest's own"), "none");
 }
 
 TEST(TradeoffText, TheTableFitsInto80ColumnsWhateverTheNames) {
