@@ -1,8 +1,13 @@
 """manifests/python/examples/train_detector.py: targets, loss and boxes that belong together,
-and a few steps on the demo."""
+and a few steps on the demo; takeaway.py and detect.py: the same boxes without the training."""
 
+import csv
+import io
 import json
+import os
 import pathlib
+import shutil
+import subprocess
 import sys
 
 import numpy as np
@@ -14,7 +19,11 @@ pytest.importorskip("cv2")
 EXAMPLES = SOURCE / "manifests" / "python" / "examples"
 sys.path.append(str(EXAMPLES))
 
+import detect
+import takeaway
 import train_detector as detector
+
+import eventgan
 
 
 def item(boxes, labels=None, ignore=None, height=96, width=128):
@@ -147,8 +156,92 @@ def test_a_few_steps(channels, data, tmp_path):
                             tmp_path / "out" / "weights.pt")
     assert code == 0 and "of the model's" in said, said
     assert all(entry["category_id"] == "Car" and len(entry["bbox"]) == 4 for entry in entries)
+    assert_taken_away(tmp_path / "out", [*line, "--epochs", "4"], tmp_path)
     said, code = run_script(*line, "--classes", "Cat", "--epochs", "1", "--out", tmp_path / "cats")
     assert code == 1 and "got Cat" in said and "Traceback" not in said
+
+
+def camera(count, size=(132, 176), seed=3):
+    """So many events of a second, of a square that crosses a sensor of that size; microseconds."""
+    draw = np.random.default_rng(seed)
+    events = np.zeros(count, [("t", "<i8"), ("x", "<i2"), ("y", "<i2"), ("p", "i1")])
+    events["t"] = 5_000_000 + np.sort(draw.integers(0, 1_000_000, count))
+    events["x"] = (events["t"] - 5_000_000) * (size[1] - 60) // 1_000_000 + draw.integers(0, 60, count)
+    events["y"], events["p"] = draw.integers(30, 90, count), draw.integers(0, 2, count)
+    return events
+
+
+@pytest.mark.parametrize("normalize, signed", [("none", False), ("eta98", False), ("none", True), ("eta98", True)])
+def test_what_is_taken_away_sees_what_shards_have(normalize, signed):
+    made = takeaway.EventsToBoxes(torch.nn.Identity(), (96, 128), 9, normalize == "eta98", signed)
+    for events in (camera(20_000), camera(1), camera(2)):
+        volume = eventgan.represent(events, "volume:9", size=(132, 176))
+        if normalize == "eta98":
+            volume = np.minimum(volume / np.percentile(volume[volume > 0], 98), 1)
+        expected = eventgan.signed_channel(volume) if signed else volume
+        seen = made.seen(*map(torch.from_numpy, detect.columns(events)), 132, 176)
+        np.testing.assert_allclose(seen.numpy(), expected, atol=2e-5)
+    events = np.array([(0, 5, 5, 1), (9, 5, 5, 0)], camera(0).dtype)  # as many of both: no signed event
+    assert np.isfinite(made.seen(*map(torch.from_numpy, detect.columns(events)), 132, 176).numpy()).all()
+    with pytest.raises(Exception, match="expected events within 50x40, got one at"):
+        made(*map(torch.from_numpy, detect.columns(camera(100))), 40, 50)
+
+
+def test_recordings_are_read_by_their_names(tmp_path):
+    h5py, events = pytest.importorskip("h5py"), camera(50)
+    expected = np.stack(detect.columns(events))
+    np.save(tmp_path / "a.npy", events[::-1])
+    np.savez(tmp_path / "a.npz", t_us=events["t"], x=events["x"], y=events["y"], polarity=2 * events["p"] - 1)
+    with h5py.File(tmp_path / "dsec.h5", "w") as file:
+        for name in "xytp":
+            file[f"events/{name}"] = events[name]
+    with h5py.File(tmp_path / "mvsec.hdf5", "w") as file:
+        file["davis/left/events"] = np.stack([events["x"], events["y"], events["t"] * 1e-6, 2.0 * events["p"] - 1], 1)
+        file["davis/left/image_raw"] = np.zeros((1, 132, 176), np.uint8)
+    for name, size in (("a.npy", None), ("a.npz", None), ("dsec.h5", None), ("mvsec.hdf5", (132, 176))):
+        found, seen = detect.read(tmp_path / name)
+        assert seen == size
+        np.testing.assert_array_equal(found[0], expected[0], name)
+        assert sorted(found.T.tolist()) == sorted(expected.T.tolist())  # those of one time in any order
+
+
+def assert_taken_away(out, line, tmp_path):
+    """detect.py finds in a recording, with nothing but its folder, what the trainer finds in the converted one."""
+    recordings, alone = tmp_path / "recordings", tmp_path / "alone"
+    for folder in (recordings, alone):
+        folder.mkdir()
+    for name in ("detect.py", "detector.pt"):
+        shutil.copy(out / name, alone)
+    events = camera(30_000)
+    np.save(recordings / "seen.npy", events)
+    window_us = round(1000 * detect.Detector(alone / "detector.pt").told["window_ms"])
+    assert 100_000 < window_us < 300_000  # the median of some of the demo's gaps
+    ends = events["t"][0] + window_us * np.arange(1, 4)
+    (recordings / "seen.csv").write_text("time_s,left,top,right,bottom,class\n"
+                                         + "".join(f"{end * 1e-6:.6f},10,30,70,90,Car\n" for end in ends))
+    eventgan.convert({"format": "eventgan-manifest", "version": 1, "name": "test", "image": {},
+                      "sources": [{"dataset": "recording", "root": str(recordings), "window_s": window_us * 1e-6,
+                                   "sensor": {"width": 176, "height": 132}}],
+                      "generator": {"kind": "events"}, "output": {"directory": "test", "dtype": "float32"}},
+                     tmp_path / "test", progress=False)
+    said, code = run_script(*line, "--test", tmp_path / "test")
+    assert code == 0 and "detect.py RECORDING" in said, said
+    expected = json.loads((out / "predictions.json").read_text())
+    assert len({each["image_id"] for each in expected}) == 3
+    bare = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run([sys.executable, "-I", alone / "detect.py", recordings / "seen.npy", "--sensor", "176x132",
+                           "--score", "0", "--images", alone / "images"], capture_output=True, text=True, env=bare)
+    assert done.returncode == 0, done.stderr
+    rows = [*csv.DictReader(io.StringIO(done.stdout))]
+    last = {row["t_us"] for row in rows} - {str(end) for end in ends}  # a rest of a window, which the labels leave out
+    rows = [row for row in rows if row["t_us"] not in last]
+    assert len(last) <= 1
+    assert len(rows) == len(expected)
+    for row, each in zip(rows, expected):
+        assert row["class"] == each["category_id"] and f"{int(row['t_us']) * 1e-6:.6f}" in each["image_id"]
+        np.testing.assert_allclose([float(row[name]) for name in "xywh"], each["bbox"], atol=0.05)
+        assert float(row["score"]) == pytest.approx(each["score"], abs=1e-3)
+    assert len([*(alone / "images").iterdir()]) == 3 + len(last)
 
 
 class TestShards:
