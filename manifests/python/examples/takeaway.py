@@ -5,7 +5,7 @@ import json
 import pathlib
 import shutil
 import warnings
-from typing import Any, Callable, Dict, List, Tuple
+from typing import Any, Callable, Dict, List, Tuple  # as TorchScript reads them
 
 import torch
 import torch.nn.functional as F

@@ -184,10 +184,11 @@ class InMemory(Dataset):
 
 def train(args: argparse.Namespace, items: Iterable[dict[str, Any]], classes: Sequence[str],
           augmentation: EventAugmentation | None,
-          check: Sequence[dict[str, Any]], norm: Norm = nn.BatchNorm2d) -> Detector:
+          check: Sequence[dict[str, Any]], norm: Norm = nn.BatchNorm2d,
+          tuned: Iterable[dict[str, Any]] = ()) -> Detector:
     """The detector trained on the items, by the options of `training`, in evaluation mode; `check`:
-    items whose AP is reported."""
-    data = InMemory(items, len(classes), augmentation)
+    items whose AP is reported; `tuned`: others, which are drawn as often as the items."""
+    data, more = (InMemory(each, len(classes), augmentation) for each in (items, tuned))
     model = Detector(len(data.items[0]["volume"]), len(classes), norm)
     training.load_fitting(model, args.pretrained)
     model = model.to(args.device).to(memory_format=torch.channels_last)
@@ -199,7 +200,7 @@ def train(args: argparse.Namespace, items: Iterable[dict[str, Any]], classes: Se
             logits, edges = model(volumes.contiguous(memory_format=torch.channels_last))
         return detection_loss(logits, edges, *targets)
 
-    training.fit(args, model, optimizer, training.batches(args, data, shuffle=True), loss_of,
+    training.fit(args, model, optimizer, training.batches(args, data, shuffle=True, tuned=more), loss_of,
                  lambda: training.average_precisions(search(model, check, args.batch), classes), f"AP50 {classes[0]}")
     return model
 
@@ -289,6 +290,8 @@ def main() -> None:
                         help="input pixels per volume pixel; objects of less than 16 pixels need more than 1")
     parser.add_argument("--bfloat16", action="store_true", help="compute convolutions in bfloat16, twice as fast where "
                         "the processor has AVX512-BF16 or AMX")
+    parser.add_argument("--tune", help="folder of shards of your camera's labelled recordings, to go on with once the "
+                        "training has ended: drawn as often as the samples of --data; into OUT/tuned")
     args = training.begin(parser)
     train_shards, validation_shards = training.divided(args, training.with_boxes)
     test_shards = training.tested(args, train_shards, validation_shards, training.with_boxes)
@@ -299,14 +302,17 @@ def main() -> None:
     def seen(shards: Shards) -> Shards:
         return shards.changed(signed) if args.channels == "signed" else shards
 
-    def items_of(dataset: DetectionDataset) -> list[dict[str, Any]]:
+    def read(dataset: DetectionDataset) -> list[dict[str, Any]]:
         return [dataset[i] for i in range(len(dataset))]
 
+    tune_shards = training.tuned_on(args, training.with_boxes, test_shards) if args.tune else None
     try:
-        items, validation = (items_of(DetectionDataset(seen(shards), classes, size, view=view))
+        items, validation = (read(DetectionDataset(seen(shards), classes, size, view=view))
                              for shards in (train_shards, validation_shards))
         test_set, test_view = training.detection_test(args, seen(test_shards), classes, size, view)
-        test = items_of(test_set)
+        test = read(test_set)
+        tuned = read(training.items_of(seen(tune_shards), classes, size,
+                                       fitted(tune_shards.image_area(), size))) if tune_shards else []
     except ValueError as error:
         raise SystemExit(str(error))
     sides = shorter_sides(items, classes)
@@ -315,8 +321,11 @@ def main() -> None:
         raise SystemExit(f"expected boxes of {classes[0]} to train on, got none, in {args.data}; its training samples "
                          f"have {', '.join(there) or 'no boxes that are not to be ignored'}")
     larger = warn_of_small(sides, area, args.scale)
-    model = train(args, items, classes, AUGMENTATION, validation)
+    model = train(argparse.Namespace(**{**vars(args), "tune": None}), items, classes, AUGMENTATION, validation)
     poor = advice(json.loads(pathlib.Path(args.out, "metrics.json").read_text(encoding="utf-8")), len(items), larger)
+    if tuned:
+        args = training.tuning(args, len(tuned))
+        model = train(args, items, classes, AUGMENTATION, validation, tuned=tuned)
 
     def image_of(i: int) -> tuple[str, np.ndarray]:
         boxes, labels, scores = next(detect(model, validation[i]["volume"][None]))
@@ -324,7 +333,7 @@ def main() -> None:
         texts = [f"{classes[label]} {score:.2f}" for label, score in zip(labels[sure].tolist(), scores[sure].tolist())]
         return validation[i]["id"], training.draw_item(validation[i], boxes[sure], texts)
 
-    gaps = train_shards.column("gap_s")
+    gaps = (tune_shards or train_shards).column("gap_s")
     takeaway.write(pathlib.Path(args.out), model, likeliest, len(items[0]["volume"]), size, {
         "classes": classes, "bins": len(train_shards.sample(0, {"volume"})["volume"]) // 2,
         "normalize": read_description(args.data)["settings"].get("volume", {}).get("normalize", "none"),

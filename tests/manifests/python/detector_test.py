@@ -205,26 +205,32 @@ def test_recordings_are_read_by_their_names(tmp_path):
         assert sorted(found.T.tolist()) == sorted(expected.T.tolist())  # those of one time in any order
 
 
+def convert_camera(folder, name, window_us):
+    """FOLDER/NAME.npy with a box in each of its first three windows, which FOLDER/shards has; their ends."""
+    folder.mkdir()
+    events = camera(30_000)
+    np.save(folder / f"{name}.npy", events)
+    ends = events["t"][0] + window_us * np.arange(1, 4)
+    (folder / f"{name}.csv").write_text("time_s,left,top,right,bottom,class\n"
+                                        + "".join(f"{end * 1e-6:.6f},10,30,70,90,Car\n" for end in ends))
+    eventgan.convert({"format": "eventgan-manifest", "version": 1, "name": "test", "image": {},
+                      "sources": [{"dataset": "recording", "root": str(folder / f"{name}.npy"),
+                                   "window_s": window_us * 1e-6, "sensor": {"width": 176, "height": 132}}],
+                      "generator": {"kind": "events"}, "output": {"directory": "shards", "dtype": "float32"}},
+                     folder / "shards", progress=False)
+    return ends
+
+
 def assert_taken_away(out, line, tmp_path):
     """detect.py finds in a recording, with nothing but its folder, what the trainer finds in the converted one."""
     recordings, alone = tmp_path / "recordings", tmp_path / "alone"
-    for folder in (recordings, alone):
-        folder.mkdir()
+    alone.mkdir()
     for name in ("detect.py", "detector.pt"):
         shutil.copy(out / name, alone)
-    events = camera(30_000)
-    np.save(recordings / "seen.npy", events)
     window_us = round(1000 * detect.Detector(alone / "detector.pt").told["window_ms"])
     assert 100_000 < window_us < 300_000  # the median of some of the demo's gaps
-    ends = events["t"][0] + window_us * np.arange(1, 4)
-    (recordings / "seen.csv").write_text("time_s,left,top,right,bottom,class\n"
-                                         + "".join(f"{end * 1e-6:.6f},10,30,70,90,Car\n" for end in ends))
-    eventgan.convert({"format": "eventgan-manifest", "version": 1, "name": "test", "image": {},
-                      "sources": [{"dataset": "recording", "root": str(recordings), "window_s": window_us * 1e-6,
-                                   "sensor": {"width": 176, "height": 132}}],
-                      "generator": {"kind": "events"}, "output": {"directory": "test", "dtype": "float32"}},
-                     tmp_path / "test", progress=False)
-    said, code = run_script(*line, "--test", tmp_path / "test")
+    ends = convert_camera(recordings, "seen", window_us)
+    said, code = run_script(*line, "--test", recordings / "shards")
     assert code == 0 and "detect.py RECORDING" in said, said
     expected = json.loads((out / "predictions.json").read_text())
     assert len({each["image_id"] for each in expected}) == 3
@@ -242,6 +248,51 @@ def assert_taken_away(out, line, tmp_path):
         np.testing.assert_allclose([float(row[name]) for name in "xywh"], each["bbox"], atol=0.05)
         assert float(row["score"]) == pytest.approx(each["score"], abs=1e-3)
     assert len([*(alone / "images").iterdir()]) == 3 + len(last)
+
+
+def test_tuned_on_the_camera_s_own_windows(data, tmp_path, monkeypatch):
+    """After the training, begun with its weights and left beside them; its own windows as often as generated ones."""
+    monkeypatch.setattr(detector.training, "TUNING_STEPS", 4)
+    for name in ("own", "other"):
+        convert_camera(tmp_path / name, name, 100_000)
+    own, out = tmp_path / "own" / "shards", tmp_path / "out"
+    line = [EXAMPLES / "train_detector.py", "--data", data, "--out", out, "--dataset", "kitti_object", "--threads", "1",
+            "--batch", "4", "--images", "1", "--every", "9", "--epochs", "2"]
+    said, code = run_script(*line)
+    assert code == 0, said
+    before = (out / "weights.pt").read_bytes(), (out / "predictions.json").read_bytes()
+    for more in ("step     4", "resuming after epoch"):
+        said, code = run_script(*line, "--tune", own, "--test", tmp_path / "other" / "shards")
+        assert code == 0 and more in said and "says nothing of other" not in " ".join(said.split()), said
+    assert ((out / "weights.pt").read_bytes(), (out / "predictions.json").read_bytes()) == before
+    first, then = (json.loads((folder / "metrics.json").read_text()) for folder in (out, out / "tuned"))
+    assert then["lr"] == first["lr"] / 4 and then["history"][-1]["step"] == 4
+    assert then["untrained"] == pytest.approx(first["AP50 Car"])  # what it begins with
+    entries = json.loads((out / "tuned" / "predictions.json").read_text())
+    assert {each["image_id"].split("/")[0] for each in entries} <= {"other"}
+    assert detect.Detector(out / "tuned" / "detector.pt").told["window_ms"] == 100  # as the camera's windows
+    said, code = run_script(*line, "--tune", own, "--test", own)
+    assert code == 0 and "warning: own of " in said, said
+    said, code = run_script(*line, "--tune", tmp_path / "other" / "shards")
+    assert code == 1 and "expected --tune " in said and f"{own}, 3 samples, as when" in said, said
+
+
+def test_a_few_windows_are_drawn_as_often_as_many_images():
+    class Many(torch.utils.data.Dataset):
+        def __init__(self, value, count):
+            self.value, self.count = value, count
+
+        def __len__(self):
+            return self.count
+
+        def __getitem__(self, _):
+            return self.value
+
+    torch.manual_seed(0)
+    args = detector.argparse.Namespace(batch=10, workers=0)
+    drawn = torch.cat([*detector.training.batches(args, Many(0, 1990), shuffle=True, tuned=Many(1, 10))])
+    assert len(drawn) == 2000 and abs(drawn.float().mean() - 0.5) < 0.05  # 4.5 standard deviations
+    assert sum(map(len, detector.training.batches(args, Many(0, 30), shuffle=True, tuned=Many(1, 0)))) == 30
 
 
 class TestShards:
