@@ -290,8 +290,7 @@ def main() -> None:
                         help="input pixels per volume pixel; objects of less than 16 pixels need more than 1")
     parser.add_argument("--bfloat16", action="store_true", help="compute convolutions in bfloat16, twice as fast where "
                         "the processor has AVX512-BF16 or AMX")
-    parser.add_argument("--tune", help="folder of shards of your camera's labelled recordings, to go on with once the "
-                        "training has ended: drawn as often as the samples of --data; into OUT/tuned")
+    training.add_tune(parser)
     args = training.begin(parser)
     train_shards, validation_shards = training.divided(args, training.with_boxes)
     test_shards = training.tested(args, train_shards, validation_shards, training.with_boxes)
@@ -321,7 +320,7 @@ def main() -> None:
         raise SystemExit(f"expected boxes of {classes[0]} to train on, got none, in {args.data}; its training samples "
                          f"have {', '.join(there) or 'no boxes that are not to be ignored'}")
     larger = warn_of_small(sides, area, args.scale)
-    model = train(argparse.Namespace(**{**vars(args), "tune": None}), items, classes, AUGMENTATION, validation)
+    model = train(training.untuned(args), items, classes, AUGMENTATION, validation)
     poor = advice(json.loads(pathlib.Path(args.out, "metrics.json").read_text(encoding="utf-8")), len(items), larger)
     if tuned:
         args = training.tuning(args, len(tuned))

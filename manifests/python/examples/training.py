@@ -36,7 +36,7 @@ GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps togeth
 MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "images", "every",
               "test", "as_bright", "without_noise"}  # when a run goes on
 
-TUNING_STEPS, TUNING_RATE = 300, 0.25  # the latter a share of the learning rate
+TUNING_STEPS, TUNING_RATE = 200, 0.25  # the latter a share of the learning rate
 
 
 def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
@@ -244,6 +244,12 @@ def items_of(shards: Shards, classes: Sequence[str], size: tuple[int, int], view
     return DetectionDataset(shards, known or classes, size, view=view)
 
 
+def add_tune(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--tune", help="folder of shards of your camera's labelled recordings, to go on with once the "
+                        f"training has ended: {TUNING_STEPS} steps, in which they are drawn as often as the samples of "
+                        "--data; into OUT/tuned")
+
+
 def tuned_on(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]], tested_shards: Shards) -> Shards:
     """The labelled samples of --tune; warns of recordings that are tested on, too."""
     try:
@@ -253,15 +259,20 @@ def tuned_on(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]]
         sys.exit(str(error))
     if not len(shards):
         sys.exit(f"expected labelled samples to tune on, got none, in {args.tune}")
-    both = {*shards.groups("sequence")} & {*tested_shards.groups("sequence")} if args.test else ()
+    both = sorted({*shards.column("next_path")} & {*tested_shards.column("next_path")})
     if both:
-        print(f"warning: {', '.join(sorted(both)[:3])} of {args.test} are in {args.tune}, too: what is found in them "
-              "says nothing of other recordings", file=sys.stderr)
+        print(f"warning: what is found in {both[0]}{' and others' * (len(both) > 1)} says nothing of other recordings: "
+              f"it is in {args.tune}, too", file=sys.stderr)
     return shards
 
 
+def untuned(args: argparse.Namespace) -> argparse.Namespace:
+    """The options of the training before."""
+    return argparse.Namespace(**{**vars(args), "tune": None})
+
+
 def tuning(args: argparse.Namespace, samples: int) -> argparse.Namespace:
-    """The options of the training on --tune that follows: it begins with the weights of the one before."""
+    """The options of the training on so many --tune samples that follows: it begins with the weights of the other."""
     out = pathlib.Path(args.out)
     (out / "tuned").mkdir(exist_ok=True)
     return argparse.Namespace(**{**vars(args), "out": str(out / "tuned"), "tune": f"{args.tune}, {samples} samples",
