@@ -80,8 +80,6 @@ def main():
     out = csv.writer(sys.stdout, lineterminator="\n")
     out.writerow(["t_us", "x", "y", "w", "h", "class", "score"])
     for end, first, last in zip(ends.round().astype(int).tolist(), places, places[1:]):
-        if first == last:
-            continue
         window = dict(zip("txyp", events[:, first:last]))
         boxes, classes, scores = detector(window, [int(side) for side in size], args.score)
         out.writerows([end, *box, name, score] for box, name, score in

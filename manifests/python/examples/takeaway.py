@@ -28,6 +28,8 @@ class EventsToBoxes(nn.Module):
                 width: int) -> Tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Of events in time order: t, x, y [N], whole numbers, and p [N], positive if above 0, of a sensor of that
         height and width: boxes [n, 4], left, top, right, bottom in its pixels, labels [n], scores [n]."""
+        if not len(t):
+            return torch.zeros(0, 4), torch.zeros(0, dtype=torch.long), torch.zeros(0)
         seen = self.seen(t, x, y, p, height, width)
         scale = min(self.width / width, self.height / height)
         wide, high = self.width / (scale * width), self.height / (scale * height)
@@ -85,8 +87,8 @@ def write(folder: pathlib.Path, network: nn.Module, likeliest: Callable[..., Tup
     """FOLDER/detector.pt of the network, of whose output `likeliest` makes boxes, labels and scores, for detect.py,
     which is put beside it. `told`: classes, bins, normalize, channels, score and window_ms, which lie in the file, too,
     as detector.json."""
-    # TorchScript, not ONNX: torch.onnx.export needs the package onnx from PyTorch 2.0 on, and Debian 12 has no program
-    # that runs its files (OpenCV 4.6 does not read this one).
+    # TorchScript, not ONNX: Debian 12 has nothing that runs ONNX's files (its OpenCV does not read this one), and
+    # PyTorch 2 writes them only with the package onnx.
     events = torch.zeros(1, channels, *size)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", torch.jit.TracerWarning)  # sizes are to be constants

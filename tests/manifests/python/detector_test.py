@@ -229,12 +229,14 @@ def assert_taken_away(out, line, tmp_path):
         shutil.copy(out / name, alone)
     window_us = round(1000 * detect.Detector(alone / "detector.pt").told["window_ms"])
     assert 100_000 < window_us < 300_000  # the median of some of the demo's gaps
-    ends = convert_camera(recordings, "seen", window_us)
+    ends, events = convert_camera(recordings, "seen", window_us), np.load(recordings / "seen.npy")
     said, code = run_script(*line, "--test", recordings / "shards")
     assert code == 0 and "detect.py RECORDING" in said, said
     expected = json.loads((out / "predictions.json").read_text())
     assert len({each["image_id"] for each in expected}) == 3
     bare = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    boxes, classes, scores = detect.Detector(alone / "detector.pt")(events[:0], (132, 176))
+    assert (boxes.shape, classes, scores.shape) == ((0, 4), [], (0,))
     done = subprocess.run([sys.executable, "-I", alone / "detect.py", recordings / "seen.npy", "--sensor", "176x132",
                            "--score", "0", "--images", alone / "images"], capture_output=True, text=True, env=bare)
     assert done.returncode == 0, done.stderr
