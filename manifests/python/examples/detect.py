@@ -75,7 +75,8 @@ def main():
     detector, (events, size) = Detector(pathlib.Path(__file__).with_name("detector.pt")), read(args.recording)
     size = [int(side) for side in args.sensor.split("x")][::-1] if args.sensor else size or (events[[2, 1]].max(1) + 1)
     window_us, t = 1000 * (args.window_ms or detector.told["window_ms"]), events[0]
-    ends = np.arange(t[0] + window_us, t[-1] + window_us, window_us)  # each window begins after the end of the last
+    # each window begins after the end of the one before
+    ends = t[0] + window_us * np.arange(1, max(np.ceil((t[-1] - t[0]) / window_us), 1) + 1)
     places = [0, *np.searchsorted(t, ends, side="right").tolist()]
     out = csv.writer(sys.stdout, lineterminator="\n")
     out.writerow(["t_us", "x", "y", "w", "h", "class", "score"])
