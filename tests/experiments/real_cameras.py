@@ -220,7 +220,7 @@ def train_and_test(args: argparse.Namespace, row: Row, seed: int) -> dict[str, A
 def parts_of(args: argparse.Namespace, row: Row) -> dict[str, list[Item]]:
     """What the row is tested on: of each recording it has not learnt from, the windows behind the first ones; these
     ("development"); its grey frames; and, where rows may learn from its first windows, those behind these
-    ("others"). Of tasks other than persons also all recordings together."""
+    ("others"). Of cars also all recordings together."""
     found: dict[str, list[Item]] = {ALL: []}
     recordings = recordings_in(args, args.test)
     for recording in recordings:
@@ -231,7 +231,8 @@ def parts_of(args: argparse.Namespace, row: Row) -> dict[str, list[Item]]:
             seen = args.task.learnt.get(name, 0)
         if args.test != args.real or f"real {name}" not in row.sources:
             found |= {name: windows[kept:], f"{name}, development": windows[:kept]}
-            if args.task.methods and len(recordings) > 1:  # few in each
+            # few in each; of tuned rows they would be others than of the rest
+            if args.task.methods and len(recordings) > 1 and not args.task.windows:
                 found[ALL] += windows[kept:]
             if row.signed:
                 frames = test_items(args, recording, row.size(), shown="frames")
