@@ -65,6 +65,7 @@ class Task:
     polarity: bool = True  # False: networks see events without it, as some of the recordings have them
     # the first windows of a recording that rows may learn from, which are then tested on the others
     learnt: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    windows: tuple[int, ...] = ()  # so many of these, on which a network of the first method is tuned
     methods: tuple[str, ...] = ()  # of SOURCES, all with so many steps; (): those of persons
     steps: int = 0
 

@@ -74,6 +74,10 @@ TASKS = {
         columns={"pck": "PCK@0.2 of the torso", "pckh": "PCKh@0.5", "mpjpe": "MPJPE px"},
         methods=IN_LAYERS, steps=3000),
 }
+# `train_detector.py --tune`: how many labelled windows of a camera bring what, tested on its other clips
+TASKS["tuning"] = dataclasses.replace(
+    TASKS["persons"], learnt={"cdehp": 48 + 60},  # the first two of four clips, as of joints
+    methods=("ESIM, layers",), windows=(5, 20, 50, 108), steps=600)
 
 Results = dict[str, list[dict[str, Any]]]  # by row, for each seed, what train_and_test gives
 
@@ -97,6 +101,8 @@ class Row:
     norm: str = "batch"
     signed: bool = True        # or the volume
     base: Row | None = None    # it has that row's weights, and learns its last layer anew
+    # so many real windows, drawn by the seed: a row with a base is tuned on these, one without sees nothing else
+    windows: int | None = None
 
     def size(self) -> tuple[int, int]:
         return next((SOURCES[name].size for name in self.sources if name in SOURCES), SIZE)
@@ -134,6 +140,11 @@ def task_rows(task: Task) -> list[Row]:
     """Of a task other than persons: its methods; where it has windows to learn from, a network that has learnt from
     these alone, and those that have tuned their last layer on them."""
     found = [Row(f"{name}, augmented, {task.steps} steps", (name,), steps=task.steps) for name in task.methods]
+    if task.windows:
+        base, real = found[0], tuple(f"real {name}" for name in task.learnt)
+        found += [Row(f"{base.name}, tuned on {count} windows", base.sources + real * (count > 0), base=base,
+                      steps=training.TUNING_STEPS, windows=count) for count in (0, *task.windows)]
+        return found + [Row(f"{count} windows alone", real, windows=count) for count in task.windows]
     for real in (f"real {name}" for name in task.learnt):
         found += [Row(f"{real}, augmented, {task.steps} steps", (real,), steps=task.steps),
                   *(Row(row.name + TUNED, (real,), steps=LAST_LAYER_STEPS, base=row) for row in found)]
@@ -166,13 +177,17 @@ def train(args: argparse.Namespace, row: Row, seed: int) -> nn.Module:
         torch.manual_seed(seed)
         parts = [items_of(args, name, row.signed)[:task.learnt.get(name.removeprefix("real "))]
                  for name in row.sources]
+        if row.windows:
+            parts[-1] = [parts[-1][i] for i in np.random.default_rng(seed).permutation(len(parts[-1]))[:row.windows]]
         # a few windows among hundreds of photographs: each part is drawn as often
         if any(name.startswith("real ") for name in row.sources):
-            parts = [part * math.ceil(max(map(len, parts)) / len(part)) for part in parts]
+            most = max([BATCH if row.windows else 1, *map(len, parts)])
+            parts = [part * math.ceil(most / len(part)) for part in parts]
         items = [item for part in parts for item in part]
         items = [_float(args, items[i]) for i in np.random.default_rng(seed).permutation(len(items))[:row.images]]
         folder.mkdir(parents=True, exist_ok=True)
-        run = argparse.Namespace(out=str(folder), batch=BATCH, lr=RATE, steps=args.steps or row.steps, epochs=None,
+        rate = RATE if row.windows is None or not row.base else RATE * training.TUNING_RATE
+        run = argparse.Namespace(out=str(folder), batch=BATCH, lr=rate, steps=args.steps or row.steps, epochs=None,
                                  minutes=None, every=10_000, seed=seed, workers=0, device="cpu",
                                  pretrained=str(_run_folder(args, row.base, seed) / "weights.pt") if row.base else None,
                                  classes=task.classes, last_layer=row.base is not None,
@@ -205,7 +220,7 @@ def train_and_test(args: argparse.Namespace, row: Row, seed: int) -> dict[str, A
 def parts_of(args: argparse.Namespace, row: Row) -> dict[str, list[Item]]:
     """What the row is tested on: of each recording it has not learnt from, the windows behind the first ones; these
     ("development"); its grey frames; and, where rows may learn from its first windows, those behind these
-    ("others"). Of tasks other than persons also all recordings together."""
+    ("others"). Of cars also all recordings together."""
     found: dict[str, list[Item]] = {ALL: []}
     recordings = recordings_in(args, args.test)
     for recording in recordings:
@@ -216,7 +231,8 @@ def parts_of(args: argparse.Namespace, row: Row) -> dict[str, list[Item]]:
             seen = args.task.learnt.get(name, 0)
         if args.test != args.real or f"real {name}" not in row.sources:
             found |= {name: windows[kept:], f"{name}, development": windows[:kept]}
-            if args.task.methods and len(recordings) > 1:  # few in each
+            # few in each; of tuned rows they would be others than of the rest
+            if args.task.methods and len(recordings) > 1 and not args.task.windows:
                 found[ALL] += windows[kept:]
             if row.signed:
                 frames = test_items(args, recording, row.size(), shown="frames")
@@ -383,7 +399,8 @@ def sections(args: argparse.Namespace) -> list[Section]:
     task = args.task
     if task.methods:
         found = task_rows(task)
-        return [Section("", found[:1] if args.quick else found, found[0].name)]
+        quick = found[:1] + [row for row in found if row.base and row.windows][-1:]
+        return [Section("", quick if args.quick else found, found[0].name)]
     main = rows([folder.name for folder in recordings_in(args, args.real)])
     if args.quick:
         return [Section("augmented", [row for row in main if row.name == "EventGAN 16, augmented"], None)]
@@ -461,8 +478,11 @@ def run(args: argparse.Namespace) -> None:
         if not trained > untrained:
             sys.exit(f"expected scores above those of an untrained network, {untrained:.3f}, got {trained:.3f}")
         return
-    wanted = ("EventGAN 16, ", "difference, ", "grey frames, ")
-    draw(args, [next(row for row in parts[-1 if args.task.methods else 1].rows if row.name.startswith(name))
-                for name in wanted])
+    drawn = parts[-1 if args.task.methods else 1].rows
+    if args.task.windows:
+        draw(args, [row for row in drawn if row.windows == args.task.windows[-1]])
+    else:
+        draw(args, [next(row for row in drawn if row.name.startswith(name))
+                    for name in ("EventGAN 16, ", "difference, ", "grey frames, ")])
     if not args.task.methods:
         draw_curves(args, results, len(items_of(args, "EventGAN 16")))

@@ -274,8 +274,42 @@ def test_only_the_last_layer_is_tuned_and_parts_are_what_they_say(tmp_path, monk
     assert changed == {"maps.weight", "maps.bias"}
 
 
+def test_windows_of_the_first_clips_are_learnt_and_the_others_tested(tmp_path, monkeypatch):
+    """The tuned network has the base's weights to begin with, and sees as many windows as photographs; a network of
+    windows alone sees whole batches of them."""
+    args = arguments(tmp_path, "tuning")
+    args.task = dataclasses.replace(args.task, development={}, learnt={"clips": 3}, windows=(2, 3))
+    items = {"ESIM, layers": [{**boxed([9, 9, 40, 60]), "id": f"photograph {i}"} for i in range(20)],
+             "real clips": [{**boxed([9, 9, 40, 60]), "id": f"window {i}"} for i in range(5)]}
+    monkeypatch.setattr(real_cameras, "recordings_in", lambda *_: [pathlib.Path("clips")])
+    monkeypatch.setattr(real_cameras, "test_items",
+                        lambda *_, shown="images", **__: items["real clips"] if shown == "images" else [])
+    monkeypatch.setattr(real_cameras, "items_of", lambda _, name, *__: items[name])
+    seen = []
+
+    def train(run, learnt, *_):
+        seen.append((run.steps, run.lr / real_cameras.RATE, run.pretrained is not None,
+                     [sum(item["id"].startswith(kind) for item in learnt) for kind in ("photograph", "window")],
+                     len({item["id"] for item in learnt} & {f"window {i}" for i in range(3)})))
+        model = real_boxes.make(1, torch.nn.BatchNorm2d)
+        for name in ("weights.pt", "checkpoint.pt"):
+            torch.save(model.state_dict(), pathlib.Path(run.out, name))
+
+    args.task = dataclasses.replace(args.task, network=dataclasses.replace(args.task.network, train=train))
+    base, *tuned, two_alone, three_alone = real_cameras.task_rows(args.task)
+    assert [row.windows for row in tuned] == [0, 2, 3] and all(row.base == base for row in tuned)
+    for row in (base, *tuned, two_alone, three_alone):
+        real_cameras.train(args, row, 0)
+    steps, rate = real_cameras.training.TUNING_STEPS, real_cameras.training.TUNING_RATE
+    assert seen == [(600, 1, False, [20, 0], 0), (steps, rate, True, [20, 0], 0), (steps, rate, True, [20, 20], 2),
+                    (steps, rate, True, [20, 21], 3), (real_cameras.STEPS, 1, False, [0, 16], 2),
+                    (real_cameras.STEPS, 1, False, [0, 18], 3)]
+    assert {name: [item["id"] for item in part] for name, part in real_cameras.parts_of(args, tuned[1]).items()} == {
+        "clips, others": ["window 3", "window 4"]}
+
+
 @nightly
-@pytest.mark.parametrize("task", ["cars", "joints"])
+@pytest.mark.parametrize("task", ["cars", "joints", "tuning"])
 def test_what_learnt_from_photographs_finds_something_in_real_events(tmp_path, task):
     if not (DATA / "labelled_frames").is_dir() or not (DATA / "real_labels").is_dir():
         pytest.skip("no ../shared/data")

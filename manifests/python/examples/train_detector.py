@@ -17,15 +17,17 @@ import itertools
 import json
 import math
 import pathlib
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import takeaway
 import torch
 import torch.nn.functional as F
 import training
-from eventgan import Shards, signed_channel
+from eventgan import Shards, read_description, signed_channel
 from eventgan.detection_scores import Detections, non_maximum_suppression
 from eventgan.torch import DetectionDataset, EventAugmentation, fitted
 from torch import nn
@@ -35,6 +37,8 @@ STRIDE = 8  # input pixels per cell of the map
 LEAST_SIDE = 2 * STRIDE  # input pixels: few boxes with a shorter side are learnt
 STEPS = 3000  # unless the options say; ten times those of a first look
 POOR = 0.1  # an AP below that finds hardly anything
+SURE = 0.3  # the score from which on a box is drawn, and told by detect.py
+WINDOW_S = 0.05  # of detect.py, where the training pairs have no times
 Norm = Callable[[int], nn.Module]  # channels -> layer
 SPREAD = 0.54 / 6  # standard deviation of a box's Gaussian, as a share of its sides: TTFNet's
 # What the events of another scene or camera may look like: measured on real cameras, manifests/guides/real_cameras.md.
@@ -139,23 +143,29 @@ def detection_loss(logits: torch.Tensor, edges: torch.Tensor, heat: torch.Tensor
     return focal + 5 * (weight[there] * (1 - giou(given, true))).sum() / weight.sum().clamp(min=1e-6)
 
 
-def detect(model: Detector,
-           volumes: torch.Tensor, most: int = 50) -> Iterator[tuple[torch.Tensor, torch.Tensor, torch.Tensor]]:
+def likeliest(logits: torch.Tensor, edges: torch.Tensor,
+              most: int = 50) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Of the network's output the `most` likeliest objects of each image, the first one before all: boxes [N, most, 4],
+    cut to the image, labels and scores [N, most]."""
+    scores = logits.sigmoid()
+    scores = (scores * (scores == F.max_pool2d(scores, 3, 1, 1))).flatten(1)
+    scores, places = scores.topk(min(most, scores.shape[1]))
+    height, width = edges.shape[2:]
+    labels, cells = places.div(height * width, rounding_mode="floor"), places % (height * width)
+    boxes = corners(edges).flatten(2).gather(2, cells[:, None].expand(-1, 4, -1)).transpose(1, 2)
+    return torch.minimum(boxes.clamp(min=0), STRIDE * torch.tensor([width, height] * 2)), labels, scores
+
+
+def detect(model: Detector, volumes: torch.Tensor) -> Iterator[tuple[torch.Tensor, torch.Tensor, torch.Tensor]]:
     """Of each volume [N, C, H, W]: boxes [n, 4], labels [n], scores [n]. The model must be in evaluation mode."""
     with torch.no_grad():
-        logits, edges = (each.cpu() for each in model(volumes.to(next(model.parameters()).device)))
-    scores = logits.sigmoid()
-    scores = scores * (scores == F.max_pool2d(scores, 3, 1, 1))
-    limits = torch.tensor([volumes.shape[3], volumes.shape[2]] * 2)
-    for score, box in zip(scores, corners(edges)):
-        values, places = score.flatten().topk(min(most, score.numel()))
-        labels, cells = places // score[0].numel(), places % score[0].numel()
-        boxes = torch.minimum(box.flatten(1)[:, cells].T.clamp(min=0), limits)
-        kept = (values > 0.001) & (boxes[:, 2:] > boxes[:, :2]).all(1)
-        boxes, labels, values = boxes[kept], labels[kept], values[kept]
-        sole = non_maximum_suppression(Detections(np.zeros(len(values), int), labels.numpy(),
-                                                  boxes.numpy(), values.numpy()), 0.5)
-        yield boxes[sole], labels[sole], values[sole]
+        output = [each.cpu() for each in model(volumes.to(next(model.parameters()).device))]
+    for boxes, labels, scores in zip(*likeliest(*output)):
+        kept = (scores > 0.001) & (boxes[:, 2:] > boxes[:, :2]).all(1)
+        boxes, labels, scores = boxes[kept], labels[kept], scores[kept]
+        sole = non_maximum_suppression(Detections(np.zeros(len(scores), int), labels.numpy(),
+                                                  boxes.numpy(), scores.numpy()), 0.5)
+        yield boxes[sole], labels[sole], scores[sole]
 
 
 class InMemory(Dataset):
@@ -174,10 +184,11 @@ class InMemory(Dataset):
 
 def train(args: argparse.Namespace, items: Iterable[dict[str, Any]], classes: Sequence[str],
           augmentation: EventAugmentation | None,
-          check: Sequence[dict[str, Any]], norm: Norm = nn.BatchNorm2d) -> Detector:
+          check: Sequence[dict[str, Any]], norm: Norm = nn.BatchNorm2d,
+          tuned: Iterable[dict[str, Any]] = ()) -> Detector:
     """The detector trained on the items, by the options of `training`, in evaluation mode; `check`:
-    items whose AP is reported."""
-    data = InMemory(items, len(classes), augmentation)
+    items whose AP is reported; `tuned`: others, which are drawn as often as the items."""
+    data, more = (InMemory(each, len(classes), augmentation) for each in (items, tuned))
     model = Detector(len(data.items[0]["volume"]), len(classes), norm)
     training.load_fitting(model, args.pretrained)
     model = model.to(args.device).to(memory_format=torch.channels_last)
@@ -189,7 +200,7 @@ def train(args: argparse.Namespace, items: Iterable[dict[str, Any]], classes: Se
             logits, edges = model(volumes.contiguous(memory_format=torch.channels_last))
         return detection_loss(logits, edges, *targets)
 
-    training.fit(args, model, optimizer, training.batches(args, data, shuffle=True), loss_of,
+    training.fit(args, model, optimizer, training.batches(args, data, shuffle=True, tuned=more), loss_of,
                  lambda: training.average_precisions(search(model, check, args.batch), classes), f"AP50 {classes[0]}")
     return model
 
@@ -279,6 +290,7 @@ def main() -> None:
                         help="input pixels per volume pixel; objects of less than 16 pixels need more than 1")
     parser.add_argument("--bfloat16", action="store_true", help="compute convolutions in bfloat16, twice as fast where "
                         "the processor has AVX512-BF16 or AMX")
+    training.add_tune(parser)
     args = training.begin(parser)
     train_shards, validation_shards = training.divided(args, training.with_boxes)
     test_shards = training.tested(args, train_shards, validation_shards, training.with_boxes)
@@ -289,14 +301,17 @@ def main() -> None:
     def seen(shards: Shards) -> Shards:
         return shards.changed(signed) if args.channels == "signed" else shards
 
-    def items_of(dataset: DetectionDataset) -> list[dict[str, Any]]:
+    def read(dataset: DetectionDataset) -> list[dict[str, Any]]:
         return [dataset[i] for i in range(len(dataset))]
 
+    tune_shards = training.tuned_on(args, training.with_boxes, test_shards) if args.tune else None
     try:
-        items, validation = (items_of(DetectionDataset(seen(shards), classes, size, view=view))
+        items, validation = (read(DetectionDataset(seen(shards), classes, size, view=view))
                              for shards in (train_shards, validation_shards))
         test_set, test_view = training.detection_test(args, seen(test_shards), classes, size, view)
-        test = items_of(test_set)
+        test = read(test_set)
+        tuned = read(training.items_of(seen(tune_shards), classes, size,
+                                       fitted(tune_shards.image_area(), size))) if tune_shards else []
     except ValueError as error:
         raise SystemExit(str(error))
     sides = shorter_sides(items, classes)
@@ -305,15 +320,26 @@ def main() -> None:
         raise SystemExit(f"expected boxes of {classes[0]} to train on, got none, in {args.data}; its training samples "
                          f"have {', '.join(there) or 'no boxes that are not to be ignored'}")
     larger = warn_of_small(sides, area, args.scale)
-    model = train(args, items, classes, AUGMENTATION, validation)
+    model = train(training.untuned(args), items, classes, AUGMENTATION, validation)
     poor = advice(json.loads(pathlib.Path(args.out, "metrics.json").read_text(encoding="utf-8")), len(items), larger)
+    if tuned:
+        args = training.tuning(args, len(tuned))
+        model = train(args, items, classes, AUGMENTATION, validation, tuned=tuned)
 
     def image_of(i: int) -> tuple[str, np.ndarray]:
         boxes, labels, scores = next(detect(model, validation[i]["volume"][None]))
-        sure = scores > 0.3
+        sure = scores >= SURE
         texts = [f"{classes[label]} {score:.2f}" for label, score in zip(labels[sure].tolist(), scores[sure].tolist())]
         return validation[i]["id"], training.draw_item(validation[i], boxes[sure], texts)
 
+    gaps = (tune_shards or train_shards).column("gap_s")
+    takeaway.write(pathlib.Path(args.out), model, likeliest, len(items[0]["volume"]), size, {
+        "classes": classes, "bins": len(train_shards.sample(0, {"volume"})["volume"]) // 2,
+        "normalize": read_description(args.data)["settings"].get("volume", {}).get("normalize", "none"),
+        "channels": args.channels, "score": SURE,
+        "window_ms": round(1000 * float(np.median(gaps[gaps > 0] if (gaps > 0).any() else WINDOW_S)), 3)})
+    print(f"to find {' and '.join(classes)} in a recording: {shlex.quote(str(pathlib.Path(args.out, 'detect.py')))} "
+          f"RECORDING (this folder's detect.py and detector.pt are all it needs)")
     found = search(model, test, args.batch)
     training.write_predictions(args, test_shards, (entry for item, boxes in found for entry in
                                                    training.box_predictions(item, boxes, classes, test_view)))

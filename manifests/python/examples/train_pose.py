@@ -28,6 +28,7 @@ def read_args() -> argparse.Namespace:
     parser.add_argument("--sigma", type=float, default=1.5,
                         help="standard deviation of the heatmap peaks, in heatmap pixels")
     parser.add_argument("--last-layer", action="store_true", help="train only the last layer, with --pretrained")
+    training.add_tune(parser)
     return training.begin(parser)
 
 
@@ -57,11 +58,14 @@ def main() -> None:
     train_shards, validation_shards = training.divided(args, with_persons)
     size = (args.size, args.size)
     searched = training.tested(args, train_shards, validation_shards, with_persons)
+    tune_shards = training.tuned_on(args, with_persons, searched) if args.tune else None
     try:
-        train_set = PoseDataset(train_shards, size, sigma=args.sigma,
-                                augmentation=PoseAugmentation(rotation=args.rotation))
+        augmentation = PoseAugmentation(rotation=args.rotation)
+        train_set = PoseDataset(train_shards, size, sigma=args.sigma, augmentation=augmentation)
         validation_set = PoseDataset(validation_shards, size, train_set.joint_names, sigma=args.sigma)
         test = PoseDataset(searched, size, train_set.joint_names, sigma=args.sigma)
+        tuned = PoseDataset(tune_shards, size, train_set.joint_names, sigma=args.sigma,
+                            augmentation=augmentation) if tune_shards else None
         persons = read_persons(validation_shards)
     except ValueError as error:
         raise SystemExit(str(error))
@@ -116,9 +120,16 @@ def main() -> None:
 
     if args.last_layer:
         model.requires_grad_(False).final_layer.requires_grad_(True)
-    optimizer = torch.optim.Adam([weight for weight in model.parameters() if weight.requires_grad], lr=args.lr)
-    training.fit(args, model, optimizer, training.batches(args, train_set, shuffle=True), loss_of, measure,
-                 "PCKh@0.5" if pckh else "MPJPE")
+
+    def learn(args: argparse.Namespace, tuned: PoseDataset | None = None) -> None:
+        optimizer = torch.optim.Adam([weight for weight in model.parameters() if weight.requires_grad], lr=args.lr)
+        training.fit(args, model, optimizer, training.batches(args, train_set, shuffle=True, tuned=tuned), loss_of,
+                     measure, "PCKh@0.5" if pckh else "MPJPE")
+
+    learn(training.untuned(args))
+    if tuned:
+        args = training.tuning(args, len(tuned))
+        learn(args, tuned)
 
     def image_of(i: int) -> tuple[str, np.ndarray]:
         events, _, _, meta = validation_set[i]

@@ -29,12 +29,14 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package
 import eventgan
 from eventgan import Sample, Shards, drawing, read_description
 from eventgan.detection_scores import Detections, GroundTruth, detection_scores
-from eventgan.torch import DetectionDataset, fitted, inverse, move_boxes
+from eventgan.torch import DetectionDataset, fitted, inverse, mixture, move_boxes
 
 VALIDATION_SPLITS = ("validation", "valid", "val", "test")
 GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps together, the most first
 MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "images", "every",
               "test", "as_bright", "without_noise"}  # when a run goes on
+
+TUNING_STEPS, TUNING_RATE = 200, 0.25  # the latter a share of the learning rate
 
 
 def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
@@ -233,8 +235,49 @@ def detection_test(args: argparse.Namespace, shards: Shards, classes: Sequence[s
     whose images have another size: then the one that fits all of them. It need not have all classes."""
     if args.test:
         view = fitted(shards.image_area(), size)
+    return items_of(shards, classes, size, view), view
+
+
+def items_of(shards: Shards, classes: Sequence[str], size: tuple[int, int], view: np.ndarray) -> DetectionDataset:
+    """Items with those of the classes that the shards know, by the numbers that all of them have."""
     known = {name: i for i, name in enumerate(classes) if name in shards.known_classes()}
-    return DetectionDataset(shards, known or classes, size, view=view), view
+    return DetectionDataset(shards, known or classes, size, view=view)
+
+
+def add_tune(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--tune", help="folder of shards of your camera's labelled recordings, to go on with once the "
+                        f"training has ended: {TUNING_STEPS} steps, in which they are drawn as often as the samples of "
+                        "--data; into OUT/tuned")
+
+
+def tuned_on(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]], tested_shards: Shards) -> Shards:
+    """The labelled samples of --tune; warns of recordings that are tested on, too."""
+    try:
+        shards = Shards(args.tune, partial=True)
+        shards = shards[list(usable(shards))]
+    except (OSError, ValueError) as error:
+        sys.exit(str(error))
+    if not len(shards):
+        sys.exit(f"expected labelled samples to tune on, got none, in {args.tune}")
+    both = sorted({*shards.column("next_path")} & {*tested_shards.column("next_path")})
+    if both:
+        print(f"warning: what is found in {both[0]}{' and others' * (len(both) > 1)} says nothing of other recordings: "
+              f"it is in {args.tune}, too", file=sys.stderr)
+    return shards
+
+
+def untuned(args: argparse.Namespace) -> argparse.Namespace:
+    """The options of the training before."""
+    return argparse.Namespace(**{**vars(args), "tune": None})
+
+
+def tuning(args: argparse.Namespace, samples: int) -> argparse.Namespace:
+    """The options of the training on so many --tune samples that follows: it begins with the weights of the other."""
+    out = pathlib.Path(args.out)
+    (out / "tuned").mkdir(exist_ok=True)
+    return argparse.Namespace(**{**vars(args), "out": str(out / "tuned"), "tune": f"{args.tune}, {samples} samples",
+                                 "pretrained": str(out / "weights.pt"), "lr": args.lr * TUNING_RATE,
+                                 "steps": TUNING_STEPS, "epochs": None, "minutes": None})
 
 
 def _mean(shards: Shards) -> float:
@@ -303,9 +346,11 @@ def _divides(shards: Shards, by: str) -> bool:
 
 
 def batches(args: argparse.Namespace, dataset: Dataset, collate: Callable | None = None,
-            shuffle: bool = False) -> DataLoader:
-    return DataLoader(dataset, args.batch, shuffle=shuffle, num_workers=args.workers, collate_fn=collate,
-                      persistent_workers=args.workers > 0)
+            shuffle: bool = False, tuned: Dataset | None = None) -> DataLoader:
+    """`tuned`: a second dataset, from which as much is drawn as from the first one, however small it is."""
+    dataset, sampler = mixture((dataset, tuned), (1, 1)) if tuned else (dataset, None)
+    return DataLoader(dataset, args.batch, shuffle=shuffle and not sampler, sampler=sampler, num_workers=args.workers,
+                      collate_fn=collate, persistent_workers=args.workers > 0)
 
 
 def load_fitting(model: nn.Module, path: str | None) -> None:

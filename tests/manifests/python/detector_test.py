@@ -1,8 +1,13 @@
 """manifests/python/examples/train_detector.py: targets, loss and boxes that belong together,
-and a few steps on the demo."""
+and a few steps on the demo; takeaway.py and detect.py: the same boxes without the training."""
 
+import csv
+import io
 import json
+import os
 import pathlib
+import shutil
+import subprocess
 import sys
 
 import numpy as np
@@ -14,7 +19,11 @@ pytest.importorskip("cv2")
 EXAMPLES = SOURCE / "manifests" / "python" / "examples"
 sys.path.append(str(EXAMPLES))
 
+import detect
+import takeaway
 import train_detector as detector
+
+import eventgan
 
 
 def item(boxes, labels=None, ignore=None, height=96, width=128):
@@ -147,8 +156,145 @@ def test_a_few_steps(channels, data, tmp_path):
                             tmp_path / "out" / "weights.pt")
     assert code == 0 and "of the model's" in said, said
     assert all(entry["category_id"] == "Car" and len(entry["bbox"]) == 4 for entry in entries)
+    assert_taken_away(tmp_path / "out", [*line, "--epochs", "4"], tmp_path)
     said, code = run_script(*line, "--classes", "Cat", "--epochs", "1", "--out", tmp_path / "cats")
     assert code == 1 and "got Cat" in said and "Traceback" not in said
+
+
+def camera(count, size=(132, 176), seed=3):
+    """So many events of a second, of a square that crosses a sensor of that size; microseconds."""
+    draw = np.random.default_rng(seed)
+    events = np.zeros(count, [("t", "<i8"), ("x", "<i2"), ("y", "<i2"), ("p", "i1")])
+    events["t"] = 5_000_000 + np.sort(draw.integers(0, 1_000_000, count))
+    events["x"] = (events["t"] - 5_000_000) * (size[1] - 60) // 1_000_000 + draw.integers(0, 60, count)
+    events["y"], events["p"] = draw.integers(30, 90, count), draw.integers(0, 2, count)
+    return events
+
+
+@pytest.mark.parametrize("normalize, signed", [("none", False), ("eta98", False), ("none", True), ("eta98", True)])
+def test_what_is_taken_away_sees_what_shards_have(normalize, signed):
+    made = takeaway.EventsToBoxes(torch.nn.Identity(), (96, 128), 9, normalize == "eta98", signed)
+    for events in (camera(20_000), camera(1), camera(2)):
+        volume = eventgan.represent(events, "volume:9", size=(132, 176))
+        if normalize == "eta98":
+            volume = np.minimum(volume / np.percentile(volume[volume > 0], 98), 1)
+        expected = eventgan.signed_channel(volume) if signed else volume
+        seen = made.seen(*map(torch.from_numpy, detect.columns(events)), 132, 176)
+        np.testing.assert_allclose(seen.numpy(), expected, atol=2e-5)
+    events = np.array([(0, 5, 5, 1), (9, 5, 5, 0)], camera(0).dtype)  # as many of both: no signed event
+    assert np.isfinite(made.seen(*map(torch.from_numpy, detect.columns(events)), 132, 176).numpy()).all()
+    with pytest.raises(Exception, match="expected events within 50x40, got one at"):
+        made(*map(torch.from_numpy, detect.columns(camera(100))), 40, 50)
+
+
+def test_recordings_are_read_by_their_names(tmp_path):
+    h5py, events = pytest.importorskip("h5py"), camera(50)
+    expected = np.stack(detect.columns(events))
+    np.save(tmp_path / "a.npy", events[::-1])
+    np.savez(tmp_path / "a.npz", t_us=events["t"], x=events["x"], y=events["y"], polarity=2 * events["p"] - 1)
+    with h5py.File(tmp_path / "dsec.h5", "w") as file:
+        for name in "xytp":
+            file[f"events/{name}"] = events[name]
+    with h5py.File(tmp_path / "mvsec.hdf5", "w") as file:
+        file["davis/left/events"] = np.stack([events["x"], events["y"], events["t"] * 1e-6, 2.0 * events["p"] - 1], 1)
+        file["davis/left/image_raw"] = np.zeros((1, 132, 176), np.uint8)
+    for name, size in (("a.npy", None), ("a.npz", None), ("dsec.h5", None), ("mvsec.hdf5", (132, 176))):
+        found, seen = detect.read(tmp_path / name)
+        assert seen == size
+        np.testing.assert_array_equal(found[0], expected[0], name)
+        assert sorted(found.T.tolist()) == sorted(expected.T.tolist())  # those of one time in any order
+
+
+def convert_camera(folder, name, window_us):
+    """FOLDER/NAME.npy with a box in each of its first three windows, which FOLDER/shards has; their ends."""
+    folder.mkdir()
+    events = camera(30_000)
+    np.save(folder / f"{name}.npy", events)
+    ends = events["t"][0] + window_us * np.arange(1, 4)
+    (folder / f"{name}.csv").write_text("time_s,left,top,right,bottom,class\n"
+                                        + "".join(f"{end * 1e-6:.6f},10,30,70,90,Car\n" for end in ends))
+    eventgan.convert({"format": "eventgan-manifest", "version": 1, "name": "test", "image": {},
+                      "sources": [{"dataset": "recording", "root": str(folder / f"{name}.npy"),
+                                   "window_s": window_us * 1e-6, "sensor": {"width": 176, "height": 132}}],
+                      "generator": {"kind": "events"}, "output": {"directory": "shards", "dtype": "float32"}},
+                     folder / "shards", progress=False)
+    return ends
+
+
+def assert_taken_away(out, line, tmp_path):
+    """detect.py finds in a recording, with nothing but its folder, what the trainer finds in the converted one."""
+    recordings, alone = tmp_path / "recordings", tmp_path / "alone"
+    alone.mkdir()
+    for name in ("detect.py", "detector.pt"):
+        shutil.copy(out / name, alone)
+    window_us = round(1000 * detect.Detector(alone / "detector.pt").told["window_ms"])
+    assert 100_000 < window_us < 300_000  # the median of some of the demo's gaps
+    ends, events = convert_camera(recordings, "seen", window_us), np.load(recordings / "seen.npy")
+    said, code = run_script(*line, "--test", recordings / "shards")
+    assert code == 0 and "detect.py RECORDING" in said, said
+    expected = json.loads((out / "predictions.json").read_text())
+    assert len({each["image_id"] for each in expected}) == 3
+    bare = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    boxes, classes, scores = detect.Detector(alone / "detector.pt")(events[:0], (132, 176))
+    assert (boxes.shape, classes, scores.shape) == ((0, 4), [], (0,))
+    done = subprocess.run([sys.executable, "-I", alone / "detect.py", recordings / "seen.npy", "--sensor", "176x132",
+                           "--score", "0", "--images", alone / "images"], capture_output=True, text=True, env=bare)
+    assert done.returncode == 0, done.stderr
+    rows = [*csv.DictReader(io.StringIO(done.stdout))]
+    last = {row["t_us"] for row in rows} - {str(end) for end in ends}  # a rest of a window, which the labels leave out
+    rows = [row for row in rows if row["t_us"] not in last]
+    assert len(last) <= 1
+    assert len(rows) == len(expected)
+    for row, each in zip(rows, expected):
+        assert row["class"] == each["category_id"] and f"{int(row['t_us']) * 1e-6:.6f}" in each["image_id"]
+        np.testing.assert_allclose([float(row[name]) for name in "xywh"], each["bbox"], atol=0.05)
+        assert float(row["score"]) == pytest.approx(each["score"], abs=1e-3)
+    assert len([*(alone / "images").iterdir()]) == 3 + len(last)
+
+
+def test_tuned_on_the_camera_s_own_windows(data, tmp_path, monkeypatch):
+    """After the training, begun with its weights and left beside them; its own windows as often as generated ones."""
+    monkeypatch.setattr(detector.training, "TUNING_STEPS", 4)
+    for name in ("own", "other"):
+        convert_camera(tmp_path / name, name, 100_000)
+    own, out = tmp_path / "own" / "shards", tmp_path / "out"
+    line = [EXAMPLES / "train_detector.py", "--data", data, "--out", out, "--dataset", "kitti_object", "--threads", "1",
+            "--batch", "4", "--images", "1", "--every", "9", "--epochs", "2"]
+    said, code = run_script(*line)
+    assert code == 0, said
+    before = (out / "weights.pt").read_bytes(), (out / "predictions.json").read_bytes()
+    for more in ("step     4", "resuming after epoch"):
+        said, code = run_script(*line, "--tune", own, "--test", tmp_path / "other" / "shards")
+        assert code == 0 and more in said and "says nothing of other recordings" not in said, said
+    assert ((out / "weights.pt").read_bytes(), (out / "predictions.json").read_bytes()) == before
+    first, then = (json.loads((folder / "metrics.json").read_text()) for folder in (out, out / "tuned"))
+    assert then["lr"] == first["lr"] / 4 and then["history"][-1]["step"] == 4
+    assert then["untrained"] == pytest.approx(first["AP50 Car"])  # what it begins with
+    entries = json.loads((out / "tuned" / "predictions.json").read_text())
+    assert {each["image_id"].split("/")[0] for each in entries} <= {"other"}
+    assert detect.Detector(out / "tuned" / "detector.pt").told["window_ms"] == 100  # as the camera's windows
+    said, code = run_script(*line, "--tune", own, "--test", own)
+    assert code == 0 and f"in {tmp_path / 'own' / 'own.npy'} says nothing of other recordings" in said, said
+    said, code = run_script(*line, "--tune", tmp_path / "other" / "shards")
+    assert code == 1 and "expected --tune " in said and f"{own}, 3 samples, as when" in said, said
+
+
+def test_a_few_windows_are_drawn_as_often_as_many_images():
+    class Many(torch.utils.data.Dataset):
+        def __init__(self, value, count):
+            self.value, self.count = value, count
+
+        def __len__(self):
+            return self.count
+
+        def __getitem__(self, _):
+            return self.value
+
+    torch.manual_seed(0)
+    args = detector.argparse.Namespace(batch=10, workers=0)
+    drawn = torch.cat([*detector.training.batches(args, Many(0, 1990), shuffle=True, tuned=Many(1, 10))])
+    assert len(drawn) == 2000 and abs(drawn.float().mean() - 0.5) < 0.05  # 4.5 standard deviations
+    assert sum(map(len, detector.training.batches(args, Many(0, 30), shuffle=True, tuned=Many(1, 0)))) == 30
 
 
 class TestShards:

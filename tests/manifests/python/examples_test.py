@@ -105,7 +105,7 @@ def convert_persons(folder, joints, limit):
     return folder / "out"
 
 
-def test_pose_resnet_learns_persons_without_head_boxes(tmp_path):
+def test_pose_resnet_learns_persons_without_head_boxes(tmp_path, monkeypatch):
     """Of COCO's files, as LSP's: PCKh is of the heads' joints, or there is none."""
     trainer = need_trainer("pose_resnet", "easydict", "yaml")
     joints = {"head_top": [32, 8], "left_shoulder": [24, 20], "right_shoulder": [40, 20], "left_hip": [26, 44],
@@ -126,6 +126,13 @@ def test_pose_resnet_learns_persons_without_head_boxes(tmp_path):
               for said in (train("train_pose", data, tmp_path / "poses", *options, "--test", test)
                            for test in (data, other_way))]
     assert errors[0] == pytest.approx(errors[1]) and set(joints) < errors[0].keys()
+    monkeypatch.syspath_prepend(EXAMPLES)
+    import training
+    monkeypatch.setattr(training, "TUNING_STEPS", 2)
+    said = train("train_pose", data, tmp_path / "poses", *options, "--tune", other_way, "--test", data)
+    assert "resuming after epoch 1" in said and "of other recordings" not in said
+    assert [row["step"] for row in history(tmp_path / "poses" / "tuned")] == [0, 2]
+    assert scores(said)["joints"].keys() == errors[0].keys()
     more = convert_persons(tmp_path / "more", {**joints, "neck": [32, 18]}, 5)
     said = train("train_pose", data, tmp_path / "poses", *options, "--test", more, expect=1)
     assert f"expected the trained joints {', '.join(joints)}, got {', '.join(joints)}, neck, in {more}" in said
