@@ -11,11 +11,6 @@ namespace {
 using Tag = dnnl::memory::format_tag;
 using Dimensions = dnnl::memory::dims;
 
-/// With a slope of 0 oneDNN takes the larger of value and 0, which turns NaN into 0. With another
-/// it multiplies. Small enough to vanish in every sum of float32 or bfloat16, and far from
-/// subnormal.
-constexpr float kNoSlope = 1e-30f;
-
 dnnl::post_ops post_operations(const ConvolutionSetup& setup) {
   dnnl::post_ops operations;
   if (setup.add_target != 0) operations.append_sum(setup.add_target);

@@ -93,6 +93,26 @@ NetworkLayers::NetworkLayers(const Weights& weights, Precision precision,
     const Type type = is_float32_layer(name) ? Type::f32 : weights_type_of(precision);
     layers_.try_emplace(name, std::move(layer), type, engine_);
   }
+  if (winograd_fits(base_channels_, precision_)) winograd_ = winograd_layers();
+}
+
+WinogradLayers NetworkLayers::winograd_layers() const {
+  const auto numbers = [&](const std::string& name) -> const LayerNumbers& {
+    return layers_.at(name).numbers();
+  };
+  WinogradLayers layers{HeadConvolution(numbers("head")), {}, {}, PlanePrediction(numbers("pred"))};
+  for (int block = 0; block < kResidualBlocks; ++block) {
+    for (const char* part : {".conv1", ".conv2"}) {
+      layers.residuals.emplace_back(numbers("resblocks." + std::to_string(block) + part), nullptr,
+                                    kNoSlope);
+    }
+  }
+  for (int level = 0; level < kNetworkLevels; ++level) {
+    const std::string name = "decoders." + std::to_string(level);
+    layers.decoders.emplace_back(numbers(name + ".skip"), &numbers(name + ".last_row"),
+                                 kLeakySlope);
+  }
+  return layers;
 }
 
 }  // namespace eventgan

@@ -33,21 +33,24 @@ NetworkPlan::NetworkPlan(NetworkLayers& layers, ImageSize size)
       size_(size),
       base_channels_(layers.base_channels()),
       bins_(layers.bins()),
-      stored_type_(layers.stored_type()) {
+      stored_type_(layers.stored_type()),
+      winograd_(layers.winograd() ? &*layers.winograd() : nullptr) {
   const bool narrow = NarrowLayers::fit(base_channels_, layers.precision());
   skips_[0] = add_activations(size_, base_channels_);
   if (narrow) {
     plan_narrow(layers);
+  } else if (winograd_) {
+    plan_winograd();
   } else {
     plan_head(layers);
   }
   plan_encoders(layers);
-  plan_residual_blocks(layers);
+  if (!winograd_) plan_residual_blocks(layers);
   plan_decoders(layers);
-  if (!narrow) plan_prediction(layers);
+  if (!narrow && !winograd_) plan_prediction(layers);
 
   std::size_t scratch_bytes =
-      narrow ? 0 : std::max(head_->scratch_bytes(), prediction_->scratch_bytes());
+      prediction_ ? std::max(head_->scratch_bytes(), prediction_->scratch_bytes()) : 0;
   for (const auto* list : {&encoders_, &residuals_}) {
     for (const FusedConvolution& convolution : *list) {
       scratch_bytes = std::max(scratch_bytes, convolution.scratch_bytes());
@@ -74,6 +77,18 @@ void NetworkPlan::plan_narrow(NetworkLayers& layers) {
   const auto stored_bytes = static_cast<int>(dnnl::memory::data_type_size(stored_type_));
   narrow_.emplace(numbers("head"), numbers("decoders.3.skip"), numbers("decoders.3.phases"),
                   numbers("pred"), size_, stored_bytes, tiles, layout_);
+}
+
+void NetworkPlan::plan_winograd() {
+  std::size_t bytes =
+      std::max(winograd_->head.buffer_bytes(size_), winograd_->prediction.buffer_bytes());
+  for (const auto* list : {&winograd_->residuals, &winograd_->decoders}) {
+    for (const WinogradConvolution& layer : *list) bytes = std::max(bytes, layer.buffer_bytes());
+  }
+  winograd_buffer_ = layout_.add(bytes);
+  // The two rows of a row of tiles, and what is read behind them.
+  const std::size_t pixels = 2 * static_cast<std::size_t>(size_.width) + PlanePrediction::kPixels;
+  decoded_rows_ = layout_.add(sizeof(float) * pixels * base_channels_);
 }
 
 void NetworkPlan::plan_head(NetworkLayers& layers) {
@@ -133,7 +148,7 @@ void NetworkPlan::plan_residual_blocks(NetworkLayers& layers) {
 void NetworkPlan::plan_decoders(NetworkLayers& layers) {
   for (int level = 0; level < kNetworkLevels; ++level) {
     const ImageSize large = sizes_[kNetworkLevels - 1 - level];
-    const bool by_strips = level < kNetworkLevels - 1 || !narrow_;
+    const bool by_strips = !winograd_ && (level < kNetworkLevels - 1 || !narrow_);
     decoders_.emplace_back(layers, level, large, by_strips, layout_);
     if (level < kNetworkLevels - 1) {
       decoded_[level] = add_activations(large, decoders_[level].channels());
@@ -155,6 +170,11 @@ template <class Stored>
 void NetworkPlan::run_head(const EngineRun& run, const float* planes) const {
   auto* stored = reinterpret_cast<Stored*>(run.block + skips_[0].offset);
   const std::size_t row_values = static_cast<std::size_t>(size_.width) * base_channels_;
+  if constexpr (std::is_same_v<Stored, float>) {
+    if (winograd_) {
+      return winograd_->head.run(planes, size_, stored, run.block + winograd_buffer_);
+    }
+  }
   if (narrow_) {
     for (int y = 0; y < size_.height; ++y) {
       Stored* const row = stored + y * row_values;
@@ -189,8 +209,34 @@ void NetworkPlan::run_head(const EngineRun& run, const float* planes) const {
   }
 }
 
+void NetworkPlan::run_residual(const EngineRun& run, int i) const {
+  const std::size_t from = (i % 2 == 0 ? bottleneck_ : between_).offset;
+  const std::size_t to = (i % 2 == 0 ? between_ : bottleneck_).offset;
+  if (!winograd_)
+    return residuals_[i].run(run.stream, run.block + from, run.block + to, run.scratch);
+  const ImageSize size = half_size(sizes_.back());
+  winograd_->residuals[i].run({reinterpret_cast<const float*>(run.block + from), nullptr, size}, 0,
+                              WinogradConvolution::tile_rows(size),
+                              reinterpret_cast<float*>(run.block + to), 0, i % 2 == 1,
+                              run.block + winograd_buffer_);
+}
+
+WinogradConvolution::Images NetworkPlan::decoder_images(const EngineRun& run, int level,
+                                                        const std::byte* small) const {
+  const int skip = kNetworkLevels - 1 - level;
+  return {reinterpret_cast<const float*>(run.block + skips_[skip].offset),
+          reinterpret_cast<const float*>(small), sizes_[skip]};
+}
+
 template <class Stored>
 void NetworkPlan::run_decoder(const EngineRun& run, int level, const std::byte* small) const {
+  if (winograd_) {
+    const WinogradConvolution::Images images = decoder_images(run, level, small);
+    return winograd_->decoders[level].run(
+        images, 0, WinogradConvolution::tile_rows(images.size),
+        reinterpret_cast<float*>(run.block + decoded_[level].offset), 0, false,
+        run.block + winograd_buffer_);
+  }
   const DecoderLevel& decoder = decoders_[level];
   const std::byte* skip = run.block + skips_[kNetworkLevels - 1 - level].offset;
   auto* stored = reinterpret_cast<Stored*>(run.block + decoded_[level].offset);
@@ -206,9 +252,27 @@ void NetworkPlan::run_decoder(const EngineRun& run, int level, const std::byte* 
   }
 }
 
+void NetworkPlan::run_winograd_end(const EngineRun& run, const std::byte* small,
+                                   float* volume) const {
+  const WinogradConvolution::Images images = decoder_images(run, kNetworkLevels - 1, small);
+  const std::ptrdiff_t row_values = static_cast<std::ptrdiff_t>(size_.width) * base_channels_;
+  auto* decoded = reinterpret_cast<float*>(run.block + decoded_rows_);
+  std::byte* buffer = run.block + winograd_buffer_;
+  std::fill_n(decoded, 2 * row_values + PlanePrediction::kPixels * base_channels_, 0.0f);
+  for (int tiles = 0; tiles < WinogradConvolution::tile_rows(size_); ++tiles) {
+    const int first = 2 * tiles - 1;
+    winograd_->decoders.back().run(images, tiles, tiles + 1, decoded, first, false, buffer);
+    for (int y = std::max(first, 0); y < std::min(first + 2, size_.height); ++y) {
+      run.sound &=
+          winograd_->prediction.run(decoded + (y - first) * row_values, size_, y, volume, buffer);
+    }
+  }
+}
+
 template <class Stored>
 void NetworkPlan::run_last_decoder(const EngineRun& run, const std::byte* small,
                                    float* volume) const {
+  if (winograd_) return run_winograd_end(run, small, volume);
   const DecoderLevel& decoder = decoders_.back();
   const std::byte* skip = run.block + skips_[0].offset;
   auto* decoded = reinterpret_cast<float*>(run.block + decoded_rows_);
@@ -282,9 +346,9 @@ GenerationNotes NetworkPlan::run(const float* planes, float* volume, std::byte* 
     }
     for (int i = 0; i < kResidualBlocks; ++i) {
       const std::string name = numbered("resblocks", i);
-      residuals_[2 * i].run(stream, at(bottleneck_), at(between_), run.scratch);
+      run_residual(run, 2 * i);
       count_and_show(name + ".conv1", between_);
-      residuals_[2 * i + 1].run(stream, at(between_), at(bottleneck_), run.scratch);
+      run_residual(run, 2 * i + 1);
       count_and_show(name, bottleneck_);
     }
     const std::byte* small = at(bottleneck_);

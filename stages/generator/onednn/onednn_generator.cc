@@ -23,6 +23,7 @@
 #include "stages/generator/onednn/detail/onednn_versions.h"
 #include "stages/generator/onednn/detail/tiled_layers.h"
 #include "stages/generator/onednn/narrow_layers.h"
+#include "stages/generator/onednn/winograd.h"
 
 namespace eventgan {
 
@@ -53,9 +54,14 @@ std::string version_text() {
          std::to_string(version->patch);
 }
 
-std::string narrow_text(int base_channels, Precision precision) {
-  if (!NarrowLayers::fit(base_channels, precision)) return "";
-  return ", narrow layers " + std::to_string(NarrowLayers::kVersion);
+std::string own_layers_text(int base_channels, Precision precision) {
+  if (NarrowLayers::fit(base_channels, precision)) {
+    return ", narrow layers " + std::to_string(NarrowLayers::kVersion);
+  }
+  if (winograd_fits(base_channels, precision)) {
+    return ", Winograd layers " + std::to_string(kWinogradVersion);
+  }
+  return "";
 }
 
 std::size_t stored_bytes(Precision precision) {
@@ -79,7 +85,7 @@ class OnednnGenerator final : public Generator {
         precision_(precision),
         description_("onednn " + std::string(to_string(precision)) + ", 1 thread, oneDNN " +
                      version_text() + ", " + onednn_support(precision).instruction_set +
-                     narrow_text(weights.base_channels, precision) + ", " +
+                     own_layers_text(weights.base_channels, precision) + ", " +
                      describe_training_gaps(weights.training_gaps)),
         layers_(weights, precision, dnnl::engine(dnnl::engine::kind::cpu, 0)),
         plans_(layers_) {}

@@ -4,11 +4,13 @@
 #include <dnnl.hpp>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "manifests/values/job.h"
 #include "stages/generator/onednn/layer_numbers.h"
+#include "stages/generator/onednn/winograd.h"
 #include "stages/generator/weights.h"
 
 namespace eventgan {
@@ -40,6 +42,14 @@ class LayerWeights {
   std::vector<dnnl::memory> packed_;
 };
 
+/// All layers but the encoders.
+struct WinogradLayers {
+  HeadConvolution head;
+  std::vector<WinogradConvolution> residuals;  ///< two a block
+  std::vector<WinogradConvolution> decoders;
+  PlanePrediction prediction;
+};
+
 /// The network's layers (layer_numbers.h) for one precision, ready for convolutions of any size.
 class NetworkLayers {
  public:
@@ -55,8 +65,12 @@ class NetworkLayers {
   /// What activations between layers are stored as.
   dnnl::memory::data_type stored_type() const { return stored_type_; }
   float residual_factor(int block) const { return residual_factors_[block]; }
+  /// Nothing where winograd_fits() says so.
+  const std::optional<WinogradLayers>& winograd() const { return winograd_; }
 
  private:
+  WinogradLayers winograd_layers() const;
+
   dnnl::engine engine_;
   int base_channels_;
   int bins_;
@@ -64,6 +78,7 @@ class NetworkLayers {
   dnnl::memory::data_type stored_type_;
   std::array<float, kResidualBlocks> residual_factors_;
   std::map<std::string, LayerWeights> layers_;
+  std::optional<WinogradLayers> winograd_;
 };
 
 }  // namespace eventgan

@@ -71,6 +71,7 @@ class NetworkPlan {
 
   Buffer add_activations(ImageSize size, int channels);
   void plan_narrow(NetworkLayers& layers);
+  void plan_winograd();
   void plan_head(NetworkLayers& layers);
   void plan_encoders(NetworkLayers& layers);
   void plan_residual_blocks(NetworkLayers& layers);
@@ -80,6 +81,12 @@ class NetworkPlan {
   /// Calls compute(Stored()) with the type of the stored activations.
   template <class Compute>
   void with_stored_type(Compute&& compute) const;
+  /// Convolution i of the residual blocks.
+  void run_residual(const EngineRun& run, int i) const;
+  WinogradConvolution::Images decoder_images(const EngineRun& run, int level,
+                                             const std::byte* small) const;
+  /// The last decoder and the prediction.
+  void run_winograd_end(const EngineRun& run, const std::byte* small, float* volume) const;
   template <class Stored>
   void run_head(const EngineRun& run, const float* planes) const;
   template <class Stored>
@@ -99,6 +106,9 @@ class NetworkPlan {
   dnnl::memory::data_type stored_type_;
   BufferLayout layout_;
 
+  /// Where it is, in place of `head_`, `residuals_`, the decoders' strips and `prediction_`.
+  const WinogradLayers* winograd_;
+  std::size_t winograd_buffer_ = 0;
   /// Where it fits, in place of `head_`, the last decoder's strips and `prediction_`.
   std::optional<NarrowLayers> narrow_;
   std::size_t inputs_ = 0;            ///< of the head

@@ -1,0 +1,111 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "manifests/values/frames.h"
+#include "manifests/values/job.h"
+#include "stages/generator/onednn/layer_numbers.h"
+
+namespace eventgan {
+
+/// Whether a network of this base width computes all of its layers but the encoders by the kernels
+/// of this file: in float32, on a processor with AVX2 and FMA that has no AVX-512, as oneDNN sees
+/// it.
+bool winograd_fits(int base_channels, Precision precision);
+/// Counts up with what changes their bytes.
+inline constexpr int kWinogradVersion = 1;
+
+/// Below zero, in place of a ReLU's 0: with that oneDNN takes the larger of value and 0, which
+/// turns NaN into 0; with another slope it multiplies. Small enough to vanish in every sum of
+/// float32 or bfloat16, and far from subnormal.
+inline constexpr float kNoSlope = 1e-30f;
+
+/// Eight channels of weights, as a register of AVX2 holds them.
+struct alignas(32) EightWeights {
+  float values[8];
+};
+
+/// activation(convolution(input) + bias [+ output]) of a 3x3 kernel with stride 1 and zeros around
+/// the image, and the same of a decoder, whose kernel also sees the doubled small image. Float32;
+/// images are [y, x, channel] without gaps, channels are multiples of 8. By Winograd's F(2x2, 3x3)
+/// (Lavin and Gray, Fast Algorithms for Convolutional Neural Networks, 2016): tiles of 2x2 output
+/// pixels are sums of 16 products of channels, where the kernel alone has 36. Of the doubled image,
+/// where neighbours are equal, 9 are left. Sums differ from the kernel's in their last bits;
+/// infinity may come out as NaN, and both may reach the other pixels of their tile. Thread safe.
+class WinogradConvolution {
+ public:
+  /// `plain` over the input. `doubled` over the doubled small image (`decoders.N.last_row`), or
+  /// null. A value below zero is multiplied with `slope`.
+  WinogradConvolution(const LayerNumbers& plain, const LayerNumbers* doubled, float slope);
+
+  /// A tile has output rows 2 row - 1 and 2 row, columns likewise.
+  static int tile_rows(ImageSize size) { return size.height / 2 + 1; }
+
+  struct Images {
+    const float* input = nullptr;
+    const float* small = nullptr;  ///< of half_size(size); null where nothing is doubled
+    ImageSize size;
+  };
+
+  /// The tiles of rows first .. end - 1. `output`: row output_row of the result and those behind
+  /// it. `add`: to what is there. `buffer`: buffer_bytes(), on a cache line.
+  void run(const Images& images, int first, int end, float* output, int output_row, bool add,
+           std::byte* buffer) const;
+
+  std::size_t buffer_bytes() const;
+  int out_channels() const { return out_; }
+
+ private:
+  struct Block;
+  int depth(int slot) const;
+  template <int kTiles, int kVectors>
+  void multiply_slots(const Block& block) const;
+  void read_input(const Images& images, const Block& block) const;
+  void read_small(const Images& images, const Block& block) const;
+  void write_output(const Images& images, const Block& block, float* output, int output_row,
+                    bool add) const;
+
+  int in_, small_, out_;
+  float slope_;
+  int tiles_at_once_;
+  std::vector<EightWeights> weights_;  ///< [slot, out / vector's, in, out % vector's]
+  std::vector<float> bias_;
+};
+
+/// The head: 3x3 from planes to channels, LeakyReLU included. Thread safe.
+class HeadConvolution {
+ public:
+  explicit HeadConvolution(const LayerNumbers& head);
+
+  std::size_t buffer_bytes(ImageSize size) const;
+
+  /// inputs: [input, y, x]; output: [y, x, channel].
+  void run(const float* inputs, ImageSize size, float* output, std::byte* buffer) const;
+
+ private:
+  int in_, out_;
+  std::vector<EightWeights> weights_;  ///< [out / 8, row, in, column, out % 8]
+  std::vector<EightWeights> bias_;
+};
+
+/// The last layer: 1x1 from channels to planes, ReLU included. Thread safe.
+class PlanePrediction {
+ public:
+  explicit PlanePrediction(const LayerNumbers& pred);
+
+  /// What a row's pixels must be followed by, whatever it is.
+  static constexpr int kPixels = 32;
+  std::size_t buffer_bytes() const;
+
+  /// Pixels [x, channel] of row y into the planes of `volume`, [channel, y, x]; NaN stays NaN.
+  /// Whether all values are finite before the ReLU.
+  bool run(const float* pixels, ImageSize size, int y, float* volume, std::byte* buffer) const;
+
+ private:
+  int in_, out_;
+  std::vector<float> weights_;  ///< [out, in]
+  std::vector<float> bias_;
+};
+
+}  // namespace eventgan
