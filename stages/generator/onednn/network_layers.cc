@@ -100,17 +100,19 @@ WinogradLayers NetworkLayers::winograd_layers() const {
   const auto numbers = [&](const std::string& name) -> const LayerNumbers& {
     return layers_.at(name).numbers();
   };
-  WinogradLayers layers{HeadConvolution(numbers("head")), {}, {}, PlanePrediction(numbers("pred"))};
+  WinogradLayers layers{
+      HeadConvolution(numbers("head")), {}, {}, {}, PlanePrediction(numbers("pred"))};
   for (int block = 0; block < kResidualBlocks; ++block) {
     for (const char* part : {".conv1", ".conv2"}) {
-      layers.residuals.emplace_back(numbers("resblocks." + std::to_string(block) + part), nullptr,
+      layers.residuals.emplace_back(numbers("resblocks." + std::to_string(block) + part), 1,
                                     kNoSlope);
     }
   }
   for (int level = 0; level < kNetworkLevels; ++level) {
-    const std::string name = "decoders." + std::to_string(level);
-    layers.decoders.emplace_back(numbers(name + ".skip"), &numbers(name + ".last_row"),
-                                 kLeakySlope);
+    const std::string number = std::to_string(level), decoder = "decoders." + number;
+    layers.encoders.emplace_back(numbers("encoders." + number), 2, kLeakySlope);
+    layers.decoders.emplace_back(numbers(decoder + ".skip"), 1, kLeakySlope,
+                                 &numbers(decoder + ".last_row"));
   }
   return layers;
 }

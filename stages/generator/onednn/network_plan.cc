@@ -82,7 +82,7 @@ void NetworkPlan::plan_narrow(NetworkLayers& layers) {
 void NetworkPlan::plan_winograd() {
   std::size_t bytes =
       std::max(winograd_->head.buffer_bytes(size_), winograd_->prediction.buffer_bytes());
-  for (const auto* list : {&winograd_->residuals, &winograd_->decoders}) {
+  for (const auto* list : {&winograd_->encoders, &winograd_->residuals, &winograd_->decoders}) {
     for (const WinogradConvolution& layer : *list) bytes = std::max(bytes, layer.buffer_bytes());
   }
   winograd_buffer_ = layout_.add(bytes);
@@ -124,7 +124,9 @@ void NetworkPlan::plan_encoders(NetworkLayers& layers) {
     setup.source_type = setup.target_type = stored_type_;
     setup.activation = Activation::kLeakyRelu;
     // oneDNN takes the padding after the last pixel as given, also where no stride reaches it.
-    encoders_.emplace_back(setup, layers.at(numbered("encoders", level)), engine_);
+    if (!winograd_) {
+      encoders_.emplace_back(setup, layers.at(numbered("encoders", level)), engine_);
+    }
     size = half_size(size);
   }
   bottleneck_ = add_activations(size, base_channels_ << kNetworkLevels);
@@ -209,16 +211,26 @@ void NetworkPlan::run_head(const EngineRun& run, const float* planes) const {
   }
 }
 
+void NetworkPlan::run_encoder(const EngineRun& run, int level, const Buffer& target) const {
+  const std::byte* from = run.block + skips_[level].offset;
+  std::byte* to = run.block + target.offset;
+  if (!winograd_) return encoders_[level].run(run.stream, from, to, run.scratch);
+  const WinogradConvolution& layer = winograd_->encoders[level];
+  layer.run({reinterpret_cast<const float*>(from), nullptr, sizes_[level]}, 0,
+            layer.tile_rows(sizes_[level]), reinterpret_cast<float*>(to), 0, false,
+            run.block + winograd_buffer_);
+}
+
 void NetworkPlan::run_residual(const EngineRun& run, int i) const {
   const std::size_t from = (i % 2 == 0 ? bottleneck_ : between_).offset;
   const std::size_t to = (i % 2 == 0 ? between_ : bottleneck_).offset;
   if (!winograd_)
     return residuals_[i].run(run.stream, run.block + from, run.block + to, run.scratch);
   const ImageSize size = half_size(sizes_.back());
-  winograd_->residuals[i].run({reinterpret_cast<const float*>(run.block + from), nullptr, size}, 0,
-                              WinogradConvolution::tile_rows(size),
-                              reinterpret_cast<float*>(run.block + to), 0, i % 2 == 1,
-                              run.block + winograd_buffer_);
+  const WinogradConvolution& layer = winograd_->residuals[i];
+  layer.run({reinterpret_cast<const float*>(run.block + from), nullptr, size}, 0,
+            layer.tile_rows(size), reinterpret_cast<float*>(run.block + to), 0, i % 2 == 1,
+            run.block + winograd_buffer_);
 }
 
 WinogradConvolution::Images NetworkPlan::decoder_images(const EngineRun& run, int level,
@@ -232,10 +244,10 @@ template <class Stored>
 void NetworkPlan::run_decoder(const EngineRun& run, int level, const std::byte* small) const {
   if (winograd_) {
     const WinogradConvolution::Images images = decoder_images(run, level, small);
-    return winograd_->decoders[level].run(
-        images, 0, WinogradConvolution::tile_rows(images.size),
-        reinterpret_cast<float*>(run.block + decoded_[level].offset), 0, false,
-        run.block + winograd_buffer_);
+    const WinogradConvolution& layer = winograd_->decoders[level];
+    return layer.run(images, 0, layer.tile_rows(images.size),
+                     reinterpret_cast<float*>(run.block + decoded_[level].offset), 0, false,
+                     run.block + winograd_buffer_);
   }
   const DecoderLevel& decoder = decoders_[level];
   const std::byte* skip = run.block + skips_[kNetworkLevels - 1 - level].offset;
@@ -259,9 +271,10 @@ void NetworkPlan::run_winograd_end(const EngineRun& run, const std::byte* small,
   auto* decoded = reinterpret_cast<float*>(run.block + decoded_rows_);
   std::byte* buffer = run.block + winograd_buffer_;
   std::fill_n(decoded, 2 * row_values + PlanePrediction::kPixels * base_channels_, 0.0f);
-  for (int tiles = 0; tiles < WinogradConvolution::tile_rows(size_); ++tiles) {
+  const WinogradConvolution& layer = winograd_->decoders.back();
+  for (int tiles = 0; tiles < layer.tile_rows(size_); ++tiles) {
     const int first = 2 * tiles - 1;
-    winograd_->decoders.back().run(images, tiles, tiles + 1, decoded, first, false, buffer);
+    layer.run(images, tiles, tiles + 1, decoded, first, false, buffer);
     for (int y = std::max(first, 0); y < std::min(first + 2, size_.height); ++y) {
       run.sound &=
           winograd_->prediction.run(decoded + (y - first) * row_values, size_, y, volume, buffer);
@@ -341,7 +354,7 @@ GenerationNotes NetworkPlan::run(const float* planes, float* volume, std::byte* 
     show("head", skips_[0]);
     for (int level = 0; level < kNetworkLevels; ++level) {
       const Buffer& target = level + 1 < kNetworkLevels ? skips_[level + 1] : bottleneck_;
-      encoders_[level].run(stream, at(skips_[level]), at(target), run.scratch);
+      run_encoder(run, level, target);
       count_and_show(numbered("encoders", level), target);
     }
     for (int i = 0; i < kResidualBlocks; ++i) {

@@ -35,49 +35,114 @@ EVENTGAN_EIGHT_INLINE void keep(Eight lanes, float* values) {
   *reinterpret_cast<Eight*>(values) = lanes;
 }
 
-// F(2, 3) of a row: outputs 0 and 1 of inputs d and kernel g are t0 + t1 + t2 and t1 - t2 - t3 of
-//   t = (d0 - d2) g0, (d1 + d2) (g0 + g1 + g2) / 2, (d2 - d1) (g0 - g1 + g2) / 2, (d1 - d3) g2.
-// A doubled row has d = a, a, b, b, and its outputs a (g0 + g1) + b g2 and a g0 + b (g1 + g2) are
-// those of
-//   t1 = a (g0 + g1 / 2) + b (g2 + g1 / 2), t2 = (a - b) g1 / 2,
-// three products where t has four. If the image ends before d3, the last output's b g2 is none of
-// it: t3 = b g2. Of tiles, rows and columns each are summed so: slot 4 i + j has t_i of rows and
-// t_j of columns.
-constexpr int kSide = 4, kSlots = kSide * kSide;
-/// Of the doubled image: what is multiplied in a slot's row or column (a and b; a - b; b).
-constexpr std::array<int, kSide> kDoubledTerms = {0, 2, 1, 1};
-constexpr int kTerms = 4;
-constexpr std::array<int, kTerms> kSlotOfTerm = {1, 1, 2, 3};
-constexpr std::array<int, kTerms> kTermInSlot = {0, 1, 0, 0};
+/// A product of a row (column) of a tile: which of the row's sums it is added to, which product of
+/// that sum it is, and what of the kernel it multiplies. What of the inputs: `input` of the rule.
+struct Term {
+  int sum = 0;
+  int place = 0;
+  std::array<double, 3> kernel{};
+};
 
-/// Input channels of a slot.
-int slot_depth(int slot, int in, int small) {
-  return in + small * kDoubledTerms[slot / kSide] * kDoubledTerms[slot % kSide];
-}
-int depth_before(int slot, int in, int small) {
-  int depth = 0;
-  for (int before = 0; before < slot; ++before) depth += slot_depth(before, in, small);
-  return depth;
-}
+// Rules by which a row of a tile's inputs d becomes its two outputs. Rows and columns of a tile are
+// summed so: sum kSums i + j has sum i of rows and j of columns.
 
-/// What a slot multiplies the kernel's rows (columns) with.
-constexpr double kPlainKernel[kSide][3] = {{1, 0, 0}, {0.5, 0.5, 0.5}, {0.5, -0.5, 0.5}, {0, 0, 1}};
-constexpr double kDoubledKernel[kTerms][3] = {{1, 0.5, 0}, {0, 0.5, 1}, {0, 0.5, 0}, {0, 0, 1}};
-
-float transformed(const float* kernel, const double (&rows)[3], const double (&columns)[3]) {
-  double sum = 0;
-  for (int y = 0; y < 3; ++y) {
-    for (int x = 0; x < 3; ++x) sum += rows[y] * columns[x] * kernel[3 * y + x];
+/// F(2, 3): what a kernel g makes of four inputs.
+struct PlainRule {
+  static constexpr int kInputs = 4, kSums = 4;
+  static constexpr std::array<Term, 4> kTerms = {
+      {{0, 0, {1, 0, 0}}, {1, 0, {0.5, 0.5, 0.5}}, {2, 0, {0.5, -0.5, 0.5}}, {3, 0, {0, 0, 1}}}};
+  template <class At>
+  static EVENTGAN_EIGHT_INLINE Eight input(int term, At&& d) {
+    switch (term) {
+      case 0:
+        return d(0) - d(2);
+      case 1:
+        return d(1) + d(2);
+      case 2:
+        return d(2) - d(1);
+      default:
+        return d(1) - d(3);
+    }
   }
-  return static_cast<float>(sum);
+  template <class At>
+  static EVENTGAN_EIGHT_INLINE Eight output(int pixel, At&& sum) {
+    return pixel == 0 ? sum(0) + sum(1) + sum(2) : sum(1) - sum(2) - sum(3);
+  }
+};
+
+/// The same of a doubled row, whose four inputs are a, a, b, b: a (g0 + g1) + b g2 and
+/// a g0 + b (g1 + g2). If the image ends before the last input, the last output has no b g2: the
+/// third input here is what there is too much of b.
+struct DoubledRule {
+  static constexpr int kInputs = 3;
+  static constexpr std::array<Term, 4> kTerms = {
+      {{1, 0, {1, 0.5, 0}}, {1, 1, {0, 0.5, 1}}, {2, 0, {0, 0.5, 0}}, {3, 0, {0, 0, 1}}}};
+  template <class At>
+  static EVENTGAN_EIGHT_INLINE Eight input(int term, At&& d) {
+    switch (term) {
+      case 0:
+        return d(0);
+      case 1:
+        return d(1);
+      case 2:
+        return d(0) - d(1);
+      default:
+        return d(2);
+    }
+  }
+};
+
+/// A kernel with stride 2: d0 g0 + d1 g1 + d2 g2 and d2 g0 + d3 g1 + d4 g2. Five products where the
+/// kernel has six.
+struct StridedRule {
+  static constexpr int kInputs = 5, kSums = 3;
+  static constexpr std::array<Term, 5> kTerms = {{{0, 0, {1, 0, 0}},
+                                                  {0, 1, {0, 1, 0}},
+                                                  {1, 0, {1, 0, 1}},
+                                                  {2, 0, {0, 0, 1}},
+                                                  {2, 1, {0, 1, 0}}}};
+  template <class At>
+  static EVENTGAN_EIGHT_INLINE Eight input(int term, At&& d) {
+    switch (term) {
+      case 0:
+        return d(0) - d(2);
+      case 1:
+        return d(1);
+      case 2:
+        return d(2);
+      case 3:
+        return d(4) - d(2);
+      default:
+        return d(3);
+    }
+  }
+  template <class At>
+  static EVENTGAN_EIGHT_INLINE Eight output(int pixel, At&& sum) {
+    return pixel == 0 ? sum(0) + sum(1) : sum(1) + sum(2);
+  }
+};
+
+/// Products of a row's sum.
+template <class Rule>
+constexpr int places(int sum) {
+  int count = 0;
+  for (const Term& term : Rule::kTerms) count += term.sum == sum;
+  return count;
 }
 
-/// Sixteen sums' registers, but those of inputs and weights, hold 12: of 6 tiles with 16 outputs,
-/// or of 12 with 8.
+/// Which product of its tile's sum that of two terms is.
+template <class Rule>
+constexpr int place_of(int row_term, int column_term) {
+  return Rule::kTerms[row_term].place * places<Rule>(Rule::kTerms[column_term].sum) +
+         Rule::kTerms[column_term].place;
+}
+
+/// Sixteen registers hold 12 sums, an input and weights: of 6 tiles with 16 outputs, or of 12 with
+/// 8.
 int vectors_of(int out) { return out % (2 * kEight) == 0 ? 2 : 1; }
 int group_of(int out) { return 12 / vectors_of(out); }
 
-/// Tiles whose inputs and sums stay in a second-level cache, beside the weights of a slot.
+/// Tiles whose inputs and sums stay in a second-level cache.
 int tiles_at_once(int bytes_of_tile) {
   constexpr int kBytesOfTiles = 1 << 17, kWholeGroups = 12;
   return std::clamp(kBytesOfTiles / bytes_of_tile / kWholeGroups, 1, 8) * kWholeGroups;
@@ -101,53 +166,89 @@ struct WinogradConvolution::Block {
   int first = 0;  ///< tile, row by row
   int count = 0;
   int columns = 0;           ///< of tiles
-  bool last_row = false;     ///< some tile's doubled rows end before its d3
+  bool last_row = false;     ///< some tile's doubled rows end before its last one
   bool last_column = false;  ///< and columns
-  float* values = nullptr;   ///< [slot, tile / group's, in / 8, tile % group's, in % 8]
-  float* sums = nullptr;     ///< [slot, tile / group's, out / vector's, tile % group's, out % it]
+  float* values = nullptr;   ///< [tile / group's, sum, product's in / 8, tile % group's, in % 8]
+  float* sums = nullptr;     ///< [tile / group's, sum, out / vector's, tile % group's, out % it]
 };
 
-WinogradConvolution::WinogradConvolution(const LayerNumbers& plain, const LayerNumbers* doubled,
-                                         float slope)
-    : in_(plain.in_channels),
-      small_(doubled ? doubled->in_channels : 0),
-      out_(plain.out_channels),
-      slope_(slope),
-      tiles_at_once_(tiles_at_once(static_cast<int>(sizeof(float)) *
-                                   (depth_before(kSlots, in_, small_) + kSlots * out_))),
-      weights_(static_cast<std::size_t>(depth_before(kSlots, in_, small_)) * out_ / kEight),
-      bias_(plain.bias) {
-  bias_.resize(out_);
-  const int width = vectors_of(out_) * kEight;
-  float* slot_weights = weights_.front().values;
-  for (int slot = 0; slot < kSlots; ++slot) {
-    const int rows = slot / kSide, columns = slot % kSide;
-    const int depth = slot_depth(slot, in_, small_);
-    for (int o = 0; o < out_; ++o) {
-      const auto at = [&](int i) -> float& {
-        return slot_weights[(static_cast<std::size_t>(o / width) * depth + i) * width + o % width];
-      };
-      for (int i = 0; i < in_; ++i) {
-        at(i) = transformed(&plain.weight[(static_cast<std::size_t>(o) * in_ + i) * 9],
-                            kPlainKernel[rows], kPlainKernel[columns]);
-      }
-      for (int term = 0; term < kTerms * kTerms && small_ > 0; ++term) {
-        const int row = term / kTerms, column = term % kTerms;
-        if (kSlotOfTerm[row] != rows || kSlotOfTerm[column] != columns) continue;
-        const int place = kTermInSlot[row] * kDoubledTerms[columns] + kTermInSlot[column];
-        for (int i = 0; i < small_; ++i) {
-          at(in_ + place * small_ + i) =
-              transformed(&doubled->weight[(static_cast<std::size_t>(o) * small_ + i) * 9],
-                          kDoubledKernel[row], kDoubledKernel[column]);
-        }
-      }
-    }
-    slot_weights += static_cast<std::size_t>(depth) * out_;
+template <class Rule, class Other>
+void WinogradConvolution::plan_sums(int other_channels) {
+  sums_ = Rule::kSums * Rule::kSums;
+  for (int sum = 0; sum < sums_; ++sum) {
+    const int row = sum / Rule::kSums, column = sum % Rule::kSums;
+    plain_depth_[sum] = in_ * places<Rule>(row) * places<Rule>(column);
+    depth_before_[sum + 1] = depth_before_[sum] + plain_depth_[sum] +
+                             other_channels * places<Other>(row) * places<Other>(column);
   }
 }
 
+/// The weights of a kernel [out, in, 3, 3] by its rule; of each sum behind `behind` other channels.
+template <class Rule>
+void WinogradConvolution::pack(const LayerNumbers& layer, const std::array<int, 16>& behind) {
+  const int in = layer.in_channels, width = vectors_of(out_) * kEight;
+  const int side = sums_ == 16 ? 4 : 3;
+  float* const weights = weights_.front().values;
+  for (std::size_t row = 0; row < Rule::kTerms.size(); ++row) {
+    for (std::size_t column = 0; column < Rule::kTerms.size(); ++column) {
+      const auto& rows = Rule::kTerms[row].kernel;
+      const auto& columns = Rule::kTerms[column].kernel;
+      const int sum = Rule::kTerms[row].sum * side + Rule::kTerms[column].sum;
+      const std::ptrdiff_t depth = depth_before_[sum + 1] - depth_before_[sum];
+      const int first = behind[sum] + place_of<Rule>(row, column) * in;
+      for (int o = 0; o < out_; ++o) {
+        float* const panel = weights + depth_before_[sum] * static_cast<std::ptrdiff_t>(out_) +
+                             o / width * depth * width + o % width;
+        for (int i = 0; i < in; ++i) {
+          const float* kernel = &layer.weight[(static_cast<std::size_t>(o) * in + i) * 9];
+          double weight = 0;
+          for (int tap = 0; tap < 9; ++tap) {
+            weight += rows[tap / 3] * columns[tap % 3] * kernel[tap];
+          }
+          panel[(first + i) * width] = static_cast<float>(weight);
+        }
+      }
+    }
+  }
+}
+
+WinogradConvolution::WinogradConvolution(const LayerNumbers& layer, int stride, float slope,
+                                         const LayerNumbers* doubled)
+    : in_(layer.in_channels),
+      small_(doubled ? doubled->in_channels : 0),
+      out_(layer.out_channels),
+      stride_(stride),
+      slope_(slope),
+      bias_(out_ / kEight) {
+  for (std::size_t o = 0; o < layer.bias.size(); ++o) {
+    bias_[o / kEight].values[o % kEight] = layer.bias[o];
+  }
+  if (stride == 1) {
+    plan_sums<PlainRule, DoubledRule>(small_);
+  } else {
+    plan_sums<StridedRule, DoubledRule>(0);
+  }
+  const int depth = depth_before_[sums_];
+  weights_.resize(static_cast<std::size_t>(depth) * out_ / kEight);
+  tiles_at_once_ = tiles_at_once(static_cast<int>(sizeof(float)) * (depth + sums_ * out_));
+  if (stride == 1) {
+    pack<PlainRule>(layer, {});
+  } else {
+    pack<StridedRule>(layer, {});
+  }
+  if (doubled) pack<DoubledRule>(*doubled, plain_depth_);
+}
+
 std::size_t WinogradConvolution::buffer_bytes() const {
-  return sizeof(float) * tiles_at_once_ * (depth_before(kSlots, in_, small_) + kSlots * out_);
+  return sizeof(float) * tiles_at_once_ * (depth_before_[sums_] + sums_ * out_);
+}
+
+ImageSize WinogradConvolution::output_size(ImageSize input) const {
+  return stride_ == 1 ? input : half_size(input);
+}
+
+int WinogradConvolution::tile_rows(ImageSize input) const {
+  return tiles_along(output_size(input).height);
 }
 
 namespace {
@@ -182,179 +283,178 @@ EVENTGAN_EIGHT_INLINE void multiply(const float* values, const float* weights, i
 }  // namespace
 
 template <int kTiles, int kVectors>
-EVENTGAN_AVX2 void WinogradConvolution::multiply_slots(const Block& block) const {
+EVENTGAN_AVX2 void WinogradConvolution::multiply_sums(const Block& block) const {
+  constexpr int kWidth = kVectors * kEight;
   const int groups = (block.count + kTiles - 1) / kTiles;
-  const float* values = block.values;
+  const std::ptrdiff_t group_values = kTiles * depth_before_[sums_];
+  const std::ptrdiff_t group_sums = kTiles * sums_ * out_;
   const float* weights = weights_.front().values;
-  float* sums = block.sums;
-  for (int slot = 0; slot < kSlots; ++slot) {
-    const int depth = slot_depth(slot, in_, small_);
-    const bool none_doubled = (slot / kSide == kSide - 1 && !block.last_row) ||
-                              (slot % kSide == kSide - 1 && !block.last_column);
-    const int eights = (none_doubled ? in_ : depth) / kEight;
-    for (int panel = 0; panel < out_ / (kVectors * kEight); ++panel) {
+  for (int sum = 0; sum < sums_; ++sum) {
+    const int depth = depth_before_[sum + 1] - depth_before_[sum];
+    const bool plain_alone =
+        small_ > 0 && ((sum / 4 == 3 && !block.last_row) || (sum % 4 == 3 && !block.last_column));
+    const int eights = (plain_alone ? plain_depth_[sum] : depth) / kEight;
+    for (int out = 0; out < out_; out += kWidth, weights += depth * kWidth) {
       for (int group = 0; group < groups; ++group) {
         multiply<kTiles, kVectors>(
-            values + group * kTiles * depth, weights, eights,
-            sums + group * kTiles * out_ + panel * kTiles * kVectors * kEight);
+            block.values + group * group_values + kTiles * depth_before_[sum], weights, eights,
+            block.sums + group * group_sums + kTiles * (sum * out_ + out));
       }
-      weights += depth * kVectors * kEight;
     }
-    values += tiles_at_once_ * depth;
-    sums += tiles_at_once_ * out_;
   }
 }
 
 namespace {
 
-/// A row (column) of slots from what it has of the four inputs.
-template <int kSlot, class At>
-EVENTGAN_EIGHT_INLINE Eight slot_input(At&& at) {
-  if constexpr (kSlot == 0) return at(0) - at(2);
-  if constexpr (kSlot == 1) return at(1) + at(2);
-  if constexpr (kSlot == 2) return at(2) - at(1);
-  return at(1) - at(3);
-}
+/// Where a tile's inputs of a rule go: to `base` + places[sum] for each sum.
+struct TileValues {
+  float* base = nullptr;
+  const std::ptrdiff_t* places = nullptr;
+  int group = 0;
+};
 
-/// pixel(y, x): the tile's four by four.
-template <int kRow, class Pixel>
-EVENTGAN_EIGHT_INLINE void slot_row(Pixel&& pixel, const std::array<float*, kSlots>& slots,
-                                    std::ptrdiff_t to) {
-  Eight row[kSide];
-#pragma GCC unroll 4
-  for (int x = 0; x < kSide; ++x) {
-    row[x] = slot_input<kRow>([&](int y) EVENTGAN_AVX2 { return pixel(y, x); });
+/// pixel(y, x, channel): a tile's inputs. Of the last terms of rows and columns there may be none.
+template <class Rule, int kSums, class Pixel>
+EVENTGAN_EIGHT_INLINE void read_tile(Pixel&& pixel, int channels, bool last_row, bool last_column,
+                                     const TileValues& to) {
+  constexpr int kTerms = Rule::kTerms.size();
+  for (int channel = 0; channel < channels; channel += kEight) {
+#pragma GCC unroll 5
+    for (int y = 0; y < kTerms; ++y) {
+      if (y == kTerms - 1 && !last_row) break;
+      Eight row[Rule::kInputs];
+#pragma GCC unroll 5
+      for (int x = 0; x < Rule::kInputs; ++x) {
+        row[x] = Rule::input(y, [&](int d) EVENTGAN_AVX2 { return pixel(d, x, channel); });
+      }
+#pragma GCC unroll 5
+      for (int x = 0; x < kTerms; ++x) {
+        if (x == kTerms - 1 && !last_column) break;
+        const int sum = Rule::kTerms[y].sum * kSums + Rule::kTerms[x].sum;
+        keep(Rule::input(x, [&](int d) EVENTGAN_AVX2 { return row[d]; }),
+             to.base + to.places[sum] + (place_of<Rule>(y, x) * channels + channel) * to.group);
+      }
+    }
   }
-  const auto at = [&](int x) EVENTGAN_AVX2 { return row[x]; };
-  keep(slot_input<0>(at), slots[kRow * kSide] + to);
-  keep(slot_input<1>(at), slots[kRow * kSide + 1] + to);
-  keep(slot_input<2>(at), slots[kRow * kSide + 2] + to);
-  keep(slot_input<3>(at), slots[kRow * kSide + 3] + to);
 }
 
 }  // namespace
 
-EVENTGAN_AVX2
-void WinogradConvolution::read_input(const Images& images, const Block& block) const {
-  const int group = group_of(out_);
-  const auto [height, width] = images.size;
+template <class Rule>
+EVENTGAN_AVX2 void WinogradConvolution::read_input(const Images& images, const Block& block) const {
+  // What is stored might alter members, as far as a compiler knows.
+  const int group = group_of(out_), in = in_, columns = block.columns;
+  const std::ptrdiff_t group_values = static_cast<std::ptrdiff_t>(group) * depth_before_[sums_];
+  std::array<std::ptrdiff_t, 16> places{};
+  for (int sum = 0; sum < sums_; ++sum) {
+    places[sum] = static_cast<std::ptrdiff_t>(group) * depth_before_[sum];
+  }
+  const int height = images.size.height, width = images.size.width;
+  const std::ptrdiff_t row_values = static_cast<std::ptrdiff_t>(width) * in;
+  const float* const input = images.input;
+  const int step = 2 * stride_, before = small_ > 0 ? 2 : 1;
   for (int i = 0; i < block.count; ++i) {
     const int tile = block.first + i;
-    const int top = 2 * (tile / block.columns) - 2, left = 2 * (tile % block.columns) - 2;
-    std::array<float*, kSlots> slots;
-    float* values = block.values;
-    for (int slot = 0; slot < kSlots; ++slot) {
-      const int depth = slot_depth(slot, in_, small_);
-      slots[slot] = values + i / group * group * depth + i % group * kEight;
-      values += tiles_at_once_ * depth;
-    }
-    const auto fill = [&](auto&& pixel) EVENTGAN_AVX2 {
-      for (int channel = 0; channel < in_; channel += kEight) {
-        const auto at = [&](int y, int x) EVENTGAN_AVX2 { return pixel(y, x, channel); };
-        slot_row<0>(at, slots, channel * group);
-        slot_row<1>(at, slots, channel * group);
-        slot_row<2>(at, slots, channel * group);
-        slot_row<3>(at, slots, channel * group);
-      }
-    };
-    const std::ptrdiff_t row_values = static_cast<std::ptrdiff_t>(width) * in_;
-    if (top >= 0 && left >= 0 && top + kSide <= height && left + kSide <= width) {
-      const float* corner = images.input + top * row_values + left * in_;
-      fill([&](int y, int x, int channel)
-               EVENTGAN_AVX2 { return eight(corner + y * row_values + x * in_ + channel); });
+    const int top = step * (tile / columns) - before;
+    const int left = step * (tile % columns) - before;
+    const TileValues to{block.values + i / group * group_values + i % group * kEight, places.data(),
+                        group};
+    if (top >= 0 && left >= 0 && top + Rule::kInputs <= height && left + Rule::kInputs <= width) {
+      const float* corner = input + top * row_values + left * in;
+      const auto pixel = [&](int y, int x, int channel) EVENTGAN_AVX2 {
+        return eight(corner + y * row_values + x * in + channel);
+      };
+      read_tile<Rule, Rule::kSums>(pixel, in, true, true, to);
     } else {
-      fill([&](int y, int x, int channel) EVENTGAN_AVX2 {
-        const bool outside = top + y < 0 || left + x < 0 || top + y >= height || left + x >= width;
-        if (outside) return Eight{};
-        return eight(images.input + (top + y) * row_values + (left + x) * in_ + channel);
-      });
+      const auto pixel = [&](int y, int x, int channel) EVENTGAN_AVX2 {
+        y += top, x += left;
+        if (y < 0 || x < 0 || y >= height || x >= width) return Eight{};
+        return eight(input + y * row_values + x * in + channel);
+      };
+      read_tile<Rule, Rule::kSums>(pixel, in, true, true, to);
     }
   }
 }
 
 EVENTGAN_AVX2
 void WinogradConvolution::read_small(const Images& images, const Block& block) const {
-  const int group = group_of(out_);
+  const int group = group_of(out_), in = small_, columns = block.columns;
+  const std::ptrdiff_t group_values = static_cast<std::ptrdiff_t>(group) * depth_before_[sums_];
+  std::array<std::ptrdiff_t, 16> places{};
+  for (int sum = 0; sum < sums_; ++sum) {
+    places[sum] = static_cast<std::ptrdiff_t>(group) * (depth_before_[sum] + plain_depth_[sum]);
+  }
   const ImageSize size = half_size(images.size);
+  const int height = size.height, width = size.width;
+  const float* const small = images.small;
+  const std::ptrdiff_t row_values = static_cast<std::ptrdiff_t>(width) * in;
   for (int i = 0; i < block.count; ++i) {
     const int tile = block.first + i;
-    const int row = tile / block.columns, column = tile % block.columns;
-    // Of this tile b, and d3 is none.
-    const bool last_row = images.size.height % 2 == 1 && row == size.height - 1;
-    const bool last_column = images.size.width % 2 == 1 && column == size.width - 1;
-    std::array<float*, kSlots> slots;
-    float* values = block.values;
-    for (int slot = 0; slot < kSlots; ++slot) {
-      const int depth = slot_depth(slot, in_, small_);
-      slots[slot] = values + i / group * group * depth + (in_ * group + i % group * kEight);
-      values += tiles_at_once_ * depth;
-    }
-    const auto pixel = [&](int y, int x, int channel) EVENTGAN_AVX2 {
-      y += row - 1, x += column - 1;
-      if (y < 0 || x < 0 || y >= size.height || x >= size.width) return Eight{};
-      return eight(images.small + (static_cast<std::ptrdiff_t>(y) * size.width + x) * small_ +
-                   channel);
-    };
-    for (int channel = 0; channel < small_; channel += kEight) {
-      Eight rows[kTerms][2];
-#pragma GCC unroll 2
-      for (int x = 0; x < 2; ++x) {
-        rows[0][x] = pixel(0, x, channel);
-        rows[1][x] = pixel(1, x, channel);
-        rows[2][x] = rows[0][x] - rows[1][x];
-        rows[3][x] = last_row ? rows[1][x] : Eight{};
-      }
-#pragma GCC unroll 4
-      for (int y = 0; y < kTerms; ++y) {
-        if (y == kTerms - 1 && !block.last_row) break;
-        const Eight terms[kTerms] = {rows[y][0], rows[y][1], rows[y][0] - rows[y][1],
-                                     last_column ? rows[y][1] : Eight{}};
-#pragma GCC unroll 4
-        for (int x = 0; x < kTerms; ++x) {
-          if (x == kTerms - 1 && !block.last_column) break;
-          const int place = kTermInSlot[y] * kDoubledTerms[kSlotOfTerm[x]] + kTermInSlot[x];
-          keep(terms[x],
-               slots[kSlotOfTerm[y] * kSide + kSlotOfTerm[x]] + (place * small_ + channel) * group);
-        }
-      }
+    const int top = tile / columns - 1, left = tile % columns - 1;
+    const TileValues to{block.values + i / group * group_values + i % group * kEight, places.data(),
+                        group};
+    if (!block.last_row && !block.last_column && top >= 0 && left >= 0 && top + 2 <= height &&
+        left + 2 <= width) {
+      const float* corner = small + top * row_values + left * in;
+      const auto pixel = [&](int y, int x, int channel) EVENTGAN_AVX2 {
+        return eight(corner + y * row_values + x * in + channel);
+      };
+      read_tile<DoubledRule, PlainRule::kSums>(pixel, in, false, false, to);
+    } else {
+      const bool ends_above = images.size.height % 2 == 1 && top == height - 2;
+      const bool ends_left = images.size.width % 2 == 1 && left == width - 2;
+      const auto pixel = [&](int y, int x, int channel) EVENTGAN_AVX2 {
+        if ((y == 2 && !ends_above) || (x == 2 && !ends_left)) return Eight{};
+        y = top + std::min(y, 1), x = left + std::min(x, 1);
+        if (y < 0 || x < 0 || y >= height || x >= width) return Eight{};
+        return eight(small + y * row_values + x * in + channel);
+      };
+      read_tile<DoubledRule, PlainRule::kSums>(pixel, in, block.last_row, block.last_column, to);
     }
   }
 }
 
-EVENTGAN_AVX2
-void WinogradConvolution::write_output(const Images& images, const Block& block, float* output,
-                                       int output_row, bool add) const {
+template <class Rule>
+EVENTGAN_AVX2 void WinogradConvolution::write_output(const Images& images, const Block& block,
+                                                     float* output, int output_row,
+                                                     bool add) const {
   const int group = group_of(out_), panel = vectors_of(out_) * kEight;
-  const auto [height, width] = images.size;
-  const std::ptrdiff_t slot_sums = static_cast<std::ptrdiff_t>(tiles_at_once_) * out_;
+  const int out = out_, columns = block.columns;
+  const float slope = slope_;
+  const ImageSize size = output_size(images.size);
+  const int height = size.height, width = size.width;
+  const std::ptrdiff_t sum_values = static_cast<std::ptrdiff_t>(group) * out;
+  const std::ptrdiff_t group_values = sums_ * sum_values;
+  const int before = small_ > 0 ? 1 : 0;
   for (int i = 0; i < block.count; ++i) {
     const int tile = block.first + i;
-    const int top = 2 * (tile / block.columns) - 1, left = 2 * (tile % block.columns) - 1;
-    for (int channel = 0; channel < out_; channel += kEight) {
-      const float* sums = block.sums + i / group * group * out_ + channel / panel * group * panel +
-                          i % group * panel + channel % panel;
-      Eight rows[2][kSide];
+    const int top = 2 * (tile / columns) - before;
+    const int left = 2 * (tile % columns) - before;
+    const float* tile_sums = block.sums + i / group * group_values + i % group * panel;
+    for (int channel = 0; channel < out; channel += kEight) {
+      const float* sums = tile_sums + channel / panel * group * panel + channel % panel;
+      Eight rows[2][Rule::kSums];
 #pragma GCC unroll 4
-      for (int x = 0; x < kSide; ++x, sums += slot_sums) {
-        const Eight middle = eight(sums + 4 * slot_sums), other = eight(sums + 8 * slot_sums);
-        rows[0][x] = eight(sums) + middle + other;
-        rows[1][x] = middle - other - eight(sums + 12 * slot_sums);
+      for (int x = 0; x < Rule::kSums; ++x) {
+        const auto sum = [&](int y) EVENTGAN_AVX2 {
+          return eight(sums + (y * Rule::kSums + x) * sum_values);
+        };
+        rows[0][x] = Rule::output(0, sum);
+        rows[1][x] = Rule::output(1, sum);
       }
+      const Eight bias = eight(bias_[channel / kEight].values);
 #pragma GCC unroll 2
       for (int y = 0; y < 2; ++y) {
         if (top + y < 0 || top + y >= height) continue;
-        const Eight pixels[2] = {rows[y][0] + rows[y][1] + rows[y][2],
-                                 rows[y][1] - rows[y][2] - rows[y][3]};
 #pragma GCC unroll 2
         for (int x = 0; x < 2; ++x) {
           if (left + x < 0 || left + x >= width) continue;
-          float* to =
-              output +
-              (static_cast<std::ptrdiff_t>(top + y - output_row) * width + left + x) * out_ +
-              channel;
-          Eight sum = pixels[x] + eight(bias_.data() + channel);
+          float* to = output +
+                      (static_cast<std::ptrdiff_t>(top + y - output_row) * width + left + x) * out +
+                      channel;
+          Eight sum = bias + Rule::output(x, [&](int at) EVENTGAN_AVX2 { return rows[y][at]; });
           if (add) sum += eight(to);
-          keep(sum > 0 ? sum : sum * slope_, to);
+          keep(sum > 0 ? sum : sum * slope, to);
         }
       }
     }
@@ -364,27 +464,35 @@ void WinogradConvolution::write_output(const Images& images, const Block& block,
 void WinogradConvolution::run(const Images& images, int first, int end, float* output,
                               int output_row, bool add, std::byte* buffer) const {
   Block block;
-  block.columns = images.size.width / 2 + 1;
+  block.columns = tiles_along(output_size(images.size).width);
   block.values = reinterpret_cast<float*>(buffer);
-  block.sums = block.values + tiles_at_once_ * depth_before(kSlots, in_, small_);
+  block.sums = block.values + tiles_at_once_ * depth_before_[sums_];
   const int last = end * block.columns;
   for (block.first = first * block.columns; block.first < last; block.first += block.count) {
     block.count = std::min(tiles_at_once_, last - block.first);
-    if (small_ > 0) {
-      const int last_tile = block.first + block.count - 1;
-      block.last_row =
-          images.size.height % 2 == 1 && last_tile / block.columns == tile_rows(images.size) - 1;
-      block.last_column = images.size.width % 2 == 1 &&
-                          (block.first % block.columns + block.count >= block.columns);
-    }
-    read_input(images, block);
-    if (small_ > 0) read_small(images, block);
-    if (vectors_of(out_) == 2) {
-      multiply_slots<6, 2>(block);
+    if (stride_ == 1) {
+      read_input<PlainRule>(images, block);
     } else {
-      multiply_slots<12, 1>(block);
+      read_input<StridedRule>(images, block);
     }
-    write_output(images, block, output, output_row, add);
+    if (small_ > 0) {
+      const auto [height, width] = images.size;
+      const int last_tile = block.first + block.count - 1;
+      block.last_row = height % 2 == 1 && last_tile / block.columns == tiles_along(height) - 1;
+      block.last_column =
+          width % 2 == 1 && block.first % block.columns + block.count >= block.columns;
+      read_small(images, block);
+    }
+    if (vectors_of(out_) == 2) {
+      multiply_sums<6, 2>(block);
+    } else {
+      multiply_sums<12, 1>(block);
+    }
+    if (stride_ == 1) {
+      write_output<PlainRule>(images, block, output, output_row, add);
+    } else {
+      write_output<StridedRule>(images, block, output, output_row, add);
+    }
   }
 }
 

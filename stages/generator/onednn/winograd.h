@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -9,9 +10,9 @@
 
 namespace eventgan {
 
-/// Whether a network of this base width computes all of its layers but the encoders by the kernels
-/// of this file: in float32, on a processor with AVX2 and FMA that has no AVX-512, as oneDNN sees
-/// it.
+/// Whether a network of this base width computes all of its layers by the kernels of this file, but
+/// single tiles (tiled_layers.h): in float32, on a processor with AVX2 and FMA that has no AVX-512,
+/// as oneDNN sees it.
 bool winograd_fits(int base_channels, Precision precision);
 /// Counts up with what changes their bytes.
 inline constexpr int kWinogradVersion = 1;
@@ -26,27 +27,29 @@ struct alignas(32) EightWeights {
   float values[8];
 };
 
-/// activation(convolution(input) + bias [+ output]) of a 3x3 kernel with stride 1 and zeros around
-/// the image, and the same of a decoder, whose kernel also sees the doubled small image. Float32;
-/// images are [y, x, channel] without gaps, channels are multiples of 8. By Winograd's F(2x2, 3x3)
-/// (Lavin and Gray, Fast Algorithms for Convolutional Neural Networks, 2016): tiles of 2x2 output
-/// pixels are sums of 16 products of channels, where the kernel alone has 36. Of the doubled image,
-/// where neighbours are equal, 9 are left. Sums differ from the kernel's in their last bits;
-/// infinity may come out as NaN, and both may reach the other pixels of their tile. Thread safe.
+/// activation(convolution(input) + bias [+ output]) of a 3x3 kernel with zeros around the image. Of
+/// a decoder the kernel also sees the doubled small image. Float32; images are [y, x, channel]
+/// without gaps, channels are multiples of 8. By Winograd's minimal filtering (Lavin and Gray, Fast
+/// Algorithms for Convolutional Neural Networks, 2016): a tile of 2x2 output pixels has 16 products
+/// of channels where the kernel has 36; 9 of the doubled image, whose neighbours are equal; 25 with
+/// stride 2. Sums differ from the kernel's in their last bits; infinity may come out as NaN, and
+/// both may reach the other pixels of their tile. Thread safe.
 class WinogradConvolution {
  public:
-  /// `plain` over the input. `doubled` over the doubled small image (`decoders.N.last_row`), or
-  /// null. A value below zero is multiplied with `slope`.
-  WinogradConvolution(const LayerNumbers& plain, const LayerNumbers* doubled, float slope);
-
-  /// A tile has output rows 2 row - 1 and 2 row, columns likewise.
-  static int tile_rows(ImageSize size) { return size.height / 2 + 1; }
+  /// stride: 1 or 2. A value below zero is multiplied with `slope`. `doubled`: the kernel over the
+  /// doubled small image (`decoders.N.last_row`), with stride 1; or null.
+  WinogradConvolution(const LayerNumbers& layer, int stride, float slope,
+                      const LayerNumbers* doubled = nullptr);
 
   struct Images {
     const float* input = nullptr;
     const float* small = nullptr;  ///< of half_size(size); null where nothing is doubled
-    ImageSize size;
+    ImageSize size;                ///< of the input
   };
+
+  /// Rows of tiles. Each has output rows 2 row and 2 row + 1; with a small image those before them,
+  /// 2 row - 1 and 2 row, which see the same of its rows.
+  int tile_rows(ImageSize input) const;
 
   /// The tiles of rows first .. end - 1. `output`: row output_row of the result and those behind
   /// it. `add`: to what is there. `buffer`: buffer_bytes(), on a cache line.
@@ -54,23 +57,32 @@ class WinogradConvolution {
            std::byte* buffer) const;
 
   std::size_t buffer_bytes() const;
-  int out_channels() const { return out_; }
 
  private:
   struct Block;
-  int depth(int slot) const;
-  template <int kTiles, int kVectors>
-  void multiply_slots(const Block& block) const;
+  template <class Rule, class Other>
+  void plan_sums(int other_channels);
+  template <class Rule>
+  void pack(const LayerNumbers& layer, const std::array<int, 16>& behind);
+  template <class Rule>
   void read_input(const Images& images, const Block& block) const;
   void read_small(const Images& images, const Block& block) const;
+  template <int kTiles, int kVectors>
+  void multiply_sums(const Block& block) const;
+  template <class Rule>
   void write_output(const Images& images, const Block& block, float* output, int output_row,
                     bool add) const;
+  ImageSize output_size(ImageSize input) const;
+  int tiles_along(int side) const { return small_ > 0 ? side / 2 + 1 : (side + 1) / 2; }
 
-  int in_, small_, out_;
+  int in_, small_, out_, stride_;
   float slope_;
-  int tiles_at_once_;
-  std::vector<EightWeights> weights_;  ///< [slot, out / vector's, in, out % vector's]
-  std::vector<float> bias_;
+  int tiles_at_once_ = 0;
+  int sums_ = 0;                        ///< of a tile, each of products of channels
+  std::array<int, 17> depth_before_{};  ///< channels of the products of a sum and those before it
+  std::array<int, 16> plain_depth_{};   ///< a sum's channels without the small image's
+  std::vector<EightWeights> weights_;   ///< [sum, out / vector's, channel, out % vector's]
+  std::vector<EightWeights> bias_;
 };
 
 /// The head: 3x3 from planes to channels, LeakyReLU included. Thread safe.

@@ -42,9 +42,10 @@ class LayerWeights {
   std::vector<dnnl::memory> packed_;
 };
 
-/// All layers but the encoders.
+/// The network's layers as winograd.h computes them.
 struct WinogradLayers {
   HeadConvolution head;
+  std::vector<WinogradConvolution> encoders;
   std::vector<WinogradConvolution> residuals;  ///< two a block
   std::vector<WinogradConvolution> decoders;
   PlanePrediction prediction;

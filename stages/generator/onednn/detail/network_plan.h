@@ -81,6 +81,7 @@ class NetworkPlan {
   /// Calls compute(Stored()) with the type of the stored activations.
   template <class Compute>
   void with_stored_type(Compute&& compute) const;
+  void run_encoder(const EngineRun& run, int level, const Buffer& target) const;
   /// Convolution i of the residual blocks.
   void run_residual(const EngineRun& run, int i) const;
   WinogradConvolution::Images decoder_images(const EngineRun& run, int level,
