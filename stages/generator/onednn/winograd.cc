@@ -183,29 +183,30 @@ void WinogradConvolution::plan_sums(int other_channels) {
   }
 }
 
-/// The weights of a kernel [out, in, 3, 3] by its rule; of each sum behind `behind` other channels.
 template <class Rule>
 void WinogradConvolution::pack(const LayerNumbers& layer, const std::array<int, 16>& behind) {
   const int in = layer.in_channels, width = vectors_of(out_) * kEight;
   const int side = sums_ == 16 ? 4 : 3;
+  constexpr int kTerms = Rule::kTerms.size();
+  const float* kernel = layer.weight.data();
   float* const weights = weights_.front().values;
-  for (std::size_t row = 0; row < Rule::kTerms.size(); ++row) {
-    for (std::size_t column = 0; column < Rule::kTerms.size(); ++column) {
-      const auto& rows = Rule::kTerms[row].kernel;
-      const auto& columns = Rule::kTerms[column].kernel;
-      const int sum = Rule::kTerms[row].sum * side + Rule::kTerms[column].sum;
-      const std::ptrdiff_t depth = depth_before_[sum + 1] - depth_before_[sum];
-      const int first = behind[sum] + place_of<Rule>(row, column) * in;
-      for (int o = 0; o < out_; ++o) {
-        float* const panel = weights + depth_before_[sum] * static_cast<std::ptrdiff_t>(out_) +
-                             o / width * depth * width + o % width;
-        for (int i = 0; i < in; ++i) {
-          const float* kernel = &layer.weight[(static_cast<std::size_t>(o) * in + i) * 9];
-          double weight = 0;
-          for (int tap = 0; tap < 9; ++tap) {
-            weight += rows[tap / 3] * columns[tap % 3] * kernel[tap];
-          }
-          panel[(first + i) * width] = static_cast<float>(weight);
+  for (int o = 0; o < out_; ++o) {
+    for (int i = 0; i < in; ++i, kernel += 9) {
+      for (int row = 0; row < kTerms; ++row) {
+        const auto& rows = Rule::kTerms[row].kernel;
+        std::array<double, 3> taps;
+        for (int x = 0; x < 3; ++x) {
+          taps[x] = rows[0] * kernel[x] + rows[1] * kernel[3 + x] + rows[2] * kernel[6 + x];
+        }
+        for (int column = 0; column < kTerms; ++column) {
+          const auto& columns = Rule::kTerms[column].kernel;
+          const int sum = Rule::kTerms[row].sum * side + Rule::kTerms[column].sum;
+          const std::ptrdiff_t depth = depth_before_[sum + 1] - depth_before_[sum];
+          const std::ptrdiff_t channel = behind[sum] + place_of<Rule>(row, column) * in + i;
+          weights[depth_before_[sum] * static_cast<std::ptrdiff_t>(out_) +
+                  (o / width * depth + channel) * width + o % width] =
+              static_cast<float>(columns[0] * taps[0] + columns[1] * taps[1] +
+                                 columns[2] * taps[2]);
         }
       }
     }
@@ -313,7 +314,8 @@ struct TileValues {
   int group = 0;
 };
 
-/// pixel(y, x, channel): a tile's inputs. Of the last terms of rows and columns there may be none.
+/// pixel(y, x, channel): a tile's inputs. last_row, last_column: else there are no last ones, nor
+/// their terms.
 template <class Rule, int kSums, class Pixel>
 EVENTGAN_EIGHT_INLINE void read_tile(Pixel&& pixel, int channels, bool last_row, bool last_column,
                                      const TileValues& to) {
@@ -325,6 +327,7 @@ EVENTGAN_EIGHT_INLINE void read_tile(Pixel&& pixel, int channels, bool last_row,
       Eight row[Rule::kInputs];
 #pragma GCC unroll 5
       for (int x = 0; x < Rule::kInputs; ++x) {
+        if (x == Rule::kInputs - 1 && !last_column) break;
         row[x] = Rule::input(y, [&](int d) EVENTGAN_AVX2 { return pixel(d, x, channel); });
       }
 #pragma GCC unroll 5

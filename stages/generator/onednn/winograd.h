@@ -29,11 +29,11 @@ struct alignas(32) EightWeights {
 
 /// activation(convolution(input) + bias [+ output]) of a 3x3 kernel with zeros around the image. Of
 /// a decoder the kernel also sees the doubled small image. Float32; images are [y, x, channel]
-/// without gaps, channels are multiples of 8. By Winograd's minimal filtering (Lavin and Gray, Fast
-/// Algorithms for Convolutional Neural Networks, 2016): a tile of 2x2 output pixels has 16 products
-/// of channels where the kernel has 36; 9 of the doubled image, whose neighbours are equal; 25 with
-/// stride 2. Sums differ from the kernel's in their last bits; infinity may come out as NaN, and
-/// both may reach the other pixels of their tile. Thread safe.
+/// without gaps, from a cache line on; channels are multiples of 8. By Winograd's minimal filtering
+/// (Lavin and Gray, Fast Algorithms for Convolutional Neural Networks, 2016): a tile of 2x2 output
+/// pixels has 16 products of channels where the kernel has 36; 9 of the doubled image, whose
+/// neighbours are equal; 25 with stride 2. Sums differ from the kernel's in their last bits;
+/// infinity may come out as NaN, and both may reach the other pixels of their tile. Thread safe.
 class WinogradConvolution {
  public:
   /// stride: 1 or 2. A value below zero is multiplied with `slope`. `doubled`: the kernel over the
@@ -62,6 +62,7 @@ class WinogradConvolution {
   struct Block;
   template <class Rule, class Other>
   void plan_sums(int other_channels);
+  /// The layer's weights; those of a sum are behind `behind` other channels.
   template <class Rule>
   void pack(const LayerNumbers& layer, const std::array<int, 16>& behind);
   template <class Rule>
