@@ -118,7 +118,7 @@ class OnednnGenerator final : public Generator {
                                  std::span<float> volume) const override {
     check_generator_spans({pair.frames, wanted.size}, volume, bins_);
     // Above it, computing all is not slower; what tiles depend on is more than they are.
-    constexpr double kLargestShare = 0.9;
+    const double largest_share = layers_.winograd() ? 0.6 : 0.9;
     constexpr double kManyTiles = 0.6;
     const auto tiles = static_cast<double>(std::ranges::count(wanted.wanted, 1));
     TiledWork work;
@@ -126,7 +126,7 @@ class OnednnGenerator final : public Generator {
         (precision_ != Precision::kInt8 || all_finite(pair.frames))) {
       work = tiled_work(wanted);
     }
-    if (work.share == 0 || work.share > kLargestShare) {
+    if (work.share == 0 || work.share > largest_share) {
       return Generator::generate_tiles(pair, wanted, volume);
     }
     std::vector<float> kept;
