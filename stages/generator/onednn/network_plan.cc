@@ -267,18 +267,26 @@ void NetworkPlan::run_decoder(const EngineRun& run, int level, const std::byte* 
 void NetworkPlan::run_winograd_end(const EngineRun& run, const std::byte* small,
                                    float* volume) const {
   const WinogradConvolution::Images images = decoder_images(run, kNetworkLevels - 1, small);
-  const std::ptrdiff_t row_values = static_cast<std::ptrdiff_t>(size_.width) * base_channels_;
+  const WinogradConvolution& layer = winograd_->decoders.back();
   auto* decoded = reinterpret_cast<float*>(run.block + decoded_rows_);
   std::byte* buffer = run.block + winograd_buffer_;
-  std::fill_n(decoded, 2 * row_values + PlanePrediction::kPixels * base_channels_, 0.0f);
-  const WinogradConvolution& layer = winograd_->decoders.back();
   for (int tiles = 0; tiles < layer.tile_rows(size_); ++tiles) {
     const int first = 2 * tiles - 1;
     layer.run(images, tiles, tiles + 1, decoded, first, false, buffer);
-    for (int y = std::max(first, 0); y < std::min(first + 2, size_.height); ++y) {
-      run.sound &=
-          winograd_->prediction.run(decoded + (y - first) * row_values, size_, y, volume, buffer);
-    }
+    const TileMask::Pixels rows{std::max(first, 0), std::min(first + 2, size_.height), 0,
+                                size_.width};
+    predict(run, rows, first, volume);
+  }
+}
+
+void NetworkPlan::predict(const EngineRun& run, const TileMask::Pixels& pixels, int first_row,
+                          float* volume) const {
+  const auto* decoded = reinterpret_cast<const float*>(run.block + decoded_rows_);
+  for (int y = pixels.top; y < pixels.bottom; ++y) {
+    const std::ptrdiff_t pixel =
+        static_cast<std::ptrdiff_t>(y - first_row) * size_.width + pixels.left;
+    run.sound &= winograd_->prediction.run(decoded + pixel * base_channels_, size_, y, pixels.left,
+                                           pixels.right, volume, run.block + winograd_buffer_);
   }
 }
 
@@ -472,6 +480,53 @@ GenerationNotes NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWor
     run_last_tiles(run, layers, work, wanted, small, volume);
   });
   return {.saturated_share = saturation.share(), .sound = sound};
+}
+
+GenerationNotes NetworkPlan::run_winograd_tiles(const WinogradWork& work, const TileMask& wanted,
+                                                const float* planes, float* volume,
+                                                std::byte* block) const {
+  dnnl::stream stream(engine_);
+  SaturationCount saturation;
+  bool sound = true;
+  const EngineRun run{stream, block, block + scratch_, saturation, sound};
+  std::byte* buffer = block + winograd_buffer_;
+  const auto at = [&](const Buffer& buffer_at) {
+    return reinterpret_cast<float*>(block + buffer_at.offset);
+  };
+  run_head<float>(run, planes);
+  for (int level = 0; level < kNetworkLevels; ++level) {
+    const Buffer& target = level + 1 < kNetworkLevels ? skips_[level + 1] : bottleneck_;
+    winograd_->encoders[level].run({at(skips_[level]), nullptr, sizes_[level]},
+                                   work.encoders[level], at(target), 0, false, buffer);
+  }
+  for (int i = 0; i < 2 * kResidualBlocks; ++i) {
+    const bool second = i % 2 == 1;
+    winograd_->residuals[i].run(
+        {at(second ? between_ : bottleneck_), nullptr, half_size(sizes_.back())}, work.residuals[i],
+        at(second ? bottleneck_ : between_), 0, second, buffer);
+  }
+  const std::byte* small = block + bottleneck_.offset;
+  for (int level = 0; level < kNetworkLevels - 1; ++level) {
+    winograd_->decoders[level].run(decoder_images(run, level, small), work.decoders[level],
+                                   at(decoded_[level]), 0, false, buffer);
+    small = block + decoded_[level].offset;
+  }
+  const WinogradConvolution::Images images = decoder_images(run, kNetworkLevels - 1, small);
+  const std::span<const int> tiles(work.decoders.back());
+  const int columns = size_.width / 2 + 1;
+  for (std::size_t begin = 0, end = 0; begin < tiles.size(); begin = end) {
+    const int row = tiles[begin] / columns;
+    while (end < tiles.size() && tiles[end] / columns == row) ++end;
+    const int first = 2 * row - 1;
+    winograd_->decoders.back().run(images, tiles.subspan(begin, end - begin),
+                                   reinterpret_cast<float*>(block + decoded_rows_), first, false,
+                                   buffer);
+    const TileMask::Pixels rows{std::max(first, 0), std::min(first + 2, size_.height), 0,
+                                size_.width};
+    wanted.visit_within(
+        rows, [&](const TileMask::Pixels& pixels) { predict(run, pixels, first, volume); });
+  }
+  return {.saturated_share = 0, .sound = sound};
 }
 
 std::vector<std::string> NetworkPlan::implementations() const {

@@ -118,23 +118,34 @@ class OnednnGenerator final : public Generator {
                                  std::span<float> volume) const override {
     check_generator_spans({pair.frames, wanted.size}, volume, bins_);
     // Above it, computing all is not slower; what tiles depend on is more than they are.
-    const double largest_share = layers_.winograd() ? 0.6 : 0.9;
+    constexpr double kLargestShare = 0.9;
     constexpr double kManyTiles = 0.6;
     const auto tiles = static_cast<double>(std::ranges::count(wanted.wanted, 1));
     TiledWork work;
+    WinogradWork winograd;
     if (tiles > 0 && tiles < kManyTiles * static_cast<double>(wanted.wanted.size()) &&
         (precision_ != Precision::kInt8 || all_finite(pair.frames))) {
-      work = tiled_work(wanted);
+      if (layers_.winograd()) {
+        winograd = winograd_work(wanted);
+      } else {
+        work = tiled_work(wanted);
+      }
     }
-    if (work.share == 0 || work.share > largest_share) {
+    const double share = layers_.winograd() ? winograd.share : work.share;
+    if (share == 0 || share > kLargestShare) {
       return Generator::generate_tiles(pair, wanted, volume);
     }
     std::vector<float> kept;
     const std::span<const float> planes = network_planes(pair, thresholds_, kept);
     std::memset(volume.data(), 0, volume.size_bytes());
     return compute(wanted.size, [&] {
-      const TiledLayers& layers = tiled_layers();
       const auto plan = plans_.plan(wanted.size);
+      if (layers_.winograd()) {
+        const BlockPool::Lease block = blocks_.take(plan->block_bytes());
+        return plan->run_winograd_tiles(winograd, wanted, planes.data(), volume.data(),
+                                        block.data());
+      }
+      const TiledLayers& layers = tiled_layers();
       const std::size_t plan_bytes = BufferLayout::aligned(plan->block_bytes());
       const BlockPool::Lease block = blocks_.take(plan_bytes + layers.layout.total_bytes());
       return plan->run_tiles(layers, work, wanted, planes.data(), volume.data(), block.data(),

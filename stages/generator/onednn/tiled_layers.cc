@@ -382,6 +382,13 @@ std::vector<int> phase_pixels(const NeededPixels& needed) {
   return pixels_of(phases);
 }
 
+/// Those of an image of half the size that hold needed pixels.
+std::vector<int> quad_pixels(const NeededPixels& needed) {
+  NeededPixels quads(half_size(needed.size()));
+  quads.add_read_by(needed, [](Range range) { return Range{range.first / 2, range.last / 2}; });
+  return pixels_of(quads);
+}
+
 /// Multiplications in units of the square of the base width.
 double work_of(const TiledWork& work) {
   const auto count = [](std::size_t tiles, ImageSize size) {
@@ -409,11 +416,16 @@ double work_of(const TiledWork& work) {
   return sum;
 }
 
-}  // namespace
+/// What is needed of the layers' outputs.
+struct NeededOutputs {
+  std::vector<NeededPixels> decoders;    ///< the finest first
+  std::vector<NeededPixels> bottleneck;  ///< kBottleneckLayers
+  std::vector<NeededPixels> encoders;    ///< but the last one's
+};
 
-TiledWork tiled_work(const TileMask& wanted) {
-  TiledWork work;
-  std::vector<NeededPixels> levels;  // of each skip connection's size, the finest first
+NeededOutputs needed_outputs(const TileMask& wanted) {
+  NeededOutputs needed;
+  std::vector<NeededPixels>& levels = needed.decoders;
   for (ImageSize size = wanted.size; levels.size() < kNetworkLevels; size = half_size(size)) {
     levels.emplace_back(size);
   }
@@ -423,28 +435,37 @@ TiledWork tiled_work(const TileMask& wanted) {
   for (std::size_t level = 1; level < kNetworkLevels; ++level) {
     levels[level].add_read_by(levels[level - 1], below_decoder);
   }
-  NeededPixels bottleneck(half_size(levels.back().size()));
-  bottleneck.add_read_by(levels.back(), below_decoder);
-  work.first_decoder = phase_pixels(levels.back());
-  for (std::size_t tiled = 0; tiled < kTiledDecoders; ++tiled) {
-    work.decoders[tiled] =
-        decoder_places(levels[kTiledDecoders - 1 - tiled], kDecoderPhases[tiled]);
-  }
-  for (std::size_t layer = kBottleneckLayers; layer-- > 0;) {
-    work.bottleneck[layer] = pixels_of(bottleneck);
-    if (layer == 0) break;
-    NeededPixels wider(bottleneck.size());
-    wider.add_read_by(bottleneck, around);
-    bottleneck = std::move(wider);
+  needed.bottleneck.assign(kBottleneckLayers, NeededPixels(half_size(levels.back().size())));
+  needed.bottleneck.back().add_read_by(levels.back(), below_decoder);
+  for (std::size_t layer = kBottleneckLayers - 1; layer > 0; --layer) {
+    needed.bottleneck[layer - 1].add_read_by(needed.bottleneck[layer], around);
   }
   // Skip connections are read by the decoder beside them and by the next encoder.
-  NeededPixels coarse = std::move(bottleneck);
+  for (std::size_t level = 1; level < kNetworkLevels; ++level) {
+    needed.encoders.emplace_back(levels[level].size());
+  }
   for (std::size_t level = kTiledEncoders; level > 0; --level) {
-    NeededPixels skip(levels[level].size());
+    NeededPixels& skip = needed.encoders[level - 1];
     skip.add_read_by(levels[level], around);
-    skip.add_read_by(coarse, above_encoder);
-    work.encoders[level - 1] = encoder_places(skip, kEncoderTiles[level - 1]);
-    coarse = std::move(skip);
+    skip.add_read_by(level == kTiledEncoders ? needed.bottleneck[0] : needed.encoders[level],
+                     above_encoder);
+  }
+  return needed;
+}
+
+}  // namespace
+
+TiledWork tiled_work(const TileMask& wanted) {
+  const NeededOutputs needed = needed_outputs(wanted);
+  TiledWork work;
+  work.first_decoder = phase_pixels(needed.decoders.back());
+  for (std::size_t tiled = 0; tiled < kTiledDecoders; ++tiled) {
+    work.decoders[tiled] =
+        decoder_places(needed.decoders[kTiledDecoders - 1 - tiled], kDecoderPhases[tiled]);
+  }
+  std::ranges::transform(needed.bottleneck, work.bottleneck.begin(), pixels_of);
+  for (std::size_t level = 0; level < kTiledEncoders; ++level) {
+    work.encoders[level] = encoder_places(needed.encoders[level], kEncoderTiles[level]);
   }
 
   constexpr double kWholeWork = 18 + 36 + 68;  // encoders, residual blocks, decoders; of a pixel
@@ -453,6 +474,39 @@ TiledWork tiled_work(const TileMask& wanted) {
   const auto pixels = static_cast<double>(wanted.size.pixel_count());
   work.share =
       (kTileCost * work_of(work) + kFixedWork * pixels) / ((kWholeWork + kFixedWork) * pixels);
+  return work;
+}
+
+WinogradWork winograd_work(const TileMask& wanted) {
+  const NeededOutputs needed = needed_outputs(wanted);
+  // Products of a tile's channels in units of the square of the base width.
+  constexpr double kEncoder = 25 * 2, kResidual = 16 << 2 * kNetworkLevels, kDecoder = 16 + 9 * 2;
+  double some = 0, all = 0;
+  const auto count = [&](const std::vector<int>& tiles, ImageSize grid, double products) {
+    some += products * static_cast<double>(tiles.size());
+    all += products * static_cast<double>(grid.pixel_count());
+  };
+  WinogradWork work;
+  const ImageSize coarsest = half_size(needed.bottleneck[0].size());
+  for (std::size_t level = 0; level < kNetworkLevels; ++level) {
+    const double channels = 1 << level;
+    const NeededPixels& encoded =
+        level < kTiledEncoders ? needed.encoders[level] : needed.bottleneck[0];
+    work.encoders[level] = quad_pixels(encoded);
+    count(work.encoders[level], half_size(encoded.size()), kEncoder * channels * channels);
+    const NeededPixels& decoded = needed.decoders[level];
+    std::vector<int>& decoder = work.decoders[kNetworkLevels - 1 - level];
+    decoder = phase_pixels(decoded);
+    count(decoder, {decoded.size().height / 2 + 1, decoded.size().width / 2 + 1},
+          kDecoder * channels * channels);
+  }
+  for (std::size_t layer = 0; layer < work.residuals.size(); ++layer) {
+    work.residuals[layer] = quad_pixels(needed.bottleneck[layer + 1]);
+    count(work.residuals[layer], coarsest, kResidual);
+  }
+  constexpr double kFixedWork = 6;  // head, clearing; of a pixel
+  const double fixed = kFixedWork * static_cast<double>(wanted.size.pixel_count());
+  work.share = (some + fixed) / (all + fixed);
   return work;
 }
 

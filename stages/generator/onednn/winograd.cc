@@ -142,10 +142,11 @@ constexpr int place_of(int row_term, int column_term) {
 int vectors_of(int out) { return out % (2 * kEight) == 0 ? 2 : 1; }
 int group_of(int out) { return 12 / vectors_of(out); }
 
-/// Tiles whose inputs and sums stay in a second-level cache.
+/// Tiles whose inputs and sums stay in a second-level cache, in whole groups.
+constexpr int kMostTiles = 96;
 int tiles_at_once(int bytes_of_tile) {
-  constexpr int kBytesOfTiles = 1 << 17, kWholeGroups = 12;
-  return std::clamp(kBytesOfTiles / bytes_of_tile / kWholeGroups, 1, 8) * kWholeGroups;
+  constexpr int kBytesOfTiles = 1 << 17, kGroups = 12;
+  return std::clamp(kBytesOfTiles / bytes_of_tile / kGroups, 1, kMostTiles / kGroups) * kGroups;
 }
 
 }  // namespace
@@ -163,7 +164,7 @@ bool winograd_fits(int base_channels, Precision precision) {
 }
 
 struct WinogradConvolution::Block {
-  int first = 0;  ///< tile, row by row
+  std::array<int, kMostTiles> tiles;  ///< their numbers, row by row
   int count = 0;
   int columns = 0;           ///< of tiles
   bool last_row = false;     ///< some tile's doubled rows end before its last one
@@ -357,7 +358,7 @@ EVENTGAN_AVX2 void WinogradConvolution::read_input(const Images& images, const B
   const float* const input = images.input;
   const int step = 2 * stride_, before = small_ > 0 ? 2 : 1;
   for (int i = 0; i < block.count; ++i) {
-    const int tile = block.first + i;
+    const int tile = block.tiles[i];
     const int top = step * (tile / columns) - before;
     const int left = step * (tile % columns) - before;
     const TileValues to{block.values + i / group * group_values + i % group * kEight, places.data(),
@@ -392,7 +393,7 @@ void WinogradConvolution::read_small(const Images& images, const Block& block) c
   const float* const small = images.small;
   const std::ptrdiff_t row_values = static_cast<std::ptrdiff_t>(width) * in;
   for (int i = 0; i < block.count; ++i) {
-    const int tile = block.first + i;
+    const int tile = block.tiles[i];
     const int top = tile / columns - 1, left = tile % columns - 1;
     const TileValues to{block.values + i / group * group_values + i % group * kEight, places.data(),
                         group};
@@ -430,7 +431,7 @@ EVENTGAN_AVX2 void WinogradConvolution::write_output(const Images& images, const
   const std::ptrdiff_t group_values = sums_ * sum_values;
   const int before = small_ > 0 ? 1 : 0;
   for (int i = 0; i < block.count; ++i) {
-    const int tile = block.first + i;
+    const int tile = block.tiles[i];
     const int top = 2 * (tile / columns) - before;
     const int left = 2 * (tile % columns) - before;
     const float* tile_sums = block.sums + i / group * group_values + i % group * panel;
@@ -464,26 +465,31 @@ EVENTGAN_AVX2 void WinogradConvolution::write_output(const Images& images, const
   }
 }
 
-void WinogradConvolution::run(const Images& images, int first, int end, float* output,
-                              int output_row, bool add, std::byte* buffer) const {
+template <class TileAt>
+void WinogradConvolution::run_blocks(const Images& images, int count, TileAt&& tile_at,
+                                     float* output, int output_row, bool add,
+                                     std::byte* buffer) const {
   Block block;
-  block.columns = tiles_along(output_size(images.size).width);
+  const int columns = block.columns = tiles_along(output_size(images.size).width);
+  const int rows = tile_rows(images.size);
   block.values = reinterpret_cast<float*>(buffer);
   block.sums = block.values + tiles_at_once_ * depth_before_[sums_];
-  const int last = end * block.columns;
-  for (block.first = first * block.columns; block.first < last; block.first += block.count) {
-    block.count = std::min(tiles_at_once_, last - block.first);
+  for (int first = 0; first < count; first += block.count) {
+    block.count = std::min(tiles_at_once_, count - first);
+    for (int i = 0; i < block.count; ++i) block.tiles[i] = tile_at(first + i);
     if (stride_ == 1) {
       read_input<PlainRule>(images, block);
     } else {
       read_input<StridedRule>(images, block);
     }
     if (small_ > 0) {
-      const auto [height, width] = images.size;
-      const int last_tile = block.first + block.count - 1;
-      block.last_row = height % 2 == 1 && last_tile / block.columns == tiles_along(height) - 1;
-      block.last_column =
-          width % 2 == 1 && block.first % block.columns + block.count >= block.columns;
+      const auto some = [&](auto&& is_last) {
+        return std::any_of(block.tiles.begin(), block.tiles.begin() + block.count, is_last);
+      };
+      block.last_row =
+          images.size.height % 2 == 1 && some([&](int tile) { return tile / columns == rows - 1; });
+      block.last_column = images.size.width % 2 == 1 &&
+                          some([&](int tile) { return tile % columns == columns - 1; });
       read_small(images, block);
     }
     if (vectors_of(out_) == 2) {
@@ -497,6 +503,21 @@ void WinogradConvolution::run(const Images& images, int first, int end, float* o
       write_output<StridedRule>(images, block, output, output_row, add);
     }
   }
+}
+
+void WinogradConvolution::run(const Images& images, int first, int end, float* output,
+                              int output_row, bool add, std::byte* buffer) const {
+  const int columns = tiles_along(output_size(images.size).width);
+  run_blocks(
+      images, (end - first) * columns, [&](int i) { return first * columns + i; }, output,
+      output_row, add, buffer);
+}
+
+void WinogradConvolution::run(const Images& images, std::span<const int> tiles, float* output,
+                              int output_row, bool add, std::byte* buffer) const {
+  run_blocks(
+      images, static_cast<int>(tiles.size()), [&](int i) { return tiles[i]; }, output, output_row,
+      add, buffer);
 }
 
 namespace {
@@ -608,13 +629,17 @@ EVENTGAN_EIGHT_INLINE void transpose(Eight (&pixels)[kEight]) {
 }  // namespace
 
 EVENTGAN_AVX2
-bool PlanePrediction::run(const float* pixels, ImageSize size, int y, float* volume,
-                          std::byte* buffer) const {
+bool PlanePrediction::run(const float* pixels, ImageSize size, int y, int first_x, int end_x,
+                          float* volume, std::byte* buffer) const {
   constexpr int kVectors = kPixels / kEight, kPlanes = 2;
   auto* const channels = reinterpret_cast<float*>(buffer);
   const auto plane_values = static_cast<std::ptrdiff_t>(size.pixel_count());
   EightBits largest{};
-  for (int x = 0; x < size.width; x += kPixels, pixels += kPixels * in_) {
+  for (int x = first_x; x < end_x; x += kPixels, pixels += kPixels * in_) {
+    const int count = std::min(kPixels, end_x - x);
+    EightBits magnitudes[kVectors];  // of numbers; of what lies behind the last pixel nothing
+    for (int p = 0; p < kPixels; ++p)
+      magnitudes[p / kEight][p % kEight] = p < count ? 0x7fffffff : 0;
     for (int i = 0; i < in_; i += kEight) {
 #pragma GCC unroll 4
       for (int v = 0; v < kVectors; ++v) {
@@ -626,7 +651,6 @@ bool PlanePrediction::run(const float* pixels, ImageSize size, int y, float* vol
         for (int c = 0; c < kEight; ++c) keep(lanes[c], channels + (i + c) * kPixels + v * kEight);
       }
     }
-    const int count = std::min(kPixels, size.width - x);
     for (int o = 0; o < out_; o += kPlanes) {
       const float* weights = &weights_[static_cast<std::size_t>(o) * in_];
       Eight sums[kPlanes][kVectors];
@@ -649,8 +673,9 @@ bool PlanePrediction::run(const float* pixels, ImageSize size, int y, float* vol
         float* to =
             volume + (o + plane) * plane_values + static_cast<std::ptrdiff_t>(y) * size.width + x;
 #pragma GCC unroll 4
-        for (Eight& sum : sums[plane]) {
-          const EightBits bits = reinterpret_cast<EightBits>(sum) & 0x7fffffff;
+        for (int v = 0; v < kVectors; ++v) {
+          Eight& sum = sums[plane][v];
+          const EightBits bits = reinterpret_cast<EightBits>(sum) & magnitudes[v];
           largest = bits > largest ? bits : largest;
           sum = sum <= 0 ? Eight{} : sum;
         }

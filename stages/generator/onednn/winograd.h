@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "manifests/values/frames.h"
@@ -10,9 +11,8 @@
 
 namespace eventgan {
 
-/// Whether a network of this base width computes all of its layers by the kernels of this file, but
-/// single tiles (tiled_layers.h): in float32, on a processor with AVX2 and FMA that has no AVX-512,
-/// as oneDNN sees it.
+/// Whether a network of this base width computes all of its layers by the kernels of this file: in
+/// float32, on a processor with AVX2 and FMA that has no AVX-512, as oneDNN sees it.
 bool winograd_fits(int base_channels, Precision precision);
 /// Counts up with what changes their bytes.
 inline constexpr int kWinogradVersion = 1;
@@ -32,8 +32,8 @@ struct alignas(32) EightWeights {
 /// without gaps, from a cache line on; channels are multiples of 8. By Winograd's minimal filtering
 /// (Lavin and Gray, Fast Algorithms for Convolutional Neural Networks, 2016): a tile of 2x2 output
 /// pixels has 16 products of channels where the kernel has 36; 9 of the doubled image, whose
-/// neighbours are equal; 25 with stride 2. Sums differ from the kernel's in their last bits;
-/// infinity may come out as NaN, and both may reach the other pixels of their tile. Thread safe.
+/// neighbours are equal; 25 with stride 2. Sums differ from the kernel's in their last bits, and
+/// infinity may come out as NaN. Thread safe.
 class WinogradConvolution {
  public:
   /// stride: 1 or 2. A value below zero is multiplied with `slope`. `doubled`: the kernel over the
@@ -56,10 +56,18 @@ class WinogradConvolution {
   void run(const Images& images, int first, int end, float* output, int output_row, bool add,
            std::byte* buffer) const;
 
+  /// The tiles that have these numbers, row by row. Each pixel of the result needs what its kernel
+  /// sees, and no other pixel need be there.
+  void run(const Images& images, std::span<const int> tiles, float* output, int output_row,
+           bool add, std::byte* buffer) const;
+
   std::size_t buffer_bytes() const;
 
  private:
   struct Block;
+  template <class TileAt>
+  void run_blocks(const Images& images, int count, TileAt&& tile_at, float* output, int output_row,
+                  bool add, std::byte* buffer) const;
   template <class Rule, class Other>
   void plan_sums(int other_channels);
   /// The layer's weights; those of a sum are behind `behind` other channels.
@@ -107,13 +115,14 @@ class PlanePrediction {
  public:
   explicit PlanePrediction(const LayerNumbers& pred);
 
-  /// What a row's pixels must be followed by, whatever it is.
+  /// As many pixels must follow those that are given, whatever they are.
   static constexpr int kPixels = 32;
   std::size_t buffer_bytes() const;
 
-  /// Pixels [x, channel] of row y into the planes of `volume`, [channel, y, x]; NaN stays NaN.
-  /// Whether all values are finite before the ReLU.
-  bool run(const float* pixels, ImageSize size, int y, float* volume, std::byte* buffer) const;
+  /// Pixels [x, channel] from first_x to end_x - 1 of row y into the planes of `volume`, [channel,
+  /// y, x]; NaN stays NaN. Whether all values are finite before the ReLU.
+  bool run(const float* pixels, ImageSize size, int y, int first_x, int end_x, float* volume,
+           std::byte* buffer) const;
 
  private:
   int in_, out_;

@@ -62,5 +62,17 @@ TEST(TiledWork, EndsAtTheImageAndOfAWholeOneIsMoreThanItsOwn) {
   EXPECT_GT(tiled_work(tiles({320, 480}, 0, 19, 0, 29)).share, 1);
 }
 
+TEST(WinogradWork, IsOfTheSamePixelsByTilesOfTwoByTwo) {
+  // As above; of the bottleneck's 15 x 20 tiles, and the last decoder's 241 x 321.
+  const WinogradWork work = winograd_work(tiles({480, 640}, 10, 10, 20, 20));
+  EXPECT_EQ(rectangle(work.residuals[3], 20), (std::array{4, 5, 9, 10}));
+  EXPECT_EQ(rectangle(work.residuals[0], 20), (std::array{3, 7, 8, 12}));
+  EXPECT_EQ(rectangle(work.encoders[3], 20), (std::array{2, 7, 7, 12}));
+  EXPECT_EQ(rectangle(work.decoders[0], 41), (std::array{10, 11, 20, 21}));
+  EXPECT_EQ(rectangle(work.decoders[3], 321), (std::array{80, 88, 160, 168}));
+  EXPECT_LT(work.share, 0.15);
+  EXPECT_NEAR(winograd_work(tiles({320, 480}, 0, 19, 0, 29)).share, 1, 1e-9);
+}
+
 }  // namespace
 }  // namespace eventgan

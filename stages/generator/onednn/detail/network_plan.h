@@ -60,6 +60,10 @@ class NetworkPlan {
                             const TileMask& wanted, const float* planes, float* volume,
                             std::byte* block, std::byte* tiles) const;
 
+  /// The same where layers.winograd() is: equals run() bit for bit.
+  GenerationNotes run_winograd_tiles(const WinogradWork& work, const TileMask& wanted,
+                                     const float* planes, float* volume, std::byte* block) const;
+
   /// oneDNN's names of all kernels.
   std::vector<std::string> implementations() const;
 
@@ -88,6 +92,9 @@ class NetworkPlan {
                                              const std::byte* small) const;
   /// The last decoder and the prediction.
   void run_winograd_end(const EngineRun& run, const std::byte* small, float* volume) const;
+  /// Pixels of the rows from first_row on that the last decoder has made.
+  void predict(const EngineRun& run, const TileMask::Pixels& pixels, int first_row,
+               float* volume) const;
   template <class Stored>
   void run_head(const EngineRun& run, const float* planes) const;
   template <class Stored>

@@ -186,7 +186,16 @@ struct TiledWork {
   double share = 0;  ///< of the whole image's work, about
 };
 
-/// Goes back through the network from the wanted pixels. At least one tile must be wanted. Pure.
+/// The same by the numbers of winograd.h's tiles, row by row.
+struct WinogradWork {
+  std::array<std::vector<int>, kNetworkLevels> encoders;
+  std::array<std::vector<int>, 2 * kResidualBlocks> residuals;
+  std::array<std::vector<int>, kNetworkLevels> decoders;  ///< the finest last
+  double share = 0;
+};
+
+/// Go back through the network from the wanted pixels. At least one tile must be wanted. Pure.
 TiledWork tiled_work(const TileMask& wanted);
+WinogradWork winograd_work(const TileMask& wanted);
 
 }  // namespace eventgan
