@@ -110,7 +110,7 @@ class HeadConvolution {
   std::vector<EightWeights> bias_;
 };
 
-/// The last layer: 1x1 from channels to planes, ReLU included. Thread safe.
+/// The last layer: 1x1 from channels to an even number of planes, ReLU included. Thread safe.
 class PlanePrediction {
  public:
   explicit PlanePrediction(const LayerNumbers& pred);
