@@ -703,8 +703,8 @@ class EventsOfACamera(Export):
             del file["davis/left/events"]
             file["davis/left/events"] = self.rows[self.rows[:, 2] != self.rows[1500, 2]]
         _, err = self.export("raw", source=source, expect=66)
-        self.assertRegex(err, r"expected \d+ positive and \d+ negative events, of which the volume is made, got \d+ and "
-                              r"\d+, in .*walk.hdf5 \(walk/0+10.\d+\)")
+        self.assertRegex(err, r"expected \d+ positive and \d+ negative events, of which the volume is made, got \d+ "
+                              r"and \d+, in .*walk.hdf5 \(walk/0+10.\d+\)")
         self.assertIn(self.COUNTS, err)
         (self.job / "walk.hdf5").unlink()
         _, err = self.export("raw", source=source, out=self.out / "gone", expect=66)
