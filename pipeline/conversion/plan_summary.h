@@ -17,10 +17,10 @@ struct TrialEstimate {
   double stored_bytes = 0;      ///< compressed volumes
 };
 
-/// Runs up to four pairs from the start of each source, or of stills up to `most` spread over it
-/// (fewer than four are the most of others, too), through reading, generating and encoding on the
-/// calling thread (after one more, which counts only where no other could be tried), and scales by
-/// source and image size. Pairs that fail are left out.
+/// Runs pairs of each source through reading, generating and encoding on the calling thread: of
+/// stills up to `most` spread over it, of sequences and clips up to min(most, 4) from its start;
+/// after one more, which counts only where no other could be tried. Scales by source and image
+/// size. Pairs that fail are left out.
 TrialEstimate measure_trial(const JobManifest& manifest, const PlannedJob& job,
                             const Generator& generator, int threads, int most = 16);
 

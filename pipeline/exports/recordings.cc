@@ -181,19 +181,21 @@ RecordedSample RecordingsExporter::recorded(const OutgoingSample& sample,
                                             const SampleWindow& window) const {
   RecordedSample result{sample.labels.sample_id, {}, {}, {}, {}, {}, {}};
   const std::int64_t length_us = window.end_us - window.begin_us;
+  const double previous_s = sample.labels.pair.previous.time_s;
   const auto events = events_.of(sample, static_cast<double>(length_us) / kMicroseconds);
   result.events.reserve(events.size());
   for (const Event& event : events) {
-    // Drawn ones at neither end of the window, since some readers count the begin to it and others
-    // the end; a camera's at their own times, which a window's begin is not.
+    // A camera's at their own times; drawn ones at neither end of the window, since some readers
+    // count the begin to it and others the end.
     const bool is_recorded = events_.are_recorded();
-    const double time_us = event.t_s * kMicroseconds;
-    const std::int64_t t_us =
-        is_recorded ? std::llround(time_us) : static_cast<std::int64_t>(time_us);
+    const std::int64_t t_us = is_recorded ? std::llround((event.t_s + previous_s) * kMicroseconds) -
+                                                std::llround(previous_s * kMicroseconds)
+                                          : static_cast<std::int64_t>(event.t_s * kMicroseconds);
     const std::int64_t last_us = is_recorded ? length_us : length_us - 1;
-    result.events.push_back(
-        {window.begin_us + std::clamp(t_us, std::min<std::int64_t>(1, last_us), last_us),
-         static_cast<std::uint16_t>(event.x), static_cast<std::uint16_t>(event.y), event.positive});
+    const std::int64_t first_us = is_recorded ? 0 : std::min<std::int64_t>(1, last_us);
+    result.events.push_back({window.begin_us + std::clamp(t_us, first_us, last_us),
+                             static_cast<std::uint16_t>(event.x),
+                             static_cast<std::uint16_t>(event.y), event.positive});
   }
   if (sample.source.has_boxes()) {
     const auto take = [&](const ClassNumbers::Entry& entry, const VolumeBox& box) {

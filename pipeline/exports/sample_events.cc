@@ -37,8 +37,9 @@ bool is_sum(double sum, std::ptrdiff_t count) {
 
 struct SampleEvents::Recordings {
   JobManifest manifest;
-  std::vector<std::unique_ptr<Dataset>> datasets = {};  ///< of its sources
-  std::map<std::string, PlannedShard> shards = {};      ///< by name
+  std::vector<std::unique_ptr<Dataset>> datasets =
+      {};  ///< of its sources; null: its split is not exported
+  std::map<std::string, PlannedShard> shards = {};  ///< by name
 };
 
 SampleEvents::SampleEvents(const ExportInput& input, const ExportOptions& options)
@@ -62,6 +63,10 @@ void SampleEvents::open() const {
                                              (input_.folder() / "plan.json").string())};
     EventIndexes indexes(input_.folder() / kEventIndexFile);
     for (const SourceSpec& source : recordings.manifest.sources) {
+      if (std::ranges::find(input_.splits(), source.split) == input_.splits().end()) {
+        recordings.datasets.push_back(nullptr);
+        continue;
+      }
       try {
         recordings.datasets.push_back(open_dataset(source, base));
       } catch (const std::exception& error) {
@@ -86,7 +91,9 @@ std::vector<Event> SampleEvents::recorded(const OutgoingSample& sample) const {
         fmt::format("{}, in {} ({}){}", what, planned.pair.next.path, stored.sample_id, kWaysOut));
   };
   Outcome<EventWindow> window = dataset.events(planned.label_key);
-  if (is_fault(window)) throw InputError(window.fault().reason + kWaysOut);
+  if (is_fault(window)) {
+    throw InputError(fmt::format("{} ({}){}", window.fault().reason, stored.sample_id, kWaysOut));
+  }
   if (window->sensor != stored.source_size) {
     fail(fmt::format("expected a sensor of {}, as when it was converted, got {}",
                      to_string(stored.source_size), to_string(window->sensor)));

@@ -683,6 +683,16 @@ class EventsOfACamera(Export):
             np.testing.assert_allclose(first + t, expected[0] * 1e-6, atol=1e-8)
             np.testing.assert_array_equal(others, expected[1:])
 
+    def test_windows_that_begin_at_half_a_microsecond(self):
+        """The label is in the middle of 33.333 ms: no event is moved to another microsecond."""
+        source = self.convert(source={"window_s": 0.033333, "label_at": "middle"})
+        self.export("dsec", source=source)
+        found = np.stack(read_columns(self.out / "dsec/train/walk/events/left/events.h5"))
+        for time in self.FRAMES[1:]:
+            begin, end = (np.round(1e6 * time + side * 16666.5) for side in (-1, 1))
+            inside = (found[0] > begin + 1) & (found[0] < end - 1)
+            np.testing.assert_array_equal(found[:, inside], self.expected(begin + 1, end - 2))
+
     def test_windows_of_so_many_events(self):
         self.export("dsec", source=self.convert(source={"window_events": 100}))
         seen = 0
@@ -691,9 +701,7 @@ class EventsOfACamera(Export):
             for begin, end, _, count, _ in read_windows(path / "windows.txt"):
                 inside = (begin <= t) & (t <= end)
                 self.assertEqual((inside.sum(), count), (100, 100))
-                # The window begins with its first event, which is not at the begin of a recording's.
-                np.testing.assert_array_equal(np.stack([np.maximum(t, begin), *others])[1:, inside],
-                                              self.expected(begin - 1, end)[1:])
+                np.testing.assert_array_equal(np.stack([t, *others])[:, inside], self.expected(begin - 1, end))
                 seen += 1
         self.assertEqual(seen, 4)
 

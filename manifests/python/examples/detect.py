@@ -59,7 +59,8 @@ def read(path):
             if "davis/left" in file:
                 events, size = dict(zip("xytp", file["davis/left/events"][:].T)), file["davis/left/image_raw"].shape[1:]
             else:
-                events = {name: file["events"][name][:] for name in "xytp"}
+                events = {name: file["events"][name][:] for name in "xyp"}
+                events["t"] = file["events/t"][:].astype(int) + int(file["t_offset"][()] if "t_offset" in file else 0)
     events = np.stack(columns(events))
     return events[:, np.argsort(events[0], kind="stable")], size
 
@@ -73,6 +74,8 @@ def main():
     parser.add_argument("--images", type=pathlib.Path, help="folder for a picture of each window")
     args = parser.parse_args()
     detector, (events, size) = Detector(pathlib.Path(__file__).with_name("detector.pt")), read(args.recording)
+    if not events.size:
+        sys.exit(f"expected events, got none, in {args.recording}")
     size = [int(side) for side in args.sensor.split("x")][::-1] if args.sensor else size or (events[[2, 1]].max(1) + 1)
     window_us, t = 1000 * (args.window_ms or detector.told["window_ms"]), events[0]
     # each window begins after the end of the one before

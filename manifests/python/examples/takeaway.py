@@ -63,7 +63,8 @@ class EventsToBoxes(nn.Module):
         if self.bins > 1:
             volume += torch.bincount(cell + pixels, at % 1, count)[:count]
         if self.eta98:
-            volume = (volume / torch.quantile(volume[volume > 0], 0.98)).clamp(max=1)
+            there = volume[volume > 0]
+            volume = (volume / there.kthvalue(max(int(0.98 * len(there)), 1))[0]).clamp(max=1)
         volume = volume.float().view(2 * self.bins, height, width)
         if not self.signed:
             return volume
@@ -97,4 +98,5 @@ def write(folder: pathlib.Path, network: nn.Module, likeliest: Callable[..., Tup
                                            told["channels"] == "signed"))
     training.replace(folder / "detector.pt",
                      lambda path: torch.jit.save(whole, str(path), {"detector.json": json.dumps(told)}))
-    shutil.copy(pathlib.Path(__file__).with_name("detect.py"), folder)
+    script = pathlib.Path(__file__).with_name("detect.py")
+    training.replace(folder / script.name, lambda path: shutil.copy(script, path))

@@ -332,14 +332,16 @@ def main() -> None:
         texts = [f"{classes[label]} {score:.2f}" for label, score in zip(labels[sure].tolist(), scores[sure].tolist())]
         return validation[i]["id"], training.draw_item(validation[i], boxes[sure], texts)
 
-    gaps = (tune_shards or train_shards).column("gap_s")
-    takeaway.write(pathlib.Path(args.out), model, likeliest, len(items[0]["volume"]), size, {
-        "classes": classes, "bins": len(train_shards.sample(0, {"volume"})["volume"]) // 2,
-        "normalize": read_description(args.data)["settings"].get("volume", {}).get("normalize", "none"),
-        "channels": args.channels, "score": SURE,
-        "window_ms": round(1000 * float(np.median(gaps[gaps > 0] if (gaps > 0).any() else WINDOW_S)), 3)})
-    print(f"to find {' and '.join(classes)} in a recording: {shlex.quote(str(pathlib.Path(args.out, 'detect.py')))} "
-          f"RECORDING (this folder's detect.py and detector.pt are all it needs)")
+    if not args.frames:
+        gaps = (tune_shards or train_shards).column("gap_s")
+        takeaway.write(pathlib.Path(args.out), model, likeliest, len(items[0]["volume"]), size, {
+            "classes": classes, "bins": len(train_shards.sample(0, {"volume"})["volume"]) // 2,
+            "normalize": read_description(args.data)["settings"].get("volume", {}).get("normalize", "none"),
+            "channels": args.channels, "score": SURE,
+            "window_ms": round(1000 * float(np.median(gaps[gaps > 0] if (gaps > 0).any() else WINDOW_S)), 3)})
+        script = shlex.quote(str(pathlib.Path(args.out, "detect.py")))
+        print(f"to find {' and '.join(classes)} in a recording: {script} RECORDING (this folder's detect.py and "
+              "detector.pt are all it needs)")
     found = search(model, test, args.batch)
     training.write_predictions(args, test_shards, (entry for item, boxes in found for entry in
                                                    training.box_predictions(item, boxes, classes, test_view)))

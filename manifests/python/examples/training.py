@@ -251,9 +251,11 @@ def add_tune(parser: argparse.ArgumentParser) -> None:
 
 
 def tuned_on(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]], tested_shards: Shards) -> Shards:
-    """The labelled samples of --tune; warns of recordings that are tested on, too."""
+    """The labelled samples of --tune, of its split train if it has one for validation, too; warns of recordings that
+    are tested on, too."""
     try:
-        shards = Shards(args.tune, partial=True)
+        split = "train" if validation_split(read_description(args.tune)) else None
+        shards = Shards(args.tune, split=split, partial=True)
         shards = shards[list(usable(shards))]
     except (OSError, ValueError) as error:
         sys.exit(str(error))
@@ -263,7 +265,7 @@ def tuned_on(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]]
     if both:
         print(f"warning: what is found in {both[0]}{' and others' * (len(both) > 1)} says nothing of other recordings: "
               f"it is in {args.tune}, too", file=sys.stderr)
-    return shards
+    return shards.changed(labelled_frame) if args.frames else shards
 
 
 def untuned(args: argparse.Namespace) -> argparse.Namespace:
@@ -272,10 +274,18 @@ def untuned(args: argparse.Namespace) -> argparse.Namespace:
 
 
 def tuning(args: argparse.Namespace, samples: int) -> argparse.Namespace:
-    """The options of the training on so many --tune samples that follows: it begins with the weights of the other."""
+    """The options of the training on so many --tune samples that follows: it begins with the weights of the other,
+    and anew where these have learnt more since."""
     out = pathlib.Path(args.out)
     (out / "tuned").mkdir(exist_ok=True)
-    return argparse.Namespace(**{**vars(args), "out": str(out / "tuned"), "tune": f"{args.tune}, {samples} samples",
+    base_steps = json.loads((out / "metrics.json").read_text(encoding="utf-8"))["history"][-1]["step"]
+    checkpoint = out / "tuned" / "checkpoint.pt"
+    if checkpoint.exists() and torch.load(checkpoint, "cpu")["settings"].get("base_steps") != base_steps:
+        print(f"{out / 'tuned'}: anew, since the training before has gone on")
+        checkpoint.unlink()
+    plan = read_description(args.tune)["plan_hash"]
+    return argparse.Namespace(**{**vars(args), "out": str(out / "tuned"), "base_steps": base_steps,
+                                 "tune": f"{samples} samples of plan {plan[:8]}",
                                  "pretrained": str(out / "weights.pt"), "lr": args.lr * TUNING_RATE,
                                  "steps": TUNING_STEPS, "epochs": None, "minutes": None})
 
@@ -376,7 +386,8 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
     of the way to the nearest limit. check(): the numbers to report, `metric` among them; asked before the first step
     and after each epoch (each --every). Minutes are those of the steps, here and in metrics.json."""
     out = pathlib.Path(args.out)
-    settings = {name: value for name, value in vars(args).items() if name not in MAY_CHANGE}
+    may_change = MAY_CHANGE | ({"pretrained"} if "base_steps" in args else set())  # of tuning, OUT's own
+    settings = {name: value for name, value in vars(args).items() if name not in may_change}
     state: dict[str, Any] = {"settings": settings, "epoch": 0, "step": 0, "seconds": 0.0, "history": []}
     if (out / "checkpoint.pt").exists():
         # its own: a pickle, not to be had from others

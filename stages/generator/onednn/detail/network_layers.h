@@ -66,7 +66,7 @@ class NetworkLayers {
   /// What activations between layers are stored as.
   dnnl::memory::data_type stored_type() const { return stored_type_; }
   float residual_factor(int block) const { return residual_factors_[block]; }
-  /// Nothing where winograd_fits() says so.
+  /// Where winograd_fits().
   const std::optional<WinogradLayers>& winograd() const { return winograd_; }
 
  private:

@@ -114,7 +114,8 @@ class NetworkPlan {
   dnnl::memory::data_type stored_type_;
   BufferLayout layout_;
 
-  /// Where it is, in place of `head_`, `residuals_`, the decoders' strips and `prediction_`.
+  /// Where it is, in place of `head_`, `encoders_`, `residuals_`, the decoders' strips and
+  /// `prediction_`.
   const WinogradLayers* winograd_;
   std::size_t winograd_buffer_ = 0;
   /// Where it fits, in place of `head_`, the last decoder's strips and `prediction_`.
