@@ -15,7 +15,9 @@ namespace eventgan {
 
 Configuration own_configuration(const JobManifest& manifest) {
   const GeneratorSpec& generator = manifest.generator;
-  if (!has_weights(generator.kind)) return {{.method = generator.kind}, manifest.output.dtype};
+  if (!has_weights(generator.kind)) {
+    return {{.method = generator.kind, .weights = ""}, manifest.output.dtype};
+  }
   return {{.weights = shipped_weights_name(generator.weights),
            .precision = precision_of(generator),
            .scope = generator.scope.scope},
