@@ -63,8 +63,8 @@ class ExportInput {
   const std::string& sources_hash() const { return sources_hash_; }
   const std::vector<std::string>& splits() const { return splits_; }  ///< chosen, plan's order
   const std::vector<ExportSource>& sources() const { return sources_; }
-  const std::vector<ExportShard>& shards() const { return shards_; }    ///< in plan order
-  bool has_recordings() const { return has_recordings_; }  ///< made of a camera's events
+  const std::vector<ExportShard>& shards() const { return shards_; }  ///< in plan order
+  bool has_recordings() const { return has_recordings_; }             ///< made of a camera's events
   const std::vector<std::string>& missing() const { return missing_; }  ///< finalize --partial
 
   const ExportSource& source_of(const ExportShard& shard) const {
