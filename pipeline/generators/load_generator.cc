@@ -190,7 +190,7 @@ LoadedGenerator load_generator(const JobManifest& manifest) {
       support);
   LoadedGenerator result;
   result.generator = make_engine(choice.engine, loaded.weights, spec, precision);
-  if (precision == Precision::kInt8 && int8_pays(loaded.weights)) choice.warning.clear();
+  if (precision == Precision::kInt8 && int8_speedup(loaded.weights) > 1) choice.warning.clear();
   result.weights_hash = std::move(loaded.hash);
   result.choice = choice_text(choice, spec, precision, support, loaded.weights.training_gaps);
   for (const std::string& warning : {loaded.warning, choice.warning}) {

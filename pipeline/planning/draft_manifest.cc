@@ -92,11 +92,15 @@ class Draft {
   std::vector<std::string> decide(const std::vector<SourceDraft>& sources) {
     std::vector<std::string> lines;
     if (has_events(sources.front().found.dataset)) return lines;
-    has_int8_ = int8_pays(read_shipped_weights(moves() ? kWideWeights : kNarrowWeights));
+    // Less is not worth float32's exactness, and `convert`, which measures anew and warns where
+    // int8 is the slower one, could see it the other way round.
+    constexpr double kLeastSpeedup = 1.3;
+    has_int8_ = int8_speedup(read_shipped_weights(moves() ? kWideWeights : kNarrowWeights)) >=
+                kLeastSpeedup;
     if (!is_network(sources)) return lines;
     if (const OnednnSupport int8 = onednn_support(Precision::kInt8); int8.able && !int8.native) {
       lines.push_back(
-          fmt::format("\"precision\": \"{}\" is the faster one here; this processor "
+          fmt::format("\"precision\": \"{}\" is the better one here; this processor "
                       "({}) has no instructions for int8",
                       precision(), int8.instruction_set));
     }

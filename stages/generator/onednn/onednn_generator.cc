@@ -208,9 +208,9 @@ double thread_processor_s() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-bool is_int8_faster(const Weights& weights) {
-  constexpr ImageSize kSize{64, 96};
-  constexpr int kRounds = 3;  // the first builds the plans
+double measured_int8_speedup(const Weights& weights) {
+  constexpr ImageSize kSize{192, 320};
+  constexpr int kRounds = 5;  // the first builds the plans
   const std::array generators{make_onednn_generator(weights, Precision::kInt8),
                               make_onednn_generator(weights, Precision::kFloat32)};
   const std::vector<float> frames(2 * kSize.pixel_count());
@@ -224,20 +224,21 @@ bool is_int8_faster(const Weights& weights) {
       if (round == 0 || spent_s < least_s[k]) least_s[k] = spent_s;
     }
   }
-  return least_s[0] < least_s[1];
+  return least_s[1] / least_s[0];
 }
 
 }  // namespace
 
-bool int8_pays(const Weights& weights) {
+double int8_speedup(const Weights& weights) {
   const OnednnSupport support = onednn_support(Precision::kInt8);
-  if (support.native || !support.able) return support.native;
+  if (!support.able) return 0;
+  if (support.native) return std::numeric_limits<double>::infinity();
   static std::mutex measuring;
-  static std::map<int, bool> known;  // by width
+  static std::map<int, double> known;  // by width
   const std::lock_guard lock(measuring);
   const auto found = known.find(weights.base_channels);
   if (found != known.end()) return found->second;
-  return known[weights.base_channels] = is_int8_faster(weights);
+  return known[weights.base_channels] = measured_int8_speedup(weights);
 }
 
 std::unique_ptr<Generator> make_onednn_generator(const Weights& weights, Precision precision) {
