@@ -33,21 +33,22 @@ NetworkPlan::NetworkPlan(NetworkLayers& layers, ImageSize size)
       size_(size),
       base_channels_(layers.base_channels()),
       bins_(layers.bins()),
-      stored_type_(layers.stored_type()),
-      winograd_(layers.winograd() ? &*layers.winograd() : nullptr) {
+      stored_type_(layers.stored_type()) {
+  if (layers.winograd()) {
+    winograd_.emplace(*layers.winograd(), base_channels_, size_, layout_);
+    return;
+  }
   const bool narrow = NarrowLayers::fit(base_channels_, layers.precision());
   skips_[0] = add_activations(size_, base_channels_);
   if (narrow) {
     plan_narrow(layers);
-  } else if (winograd_) {
-    plan_winograd();
   } else {
     plan_head(layers);
   }
   plan_encoders(layers);
-  if (!winograd_) plan_residual_blocks(layers);
+  plan_residual_blocks(layers);
   plan_decoders(layers);
-  if (!narrow && !winograd_) plan_prediction(layers);
+  if (!narrow) plan_prediction(layers);
 
   std::size_t scratch_bytes =
       prediction_ ? std::max(head_->scratch_bytes(), prediction_->scratch_bytes()) : 0;
@@ -77,18 +78,6 @@ void NetworkPlan::plan_narrow(NetworkLayers& layers) {
   const auto stored_bytes = static_cast<int>(dnnl::memory::data_type_size(stored_type_));
   narrow_.emplace(numbers("head"), numbers("decoders.3.skip"), numbers("decoders.3.phases"),
                   numbers("pred"), size_, stored_bytes, tiles, layout_);
-}
-
-void NetworkPlan::plan_winograd() {
-  std::size_t bytes =
-      std::max(winograd_->head.buffer_bytes(size_), winograd_->prediction.buffer_bytes());
-  for (const auto* list : {&winograd_->encoders, &winograd_->residuals, &winograd_->decoders}) {
-    for (const WinogradConvolution& layer : *list) bytes = std::max(bytes, layer.buffer_bytes());
-  }
-  winograd_buffer_ = layout_.add(bytes);
-  // The two rows of a row of tiles, and what is read behind them.
-  const std::size_t pixels = 2 * static_cast<std::size_t>(size_.width) + PlanePrediction::kPixels;
-  decoded_rows_ = layout_.add(sizeof(float) * pixels * base_channels_);
 }
 
 void NetworkPlan::plan_head(NetworkLayers& layers) {
@@ -124,9 +113,7 @@ void NetworkPlan::plan_encoders(NetworkLayers& layers) {
     setup.source_type = setup.target_type = stored_type_;
     setup.activation = Activation::kLeakyRelu;
     // oneDNN takes the padding after the last pixel as given, also where no stride reaches it.
-    if (!winograd_) {
-      encoders_.emplace_back(setup, layers.at(numbered("encoders", level)), engine_);
-    }
+    encoders_.emplace_back(setup, layers.at(numbered("encoders", level)), engine_);
     size = half_size(size);
   }
   bottleneck_ = add_activations(size, base_channels_ << kNetworkLevels);
@@ -150,7 +137,7 @@ void NetworkPlan::plan_residual_blocks(NetworkLayers& layers) {
 void NetworkPlan::plan_decoders(NetworkLayers& layers) {
   for (int level = 0; level < kNetworkLevels; ++level) {
     const ImageSize large = sizes_[kNetworkLevels - 1 - level];
-    const bool by_strips = !winograd_ && (level < kNetworkLevels - 1 || !narrow_);
+    const bool by_strips = level < kNetworkLevels - 1 || !narrow_;
     decoders_.emplace_back(layers, level, large, by_strips, layout_);
     if (level < kNetworkLevels - 1) {
       decoded_[level] = add_activations(large, decoders_[level].channels());
@@ -172,11 +159,6 @@ template <class Stored>
 void NetworkPlan::run_head(const EngineRun& run, const float* planes) const {
   auto* stored = reinterpret_cast<Stored*>(run.block + skips_[0].offset);
   const std::size_t row_values = static_cast<std::size_t>(size_.width) * base_channels_;
-  if constexpr (std::is_same_v<Stored, float>) {
-    if (winograd_) {
-      return winograd_->head.run(planes, size_, stored, run.block + winograd_buffer_);
-    }
-  }
   if (narrow_) {
     for (int y = 0; y < size_.height; ++y) {
       Stored* const row = stored + y * row_values;
@@ -211,44 +193,8 @@ void NetworkPlan::run_head(const EngineRun& run, const float* planes) const {
   }
 }
 
-void NetworkPlan::run_encoder(const EngineRun& run, int level, const Buffer& target) const {
-  const std::byte* from = run.block + skips_[level].offset;
-  std::byte* to = run.block + target.offset;
-  if (!winograd_) return encoders_[level].run(run.stream, from, to, run.scratch);
-  const WinogradConvolution& layer = winograd_->encoders[level];
-  layer.run({reinterpret_cast<const float*>(from), nullptr, sizes_[level]}, 0,
-            layer.tile_rows(sizes_[level]), reinterpret_cast<float*>(to), 0, false,
-            run.block + winograd_buffer_);
-}
-
-void NetworkPlan::run_residual(const EngineRun& run, int i) const {
-  const std::size_t from = (i % 2 == 0 ? bottleneck_ : between_).offset;
-  const std::size_t to = (i % 2 == 0 ? between_ : bottleneck_).offset;
-  if (!winograd_)
-    return residuals_[i].run(run.stream, run.block + from, run.block + to, run.scratch);
-  const ImageSize size = half_size(sizes_.back());
-  const WinogradConvolution& layer = winograd_->residuals[i];
-  layer.run({reinterpret_cast<const float*>(run.block + from), nullptr, size}, 0,
-            layer.tile_rows(size), reinterpret_cast<float*>(run.block + to), 0, i % 2 == 1,
-            run.block + winograd_buffer_);
-}
-
-WinogradConvolution::Images NetworkPlan::decoder_images(const EngineRun& run, int level,
-                                                        const std::byte* small) const {
-  const int skip = kNetworkLevels - 1 - level;
-  return {reinterpret_cast<const float*>(run.block + skips_[skip].offset),
-          reinterpret_cast<const float*>(small), sizes_[skip]};
-}
-
 template <class Stored>
 void NetworkPlan::run_decoder(const EngineRun& run, int level, const std::byte* small) const {
-  if (winograd_) {
-    const WinogradConvolution::Images images = decoder_images(run, level, small);
-    const WinogradConvolution& layer = winograd_->decoders[level];
-    return layer.run(images, 0, layer.tile_rows(images.size),
-                     reinterpret_cast<float*>(run.block + decoded_[level].offset), 0, false,
-                     run.block + winograd_buffer_);
-  }
   const DecoderLevel& decoder = decoders_[level];
   const std::byte* skip = run.block + skips_[kNetworkLevels - 1 - level].offset;
   auto* stored = reinterpret_cast<Stored*>(run.block + decoded_[level].offset);
@@ -264,36 +210,9 @@ void NetworkPlan::run_decoder(const EngineRun& run, int level, const std::byte* 
   }
 }
 
-void NetworkPlan::run_winograd_end(const EngineRun& run, const std::byte* small,
-                                   float* volume) const {
-  const WinogradConvolution::Images images = decoder_images(run, kNetworkLevels - 1, small);
-  const WinogradConvolution& layer = winograd_->decoders.back();
-  auto* decoded = reinterpret_cast<float*>(run.block + decoded_rows_);
-  std::byte* buffer = run.block + winograd_buffer_;
-  for (int tiles = 0; tiles < layer.tile_rows(size_); ++tiles) {
-    const int first = 2 * tiles - 1;
-    layer.run(images, tiles, tiles + 1, decoded, first, false, buffer);
-    const TileMask::Pixels rows{std::max(first, 0), std::min(first + 2, size_.height), 0,
-                                size_.width};
-    predict(run, rows, first, volume);
-  }
-}
-
-void NetworkPlan::predict(const EngineRun& run, const TileMask::Pixels& pixels, int first_row,
-                          float* volume) const {
-  const auto* decoded = reinterpret_cast<const float*>(run.block + decoded_rows_);
-  for (int y = pixels.top; y < pixels.bottom; ++y) {
-    const std::ptrdiff_t pixel =
-        static_cast<std::ptrdiff_t>(y - first_row) * size_.width + pixels.left;
-    run.sound &= winograd_->prediction.run(decoded + pixel * base_channels_, size_, y, pixels.left,
-                                           pixels.right, volume, run.block + winograd_buffer_);
-  }
-}
-
 template <class Stored>
 void NetworkPlan::run_last_decoder(const EngineRun& run, const std::byte* small,
                                    float* volume) const {
-  if (winograd_) return run_winograd_end(run, small, volume);
   const DecoderLevel& decoder = decoders_.back();
   const std::byte* skip = run.block + skips_[0].offset;
   auto* decoded = reinterpret_cast<float*>(run.block + decoded_rows_);
@@ -339,6 +258,7 @@ void NetworkPlan::with_stored_type(Compute&& compute) const {
 
 GenerationNotes NetworkPlan::run(const float* planes, float* volume, std::byte* block,
                                  const TensorObserver& observe) const {
+  if (winograd_) return winograd_->run(planes, volume, block, observe);
   dnnl::stream stream(engine_);
   SaturationCount saturation;
   bool sound = true;
@@ -362,14 +282,14 @@ GenerationNotes NetworkPlan::run(const float* planes, float* volume, std::byte* 
     show("head", skips_[0]);
     for (int level = 0; level < kNetworkLevels; ++level) {
       const Buffer& target = level + 1 < kNetworkLevels ? skips_[level + 1] : bottleneck_;
-      run_encoder(run, level, target);
+      encoders_[level].run(stream, at(skips_[level]), at(target), run.scratch);
       count_and_show(numbered("encoders", level), target);
     }
     for (int i = 0; i < kResidualBlocks; ++i) {
       const std::string name = numbered("resblocks", i);
-      run_residual(run, 2 * i);
+      residuals_[2 * i].run(stream, at(bottleneck_), at(between_), run.scratch);
       count_and_show(name + ".conv1", between_);
-      run_residual(run, 2 * i + 1);
+      residuals_[2 * i + 1].run(stream, at(between_), at(bottleneck_), run.scratch);
       count_and_show(name, bottleneck_);
     }
     const std::byte* small = at(bottleneck_);
@@ -480,53 +400,6 @@ GenerationNotes NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWor
     run_last_tiles(run, layers, work, wanted, small, volume);
   });
   return {.saturated_share = saturation.share(), .sound = sound};
-}
-
-GenerationNotes NetworkPlan::run_winograd_tiles(const WinogradWork& work, const TileMask& wanted,
-                                                const float* planes, float* volume,
-                                                std::byte* block) const {
-  dnnl::stream stream(engine_);
-  SaturationCount saturation;
-  bool sound = true;
-  const EngineRun run{stream, block, block + scratch_, saturation, sound};
-  std::byte* buffer = block + winograd_buffer_;
-  const auto at = [&](const Buffer& buffer_at) {
-    return reinterpret_cast<float*>(block + buffer_at.offset);
-  };
-  run_head<float>(run, planes);
-  for (int level = 0; level < kNetworkLevels; ++level) {
-    const Buffer& target = level + 1 < kNetworkLevels ? skips_[level + 1] : bottleneck_;
-    winograd_->encoders[level].run({at(skips_[level]), nullptr, sizes_[level]},
-                                   work.encoders[level], at(target), 0, false, buffer);
-  }
-  for (int i = 0; i < 2 * kResidualBlocks; ++i) {
-    const bool second = i % 2 == 1;
-    winograd_->residuals[i].run(
-        {at(second ? between_ : bottleneck_), nullptr, half_size(sizes_.back())}, work.residuals[i],
-        at(second ? bottleneck_ : between_), 0, second, buffer);
-  }
-  const std::byte* small = block + bottleneck_.offset;
-  for (int level = 0; level < kNetworkLevels - 1; ++level) {
-    winograd_->decoders[level].run(decoder_images(run, level, small), work.decoders[level],
-                                   at(decoded_[level]), 0, false, buffer);
-    small = block + decoded_[level].offset;
-  }
-  const WinogradConvolution::Images images = decoder_images(run, kNetworkLevels - 1, small);
-  const std::span<const int> tiles(work.decoders.back());
-  const int columns = size_.width / 2 + 1;
-  for (std::size_t begin = 0, end = 0; begin < tiles.size(); begin = end) {
-    const int row = tiles[begin] / columns;
-    while (end < tiles.size() && tiles[end] / columns == row) ++end;
-    const int first = 2 * row - 1;
-    winograd_->decoders.back().run(images, tiles.subspan(begin, end - begin),
-                                   reinterpret_cast<float*>(block + decoded_rows_), first, false,
-                                   buffer);
-    const TileMask::Pixels rows{std::max(first, 0), std::min(first + 2, size_.height), 0,
-                                size_.width};
-    wanted.visit_within(
-        rows, [&](const TileMask::Pixels& pixels) { predict(run, pixels, first, volume); });
-  }
-  return {.saturated_share = 0, .sound = sound};
 }
 
 std::vector<std::string> NetworkPlan::implementations() const {

@@ -140,10 +140,10 @@ class OnednnGenerator final : public Generator {
     std::memset(volume.data(), 0, volume.size_bytes());
     return compute(wanted.size, [&] {
       const auto plan = plans_.plan(wanted.size);
-      if (layers_.winograd()) {
+      if (plan->winograd()) {
         const BlockPool::Lease block = blocks_.take(plan->block_bytes());
-        return plan->run_winograd_tiles(winograd, wanted, planes.data(), volume.data(),
-                                        block.data());
+        return plan->winograd()->run_tiles(winograd, wanted, planes.data(), volume.data(),
+                                           block.data());
       }
       const TiledLayers& layers = tiled_layers();
       const std::size_t plan_bytes = BufferLayout::aligned(plan->block_bytes());

@@ -2,9 +2,11 @@
 
 #include <array>
 #include <dnnl.hpp>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,6 +16,10 @@
 #include "stages/generator/weights.h"
 
 namespace eventgan {
+
+/// Sees a tensor of quantized_tensors() (calibration.h), [y, x, channel] float32, behind its
+/// activation. Valid during the call.
+using TensorObserver = std::function<void(const std::string& name, std::span<const float> values)>;
 
 /// One layer's weights, laid out once for each layout that oneDNN's kernels ask for: a few, shared
 /// by all image sizes, and kept. Thread safe.

@@ -3,10 +3,8 @@
 #include <array>
 #include <cstddef>
 #include <dnnl.hpp>
-#include <functional>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -17,6 +15,7 @@
 #include "stages/generator/onednn/detail/decoder_level.h"
 #include "stages/generator/onednn/detail/fused_convolution.h"
 #include "stages/generator/onednn/detail/network_layers.h"
+#include "stages/generator/onednn/detail/winograd_plan.h"
 #include "stages/generator/onednn/narrow_layers.h"
 
 namespace eventgan {
@@ -34,10 +33,6 @@ class OneOpenMpThread {
  private:
   int threads_before_;
 };
-
-/// Sees a tensor of quantized_tensors() (calibration.h), [y, x, channel] float32, behind its
-/// activation. Valid during the call.
-using TensorObserver = std::function<void(const std::string& name, std::span<const float> values)>;
 
 /// The network for one image size: which convolutions run in which order, and where in one block
 /// of memory their buffers lie. Holds no buffers itself; thread safe.
@@ -60,9 +55,8 @@ class NetworkPlan {
                             const TileMask& wanted, const float* planes, float* volume,
                             std::byte* block, std::byte* tiles) const;
 
-  /// The same where layers.winograd() is: equals run() bit for bit.
-  GenerationNotes run_winograd_tiles(const WinogradWork& work, const TileMask& wanted,
-                                     const float* planes, float* volume, std::byte* block) const;
+  /// What runs in this plan's place, where layers.winograd() is; else null.
+  const WinogradPlan* winograd() const { return winograd_ ? &*winograd_ : nullptr; }
 
   /// oneDNN's names of all kernels.
   std::vector<std::string> implementations() const;
@@ -75,7 +69,6 @@ class NetworkPlan {
 
   Buffer add_activations(ImageSize size, int channels);
   void plan_narrow(NetworkLayers& layers);
-  void plan_winograd();
   void plan_head(NetworkLayers& layers);
   void plan_encoders(NetworkLayers& layers);
   void plan_residual_blocks(NetworkLayers& layers);
@@ -85,16 +78,6 @@ class NetworkPlan {
   /// Calls compute(Stored()) with the type of the stored activations.
   template <class Compute>
   void with_stored_type(Compute&& compute) const;
-  void run_encoder(const EngineRun& run, int level, const Buffer& target) const;
-  /// Convolution i of the residual blocks.
-  void run_residual(const EngineRun& run, int i) const;
-  WinogradConvolution::Images decoder_images(const EngineRun& run, int level,
-                                             const std::byte* small) const;
-  /// The last decoder and the prediction.
-  void run_winograd_end(const EngineRun& run, const std::byte* small, float* volume) const;
-  /// Pixels of the rows from first_row on that the last decoder has made.
-  void predict(const EngineRun& run, const TileMask::Pixels& pixels, int first_row,
-               float* volume) const;
   template <class Stored>
   void run_head(const EngineRun& run, const float* planes) const;
   template <class Stored>
@@ -114,10 +97,7 @@ class NetworkPlan {
   dnnl::memory::data_type stored_type_;
   BufferLayout layout_;
 
-  /// Where it is, in place of `head_`, `encoders_`, `residuals_`, the decoders' strips and
-  /// `prediction_`.
-  const WinogradLayers* winograd_;
-  std::size_t winograd_buffer_ = 0;
+  std::optional<WinogradPlan> winograd_;  ///< where it is, nothing below is
   /// Where it fits, in place of `head_`, the last decoder's strips and `prediction_`.
   std::optional<NarrowLayers> narrow_;
   std::size_t inputs_ = 0;            ///< of the head
