@@ -400,9 +400,10 @@ double work_of(const TiledWork& work) {
     sum += count(work.encoders[level].size(), kEncoderTiles[level]) * 18 * channels * channels;
   }
   constexpr double kBottom = 1 << kNetworkLevels;  // channels, in base widths
-  constexpr double kTaps = 9;
+  constexpr double kKernelTaps = 9;
   for (std::size_t layer = 0; layer < kBottleneckLayers; ++layer) {
-    const double of_pixel = layer == 0 ? kTaps * kBottom * kBottom / 2 : kTaps * kBottom * kBottom;
+    const double of_pixel =
+        layer == 0 ? kKernelTaps * kBottom * kBottom / 2 : kKernelTaps * kBottom * kBottom;
     sum += static_cast<double>(work.bottleneck[layer].size()) * of_pixel;
   }
   // Of a pixel of the phases 4 x 4 from twice as many channels, and 4 x 9 beside it.

@@ -7,12 +7,14 @@
 
 #include "manifests/values/frames.h"
 #include "manifests/values/job.h"
+#include "stages/generator/onednn/eight_lanes.h"
 #include "stages/generator/onednn/layer_numbers.h"
 
 namespace eventgan {
 
-/// Whether a network of this base width computes all of its layers by the kernels of this file: in
-/// float32, on a processor with AVX2 and FMA that has no AVX-512, as oneDNN sees it.
+/// Whether a network of this base width computes all of its layers by the kernels of this file and
+/// plane_layers.h: in float32, on a processor with AVX2 and FMA that has no AVX-512, as oneDNN sees
+/// it.
 bool winograd_fits(int base_channels, Precision precision);
 /// Counts up with what changes their bytes.
 inline constexpr int kWinogradVersion = 1;
@@ -21,11 +23,6 @@ inline constexpr int kWinogradVersion = 1;
 /// turns NaN into 0; with another slope it multiplies. Small enough to vanish in every sum of
 /// float32 or bfloat16, and far from subnormal.
 inline constexpr float kNoSlope = 1e-30f;
-
-/// Eight channels of weights, as a register of AVX2 holds them.
-struct alignas(32) EightWeights {
-  float values[8];
-};
 
 /// activation(convolution(input) + bias [+ output]) of a 3x3 kernel with zeros around the image. Of
 /// a decoder the kernel also sees the doubled small image. Float32; images are [y, x, channel]
@@ -92,42 +89,6 @@ class WinogradConvolution {
   std::array<int, 16> plain_depth_{};   ///< a sum's channels without the small image's
   std::vector<EightWeights> weights_;   ///< [sum, out / vector's, channel, out % vector's]
   std::vector<EightWeights> bias_;
-};
-
-/// The head: 3x3 from planes to channels, LeakyReLU included. Thread safe.
-class HeadConvolution {
- public:
-  explicit HeadConvolution(const LayerNumbers& head);
-
-  std::size_t buffer_bytes(ImageSize size) const;
-
-  /// inputs: [input, y, x]; output: [y, x, channel].
-  void run(const float* inputs, ImageSize size, float* output, std::byte* buffer) const;
-
- private:
-  int in_, out_;
-  std::vector<EightWeights> weights_;  ///< [out / 8, row, in, column, out % 8]
-  std::vector<EightWeights> bias_;
-};
-
-/// The last layer: 1x1 from channels to an even number of planes, ReLU included. Thread safe.
-class PlanePrediction {
- public:
-  explicit PlanePrediction(const LayerNumbers& pred);
-
-  /// As many pixels must follow those that are given, whatever they are.
-  static constexpr int kPixels = 32;
-  std::size_t buffer_bytes() const;
-
-  /// Pixels [x, channel] from first_x to end_x - 1 of row y into the planes of `volume`, [channel,
-  /// y, x]; NaN stays NaN. Whether all values are finite before the ReLU.
-  bool run(const float* pixels, ImageSize size, int y, int first_x, int end_x, float* volume,
-           std::byte* buffer) const;
-
- private:
-  int in_, out_;
-  std::vector<float> weights_;  ///< [out, in]
-  std::vector<float> bias_;
 };
 
 }  // namespace eventgan

@@ -5,79 +5,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <string>
 #include <vector>
 
-#include "manifests/values/counter_random.h"
 #include "stages/generator/onednn/buffers.h"
 #include "stages/generator/onednn/layer_numbers.h"
 #include "stages/generator/weights.h"
+#include "tests/stages/generator/channel_images.h"
 
 namespace eventgan {
 namespace {
-
-constexpr float kBadNumbers[] = {std::numeric_limits<float>::quiet_NaN(),
-                                 std::numeric_limits<float>::infinity(),
-                                 -std::numeric_limits<float>::infinity()};
-
-bool has_avx2() {
-#if defined(__x86_64__)
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#else
-  return false;
-#endif
-}
-
-#define EVENTGAN_AVX2_OR_SKIP() \
-  if (!has_avx2()) GTEST_SKIP() << "no AVX2 here"
-
-/// Values from a cache line on.
-class Image {
- public:
-  Image(ImageSize size, int channels, float value = 0)
-      : channels_(channels),
-        width_(size.width),
-        count_(size.pixel_count() * channels),
-        buffer_(count_ * sizeof(float)) {
-    std::fill_n(data(), count_, value);
-  }
-
-  float* data() const { return reinterpret_cast<float*>(buffer_.data()); }
-  float& at(int y, int x, int channel) const {
-    return data()[(static_cast<std::ptrdiff_t>(y) * width_ + x) * channels_ + channel];
-  }
-  std::size_t count() const { return count_; }
-
- private:
-  int channels_, width_;
-  std::size_t count_;
-  PageBuffer buffer_;
-};
-
-std::vector<float> winograd_numbers(std::size_t count, std::uint64_t seed) {
-  const CounterRandom random(seed);
-  std::vector<float> numbers(count);
-  for (std::size_t i = 0; i < count; ++i) numbers[i] = float(2 * random.uniform(i) - 1);
-  return numbers;
-}
-
-Image random_image(ImageSize size, int channels, std::uint64_t seed) {
-  Image image(size, channels);
-  const auto numbers = winograd_numbers(image.count(), seed);
-  std::copy(numbers.begin(), numbers.end(), image.data());
-  return image;
-}
-
-LayerNumbers winograd_layer(int out, int in, int kernel, std::uint64_t seed) {
-  return {"layer",
-          out,
-          in,
-          kernel,
-          winograd_numbers(static_cast<std::size_t>(out) * in * kernel * kernel, seed),
-          winograd_numbers(static_cast<std::size_t>(out), seed + 1),
-          {}};
-}
 
 struct LayerCase {
   int in = 8;
@@ -92,8 +29,8 @@ struct Layer {
   explicit Layer(const LayerCase& from, std::uint64_t seed = 1)
       : the(from),
         output_size(from.stride == 1 ? from.size : half_size(from.size)),
-        plain(winograd_layer(from.out, from.in, 3, seed)),
-        doubled(winograd_layer(from.out, 2 * from.in, 3, seed + 10)),
+        plain(random_layer(from.out, from.in, 3, seed)),
+        doubled(random_layer(from.out, 2 * from.in, 3, seed + 10)),
         input(random_image(from.size, from.in, seed + 20)),
         small(random_image(half_size(from.size), 2 * from.in, seed + 30)),
         convolution(plain, from.stride, kLeakySlope, from.doubled ? &doubled : nullptr) {}
@@ -108,8 +45,8 @@ struct Layer {
     convolution.run(images(), first, end, output, output_row, add, buffer.data());
   }
 
-  Image result(float before = 0, bool add = false) const {
-    Image output(output_size, the.out, before);
+  ChannelImage result(float before = 0, bool add = false) const {
+    ChannelImage output(output_size, the.out, before);
     run(0, convolution.tile_rows(the.size), output.data(), 0, add);
     return output;
   }
@@ -141,7 +78,7 @@ struct Layer {
   LayerCase the;
   ImageSize output_size;
   LayerNumbers plain, doubled;
-  Image input, small;
+  ChannelImage input, small;
   WinogradConvolution convolution;
 };
 
@@ -169,7 +106,7 @@ TEST(WinogradConvolution, EqualsThePlainOneOfEverySizeAndNumberOfChannels) {
   for (const LayerCase& one : layer_cases()) {
     const Layer layer(one);
     for (const bool add : {false, true}) {
-      const Image output = layer.result(0.75f, add);
+      const ChannelImage output = layer.result(0.75f, add);
       for (int y = 0; y < layer.output_size.height; ++y) {
         for (int x = 0; x < layer.output_size.width; ++x) {
           for (int channel = 0; channel < one.out; channel += 5) {  // of every lane some
@@ -191,10 +128,10 @@ TEST(WinogradConvolution, OfSomeRowsOfTilesIsTheSameBitForBit) {
                                {16, 32, 2, false, {21, 95}},
                                {8, 16, 1, false, {6, 200}}}) {
     const Layer layer(one);
-    const Image whole = layer.result();
+    const ChannelImage whole = layer.result();
     for (int tiles = 0; tiles < layer.convolution.tile_rows(one.size); ++tiles) {
       const int first = 2 * tiles - (one.doubled ? 1 : 0);
-      const Image rows({2, layer.output_size.width}, one.out);
+      const ChannelImage rows({2, layer.output_size.width}, one.out);
       layer.run(tiles, tiles + 1, rows.data(), first, false);
       for (int y = std::max(first, 0); y < std::min(first + 2, layer.output_size.height); ++y) {
         EXPECT_EQ(std::memcmp(&rows.at(y - first, 0, 0), &whole.at(y, 0, 0),
@@ -220,7 +157,7 @@ TEST(WinogradConvolution, WhatIsNotFiniteReachesAllThatSeesItAlone) {
              {std::pair{0, 0}, {3, 2}, {size.height - 1, size.width - 1}}) {
           const Layer layer(one);
           (in_small ? layer.small : layer.input).at(bad_y, bad_x, 5) = bad;
-          const Image output = layer.result();
+          const ChannelImage output = layer.result();
           const auto sees = [&](int y, int x) {
             return y >= 0 && x >= 0 && y < layer.output_size.height &&
                    x < layer.output_size.width && !std::isfinite(layer.expected(y, x, 3, 0));
@@ -232,85 +169,6 @@ TEST(WinogradConvolution, WhatIsNotFiniteReachesAllThatSeesItAlone) {
             }
           }
         }
-      }
-    }
-  }
-}
-
-TEST(HeadConvolution, EqualsThePlainOneOfEverySize) {
-  EVENTGAN_AVX2_OR_SKIP();
-  for (const int in : {2, 3}) {
-    for (const int out : {8, 24}) {
-      const LayerNumbers head = winograd_layer(out, in, 3, 7);
-      const HeadConvolution convolution(head);
-      for (const ImageSize size :
-           {ImageSize{1, 1}, {1, 2}, {2, 12}, {5, 13}, {7, 11}, {3, 50}, {40, 1}}) {
-        const auto planes = winograd_numbers(in * size.pixel_count(), 3);
-        const Image output(size, out);
-        const PageBuffer buffer(convolution.buffer_bytes(size));
-        std::memset(buffer.data(), 0xff, buffer.size_bytes());
-        convolution.run(planes.data(), size, output.data(), buffer.data());
-        for (int y = 0; y < size.height; ++y) {
-          for (int x = 0; x < size.width; ++x) {
-            for (int o = 0; o < out; ++o) {
-              double sum = head.bias[o];
-              for (int i = 0; i < in * 9; ++i) {
-                const int row = y + i % 9 / 3 - 1, column = x + i % 3 - 1;
-                if (row < 0 || column < 0 || row >= size.height || column >= size.width) continue;
-                sum += double(head.weight[o * in * 9 + i]) *
-                       planes[(i / 9 * size.height + row) * size.width + column];
-              }
-              ASSERT_NEAR(output.at(y, x, o), sum > 0 ? sum : sum * kLeakySlope, 1e-5)
-                  << to_string(size) << " at " << y << ", " << x << ", " << o;
-            }
-          }
-        }
-      }
-    }
-  }
-}
-
-TEST(PlanePrediction, EqualsThePlainOneOfEveryWidth) {
-  EVENTGAN_AVX2_OR_SKIP();
-  constexpr float kUntouched = -7;
-  for (const int in : {8, 24}) {
-    for (const int out : {2, 18}) {
-      const LayerNumbers pred = winograd_layer(out, in, 1, 9);
-      const PlanePrediction prediction(pred);
-      const PageBuffer buffer(prediction.buffer_bytes());
-      for (const int width : {1, 8, 31, 32, 33, 100}) {
-        const Image pixels = random_image({1, width + PlanePrediction::kPixels}, in, 4);
-        const ImageSize size{3, width};
-        std::vector<float> volume(out * size.pixel_count(), kUntouched);
-        EXPECT_TRUE(prediction.run(pixels.data(), size, 1, 0, width, volume.data(), buffer.data()));
-        for (std::size_t i = 0; i < volume.size(); ++i) {
-          const int x = int(i) % width, o = int(i) / (3 * width);
-          double sum = pred.bias[o];
-          for (int c = 0; c < in; ++c) sum += double(pred.weight[o * in + c]) * pixels.at(0, x, c);
-          const bool row = int(i) / width % 3 == 1;
-          ASSERT_NEAR(volume[i], row ? std::max(sum, 0.0) : kUntouched, 1e-5) << width << " " << i;
-        }
-      }
-    }
-  }
-}
-
-TEST(PlanePrediction, KeepsNanAndSaysWhetherAllIsFinite) {
-  EVENTGAN_AVX2_OR_SKIP();
-  const ImageSize size{1, 50};
-  const PlanePrediction prediction(winograd_layer(4, 8, 1, 9));
-  const PageBuffer buffer(prediction.buffer_bytes());
-  for (const float bad : kBadNumbers) {
-    for (const int x : {0, 31, 32, 49}) {
-      const Image pixels = random_image({1, size.width + PlanePrediction::kPixels}, 8, 4);
-      pixels.at(0, x, 6) = bad;
-      std::vector<float> volume(4 * size.pixel_count());
-      EXPECT_FALSE(
-          prediction.run(pixels.data(), size, 0, 0, size.width, volume.data(), buffer.data()))
-          << x;
-      for (std::size_t i = 0; i < volume.size(); ++i) {
-        EXPECT_EQ(std::isnan(volume[i]), std::isnan(bad) && int(i % 50) == x) << i;
-        EXPECT_FALSE(volume[i] < 0) << i;
       }
     }
   }

@@ -12,6 +12,7 @@
 
 #include "manifests/values/job.h"
 #include "stages/generator/onednn/layer_numbers.h"
+#include "stages/generator/onednn/plane_layers.h"
 #include "stages/generator/onednn/winograd.h"
 #include "stages/generator/weights.h"
 
