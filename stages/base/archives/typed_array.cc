@@ -42,9 +42,9 @@ using Json = nlohmann::ordered_json;
 Json element(const TypedArray& array, std::size_t index) {
   return std::visit(
       [index](const auto& elements) -> Json {
-        using Element = typename std::decay_t<decltype(elements)>::value_type;
-        const Element value = elements[index];
-        if constexpr (std::is_floating_point_v<Element>) {
+        using Value = typename std::decay_t<decltype(elements)>::value_type;
+        const Value value = elements[index];
+        if constexpr (std::is_floating_point_v<Value>) {
           if (!std::isfinite(value)) return nullptr;
           return static_cast<double>(value);
         } else {

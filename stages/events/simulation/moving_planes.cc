@@ -93,12 +93,12 @@ int steps_for(const PlaneScene& scene) {
   constexpr double kStepPx = 0.7;
   constexpr double kStepRateHz = 500;  // for what changes without motion, where it is cheap
   constexpr double kCheapSteps = 16;
-  constexpr double kMostSteps = 64;
+  constexpr double kMostPlaneSteps = 64;
   double steps = std::min(scene.duration_s * kStepRateHz, kCheapSteps);
   for (const Plane& plane : scene.planes) {
     steps = std::max(steps, largest_way_px(plane, scene.size) / kStepPx);
   }
-  return static_cast<int>(std::clamp(std::ceil(steps), 1.0, kMostSteps));
+  return static_cast<int>(std::clamp(std::ceil(steps), 1.0, kMostPlaneSteps));
 }
 
 /// Linear intensity by grey value, not scaled.
@@ -142,14 +142,14 @@ cv::Mat cut_texture(const GreyImage& image, const PlaneTexture& texture, cv::Siz
 /// The inside of a polygon, 0..1, [y, x] CV_32FC1; `origin` is the place of the first pixel.
 cv::Mat draw_mask(const std::vector<PlanePoint>& outline, PlanePoint origin, cv::Size size,
                   double blur_px) {
-  constexpr int kShift = 4;  // corners in 1/16 px
+  constexpr int kCornerBits = 4;  // corners in 1/16 px
   std::vector<cv::Point> corners;
   for (const PlanePoint& corner : outline) {
-    corners.emplace_back(cvRound((corner.x - origin.x) * (1 << kShift)),
-                         cvRound((corner.y - origin.y) * (1 << kShift)));
+    corners.emplace_back(cvRound((corner.x - origin.x) * (1 << kCornerBits)),
+                         cvRound((corner.y - origin.y) * (1 << kCornerBits)));
   }
   cv::Mat mask(size, CV_8UC1, cv::Scalar(0));
-  cv::fillPoly(mask, std::vector{corners}, cv::Scalar(255), cv::LINE_AA, kShift);
+  cv::fillPoly(mask, std::vector{corners}, cv::Scalar(255), cv::LINE_AA, kCornerBits);
   cv::Mat result;
   mask.convertTo(result, CV_32F, 1 / 255.0);
   if (blur_px > 0) cv::GaussianBlur(result, result, cv::Size(), blur_px);

@@ -59,7 +59,19 @@ constexpr std::array<MotClass, 12> kVisDroneClasses = {{{"ignored regions", true
                                                         {"motor"},
                                                         {"others"}}};
 
-enum { kFrame, kId, kLeft, kTop, kWidth, kHeight, kConf, kClass, kTruncation, kOcclusion, kMost };
+enum {
+  kMotFrame,
+  kMotId,
+  kMotLeft,
+  kMotTop,
+  kMotWidth,
+  kMotHeight,
+  kMotConf,
+  kMotClass,
+  kMotTruncation,
+  kMotOcclusion,
+  kMotMost
+};
 
 double number(std::string_view column, const char* expected, double least, double most) {
   const auto value = parse_number<double>(column);
@@ -84,35 +96,36 @@ std::size_t class_of(std::string_view column, int first, std::size_t count) {
 /// Adds the box of a row to its frame.
 void add_row(const std::vector<std::string_view>& columns, const MotForm& form,
              ImageLabels& labels) {
-  if (columns.size() <= kConf || columns.size() > kMost) {
+  if (columns.size() <= kMotConf || columns.size() > kMotMost) {
     throw BadLabel("expected 7 to 10 columns, got " + std::to_string(columns.size()));
   }
-  const bool is_of_2015 = columns.size() == kMost && !columns.back().empty();
+  const bool is_of_2015 = columns.size() == kMotMost && !columns.back().empty();
   NamedBox read;
   Box& box = read.box;
   constexpr std::int64_t kMostId = std::int64_t{1} << 53;
-  box.track_id = whole(columns[kId], "an id from 0, or -1", -1, kMostId);
+  box.track_id = whole(columns[kMotId], "an id from 0, or -1", -1, kMostId);
   if (box.track_id < 0) labels.remarks.push_back("id -1 taken for none");
   if (box.track_id == 0 && !form.is_visdrone) labels.remarks.push_back("id 0 taken as it is");
   const auto pixel = [&](std::size_t column, const char* expected) {
     return number(columns[column], expected, -kFarthest_px, kFarthest_px);
   };
-  box.xyxy.left = pixel(kLeft, "a number of pixels for bb_left") - form.edges_from;
-  box.xyxy.top = pixel(kTop, "a number of pixels for bb_top") - form.edges_from;
-  box.xyxy.right = box.xyxy.left + pixel(kWidth, "a number of pixels for bb_width");
-  box.xyxy.bottom = box.xyxy.top + pixel(kHeight, "a number of pixels for bb_height");
-  const bool is_unknown = parse_number<double>(columns[kConf]) == -1;
-  const double conf = is_unknown ? 1 : number(columns[kConf], "a conf from 0 to 1", 0, 1);
+  box.xyxy.left = pixel(kMotLeft, "a number of pixels for bb_left") - form.edges_from;
+  box.xyxy.top = pixel(kMotTop, "a number of pixels for bb_top") - form.edges_from;
+  box.xyxy.right = box.xyxy.left + pixel(kMotWidth, "a number of pixels for bb_width");
+  box.xyxy.bottom = box.xyxy.top + pixel(kMotHeight, "a number of pixels for bb_height");
+  const bool is_unknown = parse_number<double>(columns[kMotConf]) == -1;
+  const double conf = is_unknown ? 1 : number(columns[kMotConf], "a conf from 0 to 1", 0, 1);
   if (is_unknown) labels.remarks.push_back("conf -1 taken for 1");
   MotClass mot = kClasses[0];
   if (form.is_visdrone) {
-    mot = kVisDroneClasses[class_of(columns[kClass], 0, kVisDroneClasses.size())];
-    box.truncation = static_cast<float>(whole(columns[kTruncation], "0 or 1 as truncation", 0, 1));
-    box.occlusion = static_cast<int>(whole(columns[kOcclusion], "0, 1 or 2 as occlusion", 0, 2));
-  } else if (!form.class_names.empty() && columns.size() > kClass) {
-    mot = {form.class_names[class_of(columns[kClass], 1, form.class_names.size())]};
-  } else if (columns.size() > kClass && !is_of_2015) {
-    mot = kClasses[class_of(columns[kClass], 1, kClasses.size())];
+    mot = kVisDroneClasses[class_of(columns[kMotClass], 0, kVisDroneClasses.size())];
+    box.truncation =
+        static_cast<float>(whole(columns[kMotTruncation], "0 or 1 as truncation", 0, 1));
+    box.occlusion = static_cast<int>(whole(columns[kMotOcclusion], "0, 1 or 2 as occlusion", 0, 2));
+  } else if (!form.class_names.empty() && columns.size() > kMotClass) {
+    mot = {form.class_names[class_of(columns[kMotClass], 1, form.class_names.size())]};
+  } else if (columns.size() > kMotClass && !is_of_2015) {
+    mot = kClasses[class_of(columns[kMotClass], 1, kClasses.size())];
   }
   read.class_name = mot.name;
   box.ignore = conf == 0 || mot.ignore;
@@ -179,16 +192,16 @@ bool is_visdrone_table(std::string_view text) {
   CsvReader reader(text);
   bool has_class = false;
   while (const std::optional<CsvRecord> line = reader.next()) {
-    if (!line->fault.empty() || line->fields.size() != kMost) return false;
+    if (!line->fault.empty() || line->fields.size() != kMotMost) return false;
     const auto is_up_to = [&](std::size_t column, std::int64_t most) {
       const auto value = parse_whole(line->fields[column]);
       return value && *value >= 0 && *value <= most;
     };
-    if (!is_up_to(kClass, std::ssize(kVisDroneClasses) - 1) || !is_up_to(kTruncation, 1) ||
-        !is_up_to(kOcclusion, 2)) {
+    if (!is_up_to(kMotClass, std::ssize(kVisDroneClasses) - 1) || !is_up_to(kMotTruncation, 1) ||
+        !is_up_to(kMotOcclusion, 2)) {
       return false;
     }
-    has_class = has_class || !is_up_to(kClass, 0);
+    has_class = has_class || !is_up_to(kMotClass, 0);
   }
   return has_class;
 }
@@ -202,7 +215,7 @@ std::map<std::int64_t, Outcome<ImageLabels>> parse_mot_labels(std::string_view t
   while (const std::optional<CsvRecord> line = reader.next()) {
     const std::string place = place_in_file(path, line->line);
     if (!line->fault.empty()) throw InputError(line->fault + ", in " + place);
-    const auto frame = parse_whole(line->fields[kFrame]);
+    const auto frame = parse_whole(line->fields[kMotFrame]);
     if (!frame || *frame < 1 || *frame > kMaxFrameNumber) {
       throw InputError("expected a frame number from 1, got " + in_quotes(line->fields[0]) +
                        ", in " + place);

@@ -45,7 +45,7 @@ bool may_have_images(const std::string& folder) {
 
 /// Columns that say nothing of what an image shows.
 bool is_of_files(std::string_view header) {
-  static const std::set<std::string> kColumns{
+  static const std::set<std::string> kFileColumns{
       "image", "image_id", "filename", "file_name", "file",   "name",  "path",      "id",
       "width", "height",   "channels", "mode",      "size",   "bytes", "sequence",  "clip",
       "video", "index",    "frame",    "frame_id",  "number", "time",  "timestamp", "date",
@@ -55,7 +55,7 @@ bool is_of_files(std::string_view header) {
   const auto row = reader.next();
   return row && row->fields.size() > 1 &&
          std::ranges::all_of(row->fields, [](std::string_view field) {
-           return kColumns.contains(std::string(trimmed(field)));
+           return kFileColumns.contains(std::string(trimmed(field)));
          });
 }
 

@@ -42,7 +42,7 @@ struct PacketHeader {
 };
 static_assert(sizeof(PacketHeader) == 28, "it is copied as it is stored");
 
-enum PacketType : std::uint16_t { kPolarity = 1, kFrame = 2, kPacked = 0x8000 };
+enum PacketType : std::uint16_t { kPolarityPacket = 1, kFrame = 2, kPacked = 0x8000 };
 
 struct PolarityEvent {
   std::uint32_t data = 0;
@@ -222,7 +222,7 @@ class Aedat3File {
                                     cut, name(), byte));
         break;
       }
-      if (header.type == kPolarity) {
+      if (header.type == kPolarityPacket) {
         events_[header.source].push_back(packet);
       } else if (header.type == kFrame) {
         frames_[header.source].push_back(packet);
@@ -243,9 +243,9 @@ class Aedat3File {
     if ((header.type & kPacked) != 0) {
       refuse("expected packets as they are (\"#Format: RAW\"), got packed ones", byte);
     }
-    const bool fits = header.type == kPolarity ? header.event_bytes == sizeof(PolarityEvent)
-                      : header.type == kFrame  ? header.event_bytes >= sizeof(FrameHeader)
-                                               : header.event_bytes > 0;
+    const bool fits = header.type == kPolarityPacket ? header.event_bytes == sizeof(PolarityEvent)
+                      : header.type == kFrame        ? header.event_bytes >= sizeof(FrameHeader)
+                                                     : header.event_bytes > 0;
     if (fits && header.event_bytes <= kMostBytes && header.overflows <= kMostOverflows) return;
     refuse(fmt::format("expected a packet, got one of type {} with events of {} bytes and {} "
                        "overflows of their times",
@@ -293,7 +293,7 @@ class Aedat3Events final : public EventParts {
 StoredParts open_aedat3(const std::filesystem::path& path, const RecordingOptions& options) {
   std::vector<std::string> notes;
   const auto file = std::make_shared<const Aedat3File>(path, notes);
-  const auto& sources = file->packets(kPolarity);
+  const auto& sources = file->packets(kPolarityPacket);
   std::vector<int> numbers;
   for (const auto& [number, packets] : sources) numbers.push_back(number);
   if (numbers.empty()) numbers.push_back(options.stream.value_or(0));

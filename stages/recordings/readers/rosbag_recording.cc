@@ -221,9 +221,9 @@ class BagEvents final : public EventParts {
       return whole_us(camera_ns + *state.camera_to_ros_ns);
     };
     if (packet.encoding == "mono") {
-      constexpr std::uint64_t kTimesEnd = std::uint64_t{1} << 62;
-      if (packet.time_base_ns >= kTimesEnd) {
-        throw EventFault(fmt::format("expected a time of less than {} ns, got {}", kTimesEnd,
+      constexpr std::uint64_t kTimesEndNs = std::uint64_t{1} << 62;
+      if (packet.time_base_ns >= kTimesEndNs) {
+        throw EventFault(fmt::format("expected a time of less than {} ns, got {}", kTimesEndNs,
                                      packet.time_base_ns));
       }
       while (!words.empty()) {
@@ -339,9 +339,9 @@ using BagFrames = PlacedFrames<FramePlace>;
 
 std::unique_ptr<BagFrames> frames_in(const std::shared_ptr<const RosbagFile>& bag, ImageSize size) {
   using Chunks = RecentlyUsed<std::int64_t, std::shared_ptr<const std::string>>;
-  constexpr std::int64_t kMostBytes = 1 << 24;
+  constexpr std::int64_t kMostKeptBytes = 1 << 24;
   const auto chunks = std::make_shared<Chunks>(
-      kMostBytes, [](const auto& content) { return std::ssize(*content); });
+      kMostKeptBytes, [](const auto& content) { return std::ssize(*content); });
   return std::make_unique<BagFrames>(bag->name(), [bag, size, chunks](const FramePlace& place) {
     const auto content = chunks->get(
         place.chunk, [&] { return std::make_shared<const std::string>(bag->chunk(place.chunk)); });

@@ -10,10 +10,10 @@ using ::testing::ElementsAre;
 using ::testing::Optional;
 
 // Two bins of 2 x 3 pixels: channel c has the value c + 1 in pixel c, and pixel 5 has 0.1 in all.
-const VolumeShape kShape{2, {2, 3}};
+const VolumeShape kPlacesShape{2, {2, 3}};
 
 std::vector<float> volume() {
-  std::vector<float> values(kShape.value_count(), 0.0f);
+  std::vector<float> values(kPlacesShape.value_count(), 0.0f);
   for (std::size_t channel = 0; channel < 4; ++channel) {
     values[channel * 6 + channel] = static_cast<float>(channel + 1);
     values[channel * 6 + 5] = 0.125f;
@@ -22,9 +22,9 @@ std::vector<float> volume() {
 }
 
 TEST(EventPlaces, AreSumsOfChannelsAndTheMaskHasPixelsThatSumToEnough) {
-  EXPECT_THAT(channel_sums(volume(), kShape), ElementsAre(1.125, 2.125, 3.125, 4.125));
-  EXPECT_THAT(event_mask(volume(), kShape, 0.5), ElementsAre(1, 1, 1, 1, 0, 1));
-  EXPECT_THAT(event_mask(volume(), kShape, 1.5), ElementsAre(0, 1, 1, 1, 0, 0));
+  EXPECT_THAT(channel_sums(volume(), kPlacesShape), ElementsAre(1.125, 2.125, 3.125, 4.125));
+  EXPECT_THAT(event_mask(volume(), kPlacesShape, 0.5), ElementsAre(1, 1, 1, 1, 0, 1));
+  EXPECT_THAT(event_mask(volume(), kPlacesShape, 1.5), ElementsAre(0, 1, 1, 1, 0, 0));
 }
 
 TEST(EventPlaces, APixelBelongsToTheBoxItsCentreLiesIn) {

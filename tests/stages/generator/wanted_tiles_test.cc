@@ -15,14 +15,14 @@ namespace {
 using ::testing::Each;
 using ::testing::ElementsAre;
 
-constexpr ImageSize kSize{32, 48};  // 2 x 3 tiles of 16
+constexpr ImageSize kTiledSize{32, 48};  // 2 x 3 tiles of 16
 
-std::vector<float> still_frames(ImageSize size = kSize) {
+std::vector<float> still_frames(ImageSize size = kTiledSize) {
   return std::vector<float>(2 * size.pixel_count(), 0.25f);
 }
 
 /// Two frames that differ by so many grey levels in one pixel.
-std::vector<float> one_pixel(int y, int x, double grey_levels, ImageSize size = kSize) {
+std::vector<float> one_pixel(int y, int x, double grey_levels, ImageSize size = kTiledSize) {
   std::vector<float> frames = still_frames(size);
   frames[size.pixel_count() + static_cast<std::size_t>(y) * size.width + x] +=
       static_cast<float>(grey_levels / 127.5);
@@ -36,7 +36,7 @@ ScopeSpec scope_of(Scope scope) {
 }
 
 std::vector<std::uint8_t> moving(const std::vector<float>& frames) {
-  return wanted_tiles(scope_of(Scope::kMotion), frames, kSize, 0, 0, {}).wanted;
+  return wanted_tiles(scope_of(Scope::kMotion), frames, kTiledSize, 0, 0, {}).wanted;
 }
 
 TEST(WantedTiles, AreThoseThatAPixelThatMovesIsInOrNear) {
@@ -77,7 +77,7 @@ TEST(WantedTiles, AreAroundLabels) {
   ScopeSpec scope = scope_of(Scope::kLabelsOnly);
   scope.label_margin_px = 2;
   const auto wanted = [&](const VolumeLabels& labels) {
-    return wanted_tiles(scope, one_pixel(8, 8, 99), kSize, 0, 0, labels).wanted;
+    return wanted_tiles(scope, one_pixel(8, 8, 99), kTiledSize, 0, 0, labels).wanted;
   };
   EXPECT_THAT(wanted({}), Each(0));
   EXPECT_THAT(wanted(box_labels({20, 20, 28, 28})), ElementsAre(0, 0, 0, 0, 1, 0));

@@ -9,14 +9,14 @@ namespace {
 using testing::pose_xml;
 using testing::tracklet_xml;
 
-const std::string kFirst = "2011_09_26/2011_09_26_drive_0001_sync";
+const std::string kFirstDrive = "2011_09_26/2011_09_26_drive_0001_sync";
 const std::string kSecond = "2011_09_28/2011_09_28_drive_0002_sync";
 
 /// Two drives of two days with frames 0..2.
 class KittiRawDatasetTest : public FolderTest {
  protected:
   KittiRawDatasetTest() {
-    for (const std::string& drive : {kSecond, kFirst}) {
+    for (const std::string& drive : {kSecond, kFirstDrive}) {
       for (const int number : {0, 1, 2}) add(image(drive, number));
     }
     spec_.root = "raw";
@@ -29,7 +29,7 @@ class KittiRawDatasetTest : public FolderTest {
     write("raw/" + path, text);
   }
   void add_tracklets(const std::string& tracklets) const {
-    add(kFirst + "/tracklet_labels.xml", testing::tracklets_xml(tracklets));
+    add(kFirstDrive + "/tracklet_labels.xml", testing::tracklets_xml(tracklets));
   }
 
   /// A car before the camera in frame 1 of the first drive, another behind it in frames 1 and 2.
@@ -62,8 +62,8 @@ TEST_F(KittiRawDatasetTest, EveryImageIsALabelledFrame) {
 
 TEST_F(KittiRawDatasetTest, PairedFramesStayInTheDrive) {
   EXPECT_THAT(paired(*open(), 2, {-2, 0, 1}),
-              ElementsAre("present raw/" + image(kFirst, 0) + " 0",
-                          "present raw/" + image(kFirst, 2) + " 2", "beyond"));
+              ElementsAre("present raw/" + image(kFirstDrive, 0) + " 0",
+                          "present raw/" + image(kFirstDrive, 2) + " 2", "beyond"));
 }
 
 TEST_F(KittiRawDatasetTest, WithoutTrackletsAnnotationsAreEmpty) {
@@ -78,7 +78,7 @@ TEST_F(KittiRawDatasetTest, TrackletsBecomeBoxesThroughTheCalibration) {
   const auto dataset = open();
   EXPECT_EQ(annotation_of(*dataset, 0).original, "[]");
   EXPECT_EQ(dataset->label_place(dataset->labelled_frames()[1].label_key),
-            "raw/" + kFirst + "/tracklet_labels.xml#1");
+            "raw/" + kFirstDrive + "/tracklet_labels.xml#1");
   const Annotation seen = annotation_of(*dataset, 1);
   // The rear is 10 m away, 1 m wide and from 1 m below to 1 m above: see raw_fixture.h. The van is
   // behind the camera.
@@ -87,8 +87,8 @@ TEST_F(KittiRawDatasetTest, TrackletsBecomeBoxesThroughTheCalibration) {
   EXPECT_THAT(annotation_of(*dataset, 2).boxes, IsEmpty());
   EXPECT_THAT(
       dataset->annotation_files(),
-      ElementsAre("raw/" + kFirst + "/tracklet_labels.xml", "raw/2011_09_26/calib_cam_to_cam.txt",
-                  "raw/2011_09_26/calib_velo_to_cam.txt",
+      ElementsAre("raw/" + kFirstDrive + "/tracklet_labels.xml",
+                  "raw/2011_09_26/calib_cam_to_cam.txt", "raw/2011_09_26/calib_velo_to_cam.txt",
                   "raw/" + kSecond + "/image_02/timestamps.txt"));
   EXPECT_THAT(dataset->notes(), IsEmpty());
 }
@@ -107,31 +107,31 @@ TEST_F(KittiRawDatasetTest, TrackletsBeyondTheImagesAreNoted) {
   const auto dataset = open();
   EXPECT_THAT(dataset->labelled_frames(), SizeIs(6));
   EXPECT_THAT(dataset->notes(), ElementsAre("1 frame beyond the drive's images left out in raw/" +
-                                            kFirst + "/tracklet_labels.xml"));
+                                            kFirstDrive + "/tracklet_labels.xml"));
 }
 
 TEST_F(KittiRawDatasetTest, ATrackletsFrameWithoutImageInsideADriveIsMissing) {
   add_car_and_van();  // frames 1 and 2
   add_calibration();
-  add(image(kFirst, 3));
-  fs::remove(at("raw/" + image(kFirst, 2)));
+  add(image(kFirstDrive, 3));
+  fs::remove(at("raw/" + image(kFirstDrive, 2)));
   fs::remove(at("raw/" + image(kSecond, 1)));
   const auto dataset = open();
   // Of the second drive's missing frame nothing is labelled.
   ASSERT_THAT(dataset->labelled_frames(), SizeIs(4 + 2));
   EXPECT_EQ(dataset->labelled_frames()[2].sample_id, "2011_09_26_drive_0001_sync/0000000002");
-  EXPECT_EQ(dataset->labelled_frames()[2].label_key, kFirst + "#2");
-  EXPECT_THAT(paired(*dataset, 2, {0}), ElementsAre("missing raw/" + image(kFirst, 2) + " 2"));
+  EXPECT_EQ(dataset->labelled_frames()[2].label_key, kFirstDrive + "#2");
+  EXPECT_THAT(paired(*dataset, 2, {0}), ElementsAre("missing raw/" + image(kFirstDrive, 2) + " 2"));
   EXPECT_THAT(dataset->notes(), IsEmpty());
 }
 
 TEST_F(KittiRawDatasetTest, DamagedTimestampsAreAFaultOfTheirDrivesFrames) {
-  add(kFirst + "/image_02/timestamps.txt",
+  add(kFirstDrive + "/image_02/timestamps.txt",
       "2011-09-26 13:00:01\n2011-09-26 13:00:00\n2011-09-26 13:00:02\n");
   const auto dataset = open();
   const std::string fault =
-      "expected a time after '2011-09-26 13:00:01', got '2011-09-26 13:00:00', in raw/" + kFirst +
-      "/image_02/timestamps.txt:2";
+      "expected a time after '2011-09-26 13:00:01', got '2011-09-26 13:00:00', in raw/" +
+      kFirstDrive + "/image_02/timestamps.txt:2";
   EXPECT_THAT(faults_of(*dataset), ElementsAre(fault, fault, fault, "", "", ""));
   EXPECT_THAT(dataset->notes(),
               ElementsAre("no frame of 2011_09_26_drive_0001_sync can be used: " + fault));
@@ -139,29 +139,30 @@ TEST_F(KittiRawDatasetTest, DamagedTimestampsAreAFaultOfTheirDrivesFrames) {
 
 TEST_F(KittiRawDatasetTest, FilesAndFoldersLeftOutAreCountedAndNamed) {
   for (const std::string& path :
-       {kFirst + "/image_02/data/left.png", kFirst + "/image_02/data/0000000001.jpg",
+       {kFirstDrive + "/image_02/data/left.png", kFirstDrive + "/image_02/data/0000000001.jpg",
         "2011_09_26/2011_09_26_drive_0001_extract/image_02/data/0.png"s, "devkit/readme.txt"s}) {
     add(path);
   }
   const auto dataset = open();
   EXPECT_THAT(dataset->labelled_frames(), SizeIs(6));
-  EXPECT_THAT(
-      dataset->notes(),
-      ElementsAre("1 folder without a drive's name left out in raw/2011_09_26: "
-                  "2011_09_26_drive_0001_extract",
-                  "2 files left out in raw/" + kFirst + "/image_02/data: 0000000001.jpg, left.png",
-                  "1 folder without a date's name left out in raw: devkit"));
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("1 folder without a drive's name left out in raw/2011_09_26: "
+                          "2011_09_26_drive_0001_extract",
+                          "2 files left out in raw/" + kFirstDrive +
+                              "/image_02/data: 0000000001.jpg, left.png",
+                          "1 folder without a date's name left out in raw: devkit"));
 }
 
 TEST_F(KittiRawDatasetTest, AMalformedTrackletIsAFaultOfItsFrame) {
   add_tracklets(tracklet_xml("Car", "1", pose_xml("x")));
-  EXPECT_THAT(fault_of(open()->annotation(kFirst + "#1")),
-              HasSubstr("in raw/" + kFirst + "/tracklet_labels.xml (tracklet 0)"));
+  EXPECT_THAT(fault_of(open()->annotation(kFirstDrive + "#1")),
+              HasSubstr("in raw/" + kFirstDrive + "/tracklet_labels.xml (tracklet 0)"));
 }
 
 TEST_F(KittiRawDatasetTest, AKeyOfAnotherFormIsAFault) {
   const auto dataset = open();
-  for (const std::string& key : {""s, kFirst, kFirst + "#", kFirst + "#x", "a/b#1"s}) {
+  for (const std::string& key :
+       {""s, kFirstDrive, kFirstDrive + "#", kFirstDrive + "#x", "a/b#1"s}) {
     EXPECT_THAT(fault_of(dataset->annotation(key)), HasSubstr("expected")) << key;
   }
 }
@@ -184,14 +185,16 @@ TEST(KittiRawData, RealDriveHasTwentyOneFrames) {
 }
 
 TEST_F(KittiRawDatasetTest, UnreadableTrackletsAreAFaultOfTheirDriveAloneAndNotNone) {
-  fs::create_symlink("tracklet_labels.xml", folder_ / ("raw/" + kFirst + "/tracklet_labels.xml"));
+  fs::create_symlink("tracklet_labels.xml",
+                     folder_ / ("raw/" + kFirstDrive + "/tracklet_labels.xml"));
   const auto dataset = open();
   for (const LabelledFrame& frame : dataset->labelled_frames()) {
-    EXPECT_EQ(is_fault(dataset->annotation(frame.label_key)), frame.label_key.starts_with(kFirst))
+    EXPECT_EQ(is_fault(dataset->annotation(frame.label_key)),
+              frame.label_key.starts_with(kFirstDrive))
         << frame.sample_id;
   }
-  EXPECT_THAT(fault_of(dataset->annotation(kFirst + "#1")),
-              HasSubstr("'Too many levels of symbolic links', in raw/" + kFirst));
+  EXPECT_THAT(fault_of(dataset->annotation(kFirstDrive + "#1")),
+              HasSubstr("'Too many levels of symbolic links', in raw/" + kFirstDrive));
 }
 
 }  // namespace

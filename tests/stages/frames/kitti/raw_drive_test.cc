@@ -65,8 +65,8 @@ TEST(Timestamps, ALastLineThatIsCutShortIsAFault) {
   }
 }
 
-const std::string kFolder = "2011_09_26/2011_09_26_drive_0052_sync";
-const std::string kDriveData = "raw/" + kFolder + "/image_02/data/000000000";
+const std::string kDriveFolder = "2011_09_26/2011_09_26_drive_0052_sync";
+const std::string kDriveData = "raw/" + kDriveFolder + "/image_02/data/000000000";
 
 /// Frames 0, 2 and 4.
 class RawDriveTest : public FolderTest {
@@ -74,10 +74,10 @@ class RawDriveTest : public FolderTest {
   RawDriveTest() { touch({kDriveData + "0.png", kDriveData + "2.png", kDriveData + "4.png"}); }
 
   void write_timestamps(const std::string& text) const {
-    write("raw/" + kFolder + "/image_02/timestamps.txt", text);
+    write("raw/" + kDriveFolder + "/image_02/timestamps.txt", text);
   }
 
-  RawDrive open() const { return {SourceRoot("raw", folder_.path()), kFolder}; }
+  RawDrive open() const { return {SourceRoot("raw", folder_.path()), kDriveFolder}; }
 };
 
 TEST_F(RawDriveTest, FindsAFrameByItsNumber) {
@@ -107,7 +107,7 @@ TEST_F(RawDriveTest, TimesComeFromTheTimestamps) {
       "2011-09-26 13:02:25\n2011-09-26 13:02:26\n2011-09-26 13:02:28\n2011-09-26 13:02:29\n"
       "2011-09-26 13:02:31\n");
   const RawDrive drive = open();
-  EXPECT_EQ(drive.timestamps_path(), "raw/" + kFolder + "/image_02/timestamps.txt");
+  EXPECT_EQ(drive.timestamps_path(), "raw/" + kDriveFolder + "/image_02/timestamps.txt");
   EXPECT_EQ(drive.fault(), "");
   EXPECT_EQ(drive.frame(2).frame.time_s, 3);
   EXPECT_EQ(drive.frame(4).frame.time_s, 6);
@@ -115,7 +115,7 @@ TEST_F(RawDriveTest, TimesComeFromTheTimestamps) {
 }
 
 TEST_F(RawDriveTest, DamagedTimestampsAreAFaultOfTheDriveAndItsTimesUnknown) {
-  const std::string place = ", in raw/" + kFolder + "/image_02/timestamps.txt";
+  const std::string place = ", in raw/" + kDriveFolder + "/image_02/timestamps.txt";
   const std::string four =
       "2011-09-26 13:02:25\n2011-09-26 13:02:26\n2011-09-26 13:02:28\n2011-09-26 13:02:29\n";
   const std::pair<std::string, std::string> damaged[] = {

@@ -11,12 +11,12 @@ constexpr ImageSize kYoloImage{30, 40};
 
 YoloSchema classes() { return parse_yolo_classes("cat\ndog\n", "classes.txt"); }
 
-Outcome<Annotation> parse(const std::string& text, const YoloSchema& schema = classes()) {
+Outcome<Annotation> parse_yolo(const std::string& text, const YoloSchema& schema = classes()) {
   return parse_yolo_text(text, schema, kYoloImage, "a.txt");
 }
 
 Annotation read_yolo(const std::string& text, const YoloSchema& schema = classes()) {
-  const auto read = parse(text, schema);
+  const auto read = parse_yolo(text, schema);
   EXPECT_EQ(fault_of(read), "no fault");
   return is_fault(read) ? Annotation() : *read;
 }
@@ -27,7 +27,7 @@ TEST(YoloText, ABoxIsCentreAndSizeAsShares) {
                                          {Box{.class_id = 1, .xyxy = {15, 12, 25, 18}},
                                           Box{.class_id = 0, .xyxy = {-10, 15, 10, 45}}},
                                          {}}));
-  EXPECT_EQ(fault_of(parse("")), "no fault");
+  EXPECT_EQ(fault_of(parse_yolo("")), "no fault");
 }
 
 // Of 40 x 30: 1.01 is 40.4 and 30.3, -0.01 is -0.4 and -0.3.
@@ -80,7 +80,7 @@ TEST(YoloText, WhatProgramsPutAroundNumbersIsPassedOver) {
 
 TEST(YoloText, AnythingElseIsAFaultOfItsLine) {
   for (const std::string number : {"2", "-1", "0.5", "1e30"}) {
-    EXPECT_EQ(fault_of(parse("0 0.5 0.5 0.1 0.1\n" + number + " 0.5 0.5 0.1 0.1")),
+    EXPECT_EQ(fault_of(parse_yolo("0 0.5 0.5 0.1 0.1\n" + number + " 0.5 0.5 0.1 0.1")),
               "expected a class 0..1, since there are 2 names, got '" + number + "', in a.txt:2");
   }
   const std::pair<const char*, const char*> cases[] = {
@@ -97,9 +97,9 @@ TEST(YoloText, AnythingElseIsAFaultOfItsLine) {
       {"0 0.5 0.5 0.1 0.1 0.9", "expected 5 columns, got 6"},
       {"0 0.1 0.1 0.2 0.1 0.2 0.2 0.3", "expected 5 columns, or kpt_shape in data.yaml, got 8"}};
   for (const auto& [text, fault] : cases) {
-    EXPECT_EQ(fault_of(parse(text)), fault + ", in a.txt:1"s) << text;
+    EXPECT_EQ(fault_of(parse_yolo(text)), fault + ", in a.txt:1"s) << text;
   }
-  EXPECT_THAT(fault_of(parse("0 0.5 0.5 0.1 0.1\0"s)), HasSubstr("expected"));
+  EXPECT_THAT(fault_of(parse_yolo("0 0.5 0.5 0.1 0.1\0"s)), HasSubstr("expected"));
 }
 
 TEST(YoloText, PoseLinesHaveJoints) {
@@ -117,7 +117,7 @@ TEST(YoloText, PoseLinesHaveJoints) {
        {std::pair("", "expected 14 columns, got 5, in a.txt:1"),
         {" 0.25 0.5 3 0 0 0 1 0.2 1", "expected a visibility 0, 1 or 2, got '3', in a.txt:1"},
         {" 0.25 1.5 1 0 0 0 1 0.2 1", "expected a share 0..1, got '1.5', in a.txt:1"}}) {
-    EXPECT_EQ(fault_of(parse("0 0.5 0.5 1 1"s + more, schema)), fault);
+    EXPECT_EQ(fault_of(parse_yolo("0 0.5 0.5 1 1"s + more, schema)), fault);
   }
 }
 

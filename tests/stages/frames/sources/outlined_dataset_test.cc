@@ -7,7 +7,7 @@
 namespace eventgan {
 namespace {
 
-constexpr ImageSize kSize{3, 5};
+constexpr ImageSize kImageSize{3, 5};
 
 /// Images with a table of boxes, and masks.
 class Outlines : public FolderTest {
@@ -19,7 +19,7 @@ class Outlines : public FolderTest {
   void add_images(const Texts& names) {
     std::string table = "image,class,left,top,right,bottom\n";
     for (const std::string& name : names) {
-      images({"images/" + name}, kSize);
+      images({"images/" + name}, kImageSize);
       table += name + ",a,0,0,2,3\n" + name + ",b,3,0,5,3\n";
     }
     write("boxes.csv", table);
@@ -27,7 +27,7 @@ class Outlines : public FolderTest {
     spec_.labels = LabelSpec{LabelFormat::kCsv, "boxes.csv"};
   }
   void write_mask(const std::string& name, const std::vector<int>& pixels,
-                  ImageSize size = kSize) const {
+                  ImageSize size = kImageSize) const {
     testing::write_index_image(at("masks/" + name), size, pixels);
   }
   std::unique_ptr<Dataset> open() const { return open_dataset(spec_, folder_.path()); }
@@ -91,7 +91,7 @@ TEST_F(Outlines, NumbersCountBoxesThatAreLeftOut) {
 }
 
 TEST_F(Outlines, BoxesKeepTheirOwn) {
-  images({"images/1.png"}, kSize);
+  images({"images/1.png"}, kImageSize);
   write("classes.txt", "a\n");
   write("labels/1.txt", "0 0 0 0.4 0 0.4 1\n0 0.8 0.5 0.4 1\n");
   spec_.root = "images";
@@ -148,7 +148,7 @@ TEST_F(Outlines, AFolderWithoutAnyIsRefused) {
 TEST_F(Outlines, ServeOtherDatasets) {
   spec_.dataset = DatasetKind::kKittiObject;
   spec_.root = "kitti";
-  images({"kitti/image_2/000003.png"}, kSize);
+  images({"kitti/image_2/000003.png"}, kImageSize);
   write("kitti/label_2/000003.txt",
         "Car 0 0 0 0 0 2 3 1 1 1 1 1 9 0\nDontCare -1 -1 -10 3 0 5 3 -1 -1 -1 -1000 -1000 -1000 "
         "-10\n");

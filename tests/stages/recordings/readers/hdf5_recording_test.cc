@@ -80,7 +80,7 @@ TEST_F(Hdf5TableTest, RefusesWhatIsNoDatasetOfNumbers) {
   }
 }
 
-const std::string kEvents = "davis/left/events";
+const std::string kHdf5Events = "davis/left/events";
 const std::string kFrames = "davis/left/image_raw";
 const std::string kTimes = "davis/left/image_raw_ts";
 const std::string kIndex = "davis/left/image_raw_event_inds";
@@ -96,7 +96,7 @@ class Hdf5RecordingTest : public ::testing::Test {
   }
   /// A cell of the events' table.
   double& cell(std::size_t event, std::size_t column) {
-    return std::get<std::vector<double>>(datasets_[kEvents].values)[4 * event + column];
+    return std::get<std::vector<double>>(datasets_[kHdf5Events].values)[4 * event + column];
   }
   /// Opening fails with all of `parts` in the message.
   void expect_refused(const std::string& expected, const std::string& got) {
@@ -145,10 +145,10 @@ TEST_F(Hdf5RecordingTest, ReadsEventsBetweenFramesOfAnyTimesAndSoManyAroundOne) 
 }
 
 TEST_F(Hdf5RecordingTest, MayHaveNoEvents) {
-  datasets_[kEvents] = {{1, 4}, std::vector<double>{0, 0, 1.75, 1}};
+  datasets_[kHdf5Events] = {{1, 4}, std::vector<double>{0, 0, 1.75, 1}};
   EXPECT_THAT(open()->events_between(0, 1), IsEmpty());
   EXPECT_EQ(open()->events_between(0, 2).size(), 1u);
-  datasets_[kEvents] = {{0, 4}, std::vector<double>{}};
+  datasets_[kHdf5Events] = {{0, 4}, std::vector<double>{}};
   datasets_[kIndex] = {{3}, std::vector<std::int64_t>{-1, -1, -1}};
   const auto empty = open();
   EXPECT_THAT(empty->events_around(1, 5, 5), IsEmpty());
@@ -169,8 +169,8 @@ TEST_F(Hdf5RecordingTest, TrustsTimesMoreThanTheEventIndex) {
 
 TEST_F(Hdf5RecordingTest, ReadsFloat32AndPolarityZero) {
   for (std::size_t i = 0; i < 7; ++i) cell(i, 3) = cell(i, 3) > 0 ? 1 : 0;
-  const auto wide = std::get<std::vector<double>>(datasets_[kEvents].values);
-  datasets_[kEvents].values = std::vector<float>(wide.begin(), wide.end());
+  const auto wide = std::get<std::vector<double>>(datasets_[kHdf5Events].values);
+  datasets_[kHdf5Events].values = std::vector<float>(wide.begin(), wide.end());
   const std::vector<Event> all = testing::small_events();
   EXPECT_EQ(open()->events_between(0, 2), (std::vector<Event>{all[2], all[3], all[4], all[5]}));
 }
@@ -243,7 +243,7 @@ TEST_F(Hdf5RecordingTest, TellsOfDamagedValuesWithTheCause) {
 }
 
 TEST_F(Hdf5RecordingTest, NamesTheDatasetThatIsMissing) {
-  for (const std::string& name : {kEvents, kFrames, kTimes}) {
+  for (const std::string& name : {kHdf5Events, kFrames, kTimes}) {
     datasets_.erase(name);
     expect_refused("a dataset", "none");
     datasets_ = testing::small_mvsec();
@@ -271,10 +271,10 @@ TEST_F(Hdf5RecordingTest, RefusesOtherShapesAndTypes) {
     expect_refused("", got);
     datasets_ = testing::small_mvsec();
   };
-  refused(kEvents, {{7, 5}, std::vector<double>(35)}, "float64 [7, 5]");
-  refused(kEvents, {{28}, std::vector<double>(28)}, "float64 [28]");
-  refused(kEvents, {{7, 4}, std::vector<std::int64_t>(28)}, "int64 [7, 4]");
-  refused(kEvents, {{1}, std::vector<std::string>{"x y t p"}}, "text [1]");
+  refused(kHdf5Events, {{7, 5}, std::vector<double>(35)}, "float64 [7, 5]");
+  refused(kHdf5Events, {{28}, std::vector<double>(28)}, "float64 [28]");
+  refused(kHdf5Events, {{7, 4}, std::vector<std::int64_t>(28)}, "int64 [7, 4]");
+  refused(kHdf5Events, {{1}, std::vector<std::string>{"x y t p"}}, "text [1]");
   refused(kFrames, {{36}, std::vector<std::uint8_t>(36)}, "uint8 [36]");
   refused(kFrames, {{3, 0, 4}, std::vector<std::uint8_t>{}}, "uint8 [3, 0, 4]");
   refused(kTimes, {{2}, std::vector<double>{1, 2}}, "float64 [2]");
