@@ -152,6 +152,8 @@ bool read_flag(const StrictValue& value) {
 
 /// The object's number in its sequence: of CocoVID, TAO and PoseTrack, of BDD100K, of CVAT. -1 if
 /// there is none, or another value.
+constexpr std::uint64_t kMostTrack = std::numeric_limits<std::int64_t>::max();
+
 std::int64_t read_track(const nlohmann::json& annotation) {
   const auto member = [](const nlohmann::json& object, const char* key) {
     const auto found = object.is_object() ? object.find(key) : object.end();
@@ -160,7 +162,12 @@ std::int64_t read_track(const nlohmann::json& annotation) {
   for (const nlohmann::json& track :
        {member(annotation, "track_id"), member(annotation, "instance_id"),
         member(member(annotation, "attributes"), "track_id")}) {
-    if (track.is_number_integer() && track >= 0) return track;
+    if (track.is_string()) {
+      const auto number = parse_whole(track.get_ref<const std::string&>());
+      if (number && *number >= 0) return *number;
+    }
+    const bool fits = !track.is_number_unsigned() || track.get<std::uint64_t>() <= kMostTrack;
+    if (track.is_number_integer() && fits && track >= 0) return track;
   }
   return Box().track_id;
 }

@@ -80,6 +80,9 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
   bool binary(nlohmann::json::binary_t&) override { return false; }  // not in JSON text
 
   bool string(std::string& value) override {
+    if (depth_ == kInEntry && is_annotation() && (key_ == "track_id" || key_ == "instance_id")) {
+      index.tracks_of_text += !value.empty() && !parse_whole(value);
+    }
     if (depth_ == kInEntry && is_image() && key_ == "file_name") {
       return set(fields_.file_name, std::move(value));
     }

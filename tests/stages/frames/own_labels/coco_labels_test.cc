@@ -469,17 +469,32 @@ TEST_F(CocoLabels, TracksAreCalledAsToolsCallThem) {
     of_one(box(1, 7, "[1, 2, 3, 4]", first) + "," + box(2, 7, "[1, 2, 5, 6]", second));
     return std::pair(annotation().boxes.at(0).track_id, annotation().boxes.at(1).track_id);
   };
-  for (const auto& [more, track] : {std::pair(R"(, "track_id": 3)", 3),
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  for (const auto& [more, track] : {std::pair(R"(, "track_id": 3)", std::int64_t{3}),
+                                    {R"(, "track_id": 9223372036854775807)", kMost},
+                                    {R"(, "track_id": 9223372036854775808)", -1},
+                                    {R"(, "track_id": 18446744073709551610)", -1},
                                     {R"(, "instance_id": 4.0)", 4},
                                     {R"(, "attributes": {"track_id": 0})", 0},
                                     {R"(, "track_id": null, "instance_id": 5)", 5},
                                     {R"(, "track_id": -1)", -1},
-                                    {R"(, "track_id": "7", "attributes": [1])", -1},
+                                    {R"(, "track_id": "7", "attributes": [1])", 7},
+                                    {R"(, "track_id": "a-7")", -1},
                                     {", \"ids\": 2", -1}}) {
     EXPECT_THAT(tracks(more, R"(, "track_id": 90)"), Pair(track, 90)) << more;
   }
   EXPECT_THAT(tracks(R"(, "instance_id": 1)", R"(, "instance_id": 1)"), Pair(-1, -1))
       << "it is no object's number";
+}
+
+TEST_F(CocoLabels, TracksThatAreTextAreCounted) {
+  const auto notes = [&](const std::string& more) {
+    of_one(box(1, 7, "[1, 2, 3, 4]", more) + "," + box(2, 7, "[1, 2, 5, 6]", more));
+    return open()->notes();
+  };
+  const auto of_tracks = StartsWith("2 tracks left out: expected a whole number as ");
+  EXPECT_THAT(notes(R"(, "track_id": "7")"), Not(Contains(of_tracks)));
+  EXPECT_THAT(notes(R"(, "instance_id": "a-7")"), Contains(of_tracks));
 }
 
 TEST_F(CocoLabels, CrowdsAreToldByANumberOrABoolean) {
