@@ -209,12 +209,10 @@ std::vector<Channel> read_pixels(std::FILE* file, const PnmHeader& header, const
 
 ColourFrame decode_pnm(std::FILE* file) {
   const PnmHeader header = read_pnm_header(file);
-  const bool is_binary = header.kind >= '4';
   return {header.size, read_pixels<std::uint8_t>(file, header, [&](int value) {
-            return header.is_bits()        ? 255 * (1 - value)
-                   : header.greatest > 255 ? value >> 8
-                   : is_binary             ? value
-                                           : value * 255 / header.greatest;
+            return header.is_bits()           ? 255 * (1 - value)
+                   : header.greatest == 65535 ? value >> 8
+                                              : value * 255 / header.greatest;
           })};
 }
 

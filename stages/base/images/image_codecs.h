@@ -14,12 +14,13 @@ namespace eventgan {
 
 // One decoder for each format of image files. Each takes a file that is open at its start and gives
 // the same pixels as OpenCV's imread: grey and palettes become colour, 16 bits become 8,
-// transparency is dropped, and an orientation tag is not applied. But where OpenCV returns an image
-// with a grey or invented rest, these throw std::runtime_error saying what is wrong if any pixel is
-// missing or in doubt, as they do if the image is too large (check_image_size, before memory is
-// taken) or of a kind that is not read. All are thread safe and write nothing to the standard
-// streams. The sizes are from the header alone, and so are the orientations: 1 to 8 as EXIF counts,
-// 1 where none is told.
+// transparency is dropped, and an orientation tag is not applied; but a PNM's values are of the
+// greatest that its header tells, also in binary. And where OpenCV returns an image with a grey or
+// invented rest, these throw std::runtime_error saying what is wrong if any pixel is missing or in
+// doubt, as they do if the image is too large (check_image_size, before memory is taken) or of a
+// kind that is not read. All are thread safe and write nothing to the standard streams. The sizes
+// are from the header alone, and so are the orientations: 1 to 8 as EXIF counts, 1 where none is
+// told.
 
 /// Grey, YCbCr and RGB.
 ColourFrame decode_jpeg(std::FILE* file);

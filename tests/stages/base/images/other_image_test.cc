@@ -258,6 +258,13 @@ TEST(OtherImages, PnmHeadersHaveCommentsAndAnySpace) {
     write_file(file, bytes);
     EXPECT_EQ(decode_image_file(file).bgr, grey) << bytes;
   }
+  const std::vector<std::uint8_t> third{85, 85, 85, 255, 255, 255};
+  for (const std::string& bytes :
+       {"P2 2 1 9 3 9\n"s, "P5 2 1 9 \x03\x09"s, "P5 2 1 4095 \x05\x55\x0f\xff"s,
+        "P5 2 1 65535 \x55\x55\xff\xff"s}) {
+    write_file(file, bytes);
+    EXPECT_EQ(decode_image_file(file).bgr, third) << bytes;
+  }
   write_file(file, "P1 3 1\n01 1\n");
   EXPECT_EQ(decode_image_file(file).bgr,
             (std::vector<std::uint8_t>{255, 255, 255, 0, 0, 0, 0, 0, 0}));
