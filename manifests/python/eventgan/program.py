@@ -218,14 +218,17 @@ def _follow(on_event: Callable[[Event], object], *arguments: PathLike) -> Event:
     # In a session of its own: a terminal or a notebook interrupts the whole session, and a second interrupt would drop
     # the current shard.
     event: Event = {}
+    report: Event = {}
     told: list[str] = []
     with _running(*arguments, stderr=subprocess.STDOUT, start_new_session=True) as process:
         assert process.stdout
         try:
             for line in process.stdout:
                 event = _event_of(line.rstrip("\n"))
-                if event.get("event") == "error":
+                if event["event"] == "error":
                     told.append(event["text"])
+                if event["event"] == "report":
+                    report = event
                 on_event(event)
             process.wait()
         except BaseException:
@@ -234,7 +237,7 @@ def _follow(on_event: Callable[[Event], object], *arguments: PathLike) -> Event:
     if process.returncode:
         raise ProgramError("\n".join(told) or f"{_ended(arguments[0], process.returncode)}: {json.dumps(event)[:1000]}",
                            process.returncode)
-    return event
+    return report or event
 
 
 def _event_of(line: str) -> Event:

@@ -281,6 +281,12 @@ def test_a_report_longer_than_a_pipe(job, in_the_programs_place):
     assert len(str(caught.value)) == 300000
 
 
+def test_a_library_may_speak_last(job, in_the_programs_place):
+    eventgan.convert(job, progress=False)
+    in_the_programs_place("print(json.dumps({'event': 'report', 'folder': 'out'}))", "print('goodbye')")
+    assert len(eventgan.convert(job, progress=False)) == PAIRS
+
+
 COUNTS_INTERRUPTS = ["def interrupted(*_):", "    with open('interrupts', 'a') as file:", "        file.write('.')",
                      "signal.signal(signal.SIGINT, interrupted)",
                      "print(json.dumps({'event': 'note', 'text': 'ready'}), flush=True)"]
