@@ -59,6 +59,8 @@ void SampleMessage::fail(std::string reason) {
   if (!reason.ends_with(id)) reason += id;
   sample.fault = std::move(reason);
   sample.flow = {};
+  sample.threshold = std::nullopt;
+  sample.tiles = {};
   prepared = {};
   free_memory(events);
   free_memory(volume);
@@ -259,7 +261,7 @@ void SampleStages::finish(SampleMessage& message) const try {
     const std::size_t bad = first_unsound_value(message.volume);
     message.fail("expected finite values >= 0, got " + std::to_string(message.volume[bad]) +
                  " in channel " + std::to_string(bad / prepared.content.pixel_count()) +
-                 " of the generated volume, from " + frame_names(pair));
+                 " of the generated volume, in " + frame_names(pair));
     return;
   }
   VolumeStatistics& statistics = message.sample.statistics = *found;

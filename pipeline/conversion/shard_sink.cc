@@ -161,8 +161,8 @@ void ShardSink::add(const SampleMessage& message) {
   } else {
     ++record_.valid;
     record_.outlines += message.outlines;
+    losses_.add(message.sample.annotation);
   }
-  losses_.add(message.sample.annotation);
   same_images_ += message.same_image ? 1 : 0;
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     record_.stage_seconds[kStageNames[stage]] += message.seconds[stage];

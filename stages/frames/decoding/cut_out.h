@@ -12,7 +12,9 @@ namespace eventgan {
 struct CutOutSpec {
   int side_px = 64;    ///< of the box's longer side in the copy that is cut; smaller ones are kept
   int iterations = 1;  ///< of GrabCut
-  double core = 0.7;   ///< half width of what is sure to be the object, in heights of the box
+  /// Share of a square box's width that is sure to be the object; of another's in proportion to
+  /// width / height, from 0.3 to 0.9.
+  double core = 0.7;
 };
 
 /// What an object covers, found from its box alone.

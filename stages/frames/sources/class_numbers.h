@@ -13,8 +13,9 @@ namespace eventgan {
 using ClassNames = std::vector<std::string>;
 
 /// Leaves out boxes of other classes than SourceSpec::classes, counted as
-/// Annotation::of_other_classes; the others stay part of the background, and KITTI's DontCare
-/// stays. Throws InputError for a class that the source does not have.
+/// Annotation::of_other_classes; the others stay part of the background (in a clip of one
+/// photograph they move on their own, too), and KITTI's DontCare stays. Throws InputError for a
+/// class that the source does not have.
 ///
 /// Gives all sources of one kind of dataset one list of classes, so that a class has one number in
 /// all their shards, be they of train or of val: the names of the first source in its own order

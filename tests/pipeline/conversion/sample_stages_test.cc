@@ -631,8 +631,10 @@ TEST_F(SampleStagesTest, ABoxLeftOutIsAFaultOnlyWhereThePolicyIsFail) {
 
 TEST_F(SampleStagesTest, AVolumeThatIsNotFiniteIsAFaultThatNamesTheFrames) {
   generator_.fail_on((51 / 255.0f - 0.5f) * 2);
+  manifest_.generator.threshold = ThresholdSpec{.range = {0.1, 0.9}};
   const SampleMessage message = run();
   EXPECT_TRUE(message.failed());
+  EXPECT_EQ(message.sample.threshold, std::nullopt) << "no volume, no threshold";
   EXPECT_THAT(message.sample.fault, ::testing::AllOf(::testing::HasSubstr("got nan in channel 0"),
                                                      ::testing::HasSubstr("clip/0000.png"),
                                                      ::testing::HasSubstr("clip/0001.png"),

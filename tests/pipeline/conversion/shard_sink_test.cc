@@ -175,6 +175,7 @@ class ShardSinkTest : public ::testing::Test {
     message.slot = slot;
     message.sample.sample_id = shard.name + "/" + std::to_string(slot);
     message.sample.pair.gap_frames = slot + 1;
+    message.sample.annotation.left_out = {message.sample.sample_id};
     if (valid) {
       message.chunk = VolumeCodec(manifest_.output.dtype, manifest_.output.deflate_level)
                           .encode(std::vector<float>(kShape.value_count()))
@@ -218,6 +219,13 @@ TEST(LabelLosses, AreCountedByKindAndTheFirstNamed) {
               ::testing::ElementsAre("2 boxes of labels left out: b; c",
                                      "4 outlines of labels taken without some of their parts: no "
                                      "area, in a.json (annotation 4); d; e; ..."));
+}
+
+TEST_F(ShardSinkTest, CountsWhatIsLeftOutOfSamplesThatAreNotTriedAgain) {
+  open_sink();
+  accept(frozen_.plan.shards[0], 0);
+  accept(frozen_.plan.shards[0], 1, /*valid=*/false);
+  EXPECT_THAT(sink_->notes(), ElementsAre("1 box of labels left out: job-a-00000-of-00001.h5/0"));
 }
 
 TEST_F(ShardSinkTest, CommitsEachShardWithItsCommitRecord) {
