@@ -69,12 +69,22 @@ std::optional<OriginalIds> original_ids(const ExportSource& source, const Annota
   try {
     OriginalIds ids;
     ids.image = entry.at("image").at("id").get<std::int64_t>();
-    for (const nlohmann::json& object : entry.at("annotations")) {
+    const auto box_of = [](const nlohmann::json& object) {
       const auto sides = object.at("bbox").get<std::array<double, 4>>();
-      const Rectangle box{sides[0], sides[1], sides[0] + sides[2], sides[1] + sides[3]};
+      return Rectangle{sides[0], sides[1], sides[0] + sides[2], sides[1] + sides[3]};
+    };
+    const nlohmann::json& objects = entry.at("annotations");
+    for (const nlohmann::json& object : objects) {
+      const Rectangle box = box_of(object);
       const std::size_t number = ids.annotations.size();
-      // One that was left out, being outside its image, has no box.
-      if (number == annotation.boxes.size() || annotation.boxes[number].xyxy != box) continue;
+      // One that was left out, being outside its image or of another class, has no box. Which of
+      // two that are alike was left out, boxes do not say.
+      if (number == annotation.boxes.size() || annotation.boxes[number].xyxy != box) {
+        if (std::ranges::find(annotation.boxes, box, &Box::xyxy) != annotation.boxes.end()) {
+          return std::nullopt;
+        }
+        continue;
+      }
       ids.annotations.push_back(object.at("id").get<std::int64_t>());
       ids.categories.push_back(object.at("category_id").get<std::int64_t>());
       const nlohmann::json joints = object.value("keypoints", nlohmann::json::array());

@@ -178,7 +178,6 @@ void account_persons(const ShardSample& sample, const JointChoice& choice, Image
 ClassNumbers::ClassNumbers(const ExportInput& input, const ExportOptions& options, int first) {
   std::vector<std::string> known;
   for (const ExportSource& source : input.sources()) {
-    if (std::ranges::find(input.splits(), source.split) == input.splits().end()) continue;
     for (const std::string& name : source.class_names) {
       if (std::ranges::find(known, name) == known.end()) known.push_back(name);
     }
@@ -221,7 +220,7 @@ ClassNumbers::ClassNumbers(const ExportInput& input, const ExportOptions& option
     }
   }
   if (names_.empty())
-    throw UsageError(file + ": expected a number for at least one class, got none");
+    throw UsageError("expected a number for at least one class, got none, in " + file);
 }
 
 void ClassNumbers::renumber(const std::map<std::string, int>& given, int first) {
