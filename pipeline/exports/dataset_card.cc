@@ -74,21 +74,18 @@ std::vector<FilesOfKind> files_of(const ExportWork& work, const ExportFormat& fo
     spelled(
         pattern, [&](auto) { return has_parts = true, ""; }, [](char) { return ""; });
     const bool is_listed = has_parts && pattern.find('/') == pattern.npos;
-    const std::size_t at = pattern.find("SPLIT");
-    if (at == pattern.npos) {
+    if (pattern.find("SPLIT") == pattern.npos) {
       all.push_back({kind, "", pattern, is_listed, false, {}});
       continue;
     }
     for (const std::string& split : work.input.splits()) {
-      std::string of_split = pattern;
-      of_split.replace(at, std::string_view("SPLIT").size(), split);
-      all.push_back({kind, split, of_split, false, false, {}});
+      all.push_back({kind, split, pattern, false, false, {}});
     }
   }
   work.folder.for_each_file([&](const std::string& name) {
     for (Candidates& candidates : all) {
       if (candidates.is_found && !candidates.is_listed) continue;
-      if (!fits(name, candidates.pattern)) continue;
+      if (!fits(name, candidates.pattern, candidates.split)) continue;
       candidates.is_found = true;
       if (candidates.is_listed) candidates.names.insert(name);
       break;
@@ -113,7 +110,9 @@ std::vector<FilesOfKind> files_of(const ExportWork& work, const ExportFormat& fo
       std::vector<std::string> names;
       for (const std::string& pattern : without_brackets(candidates.pattern)) {
         names.push_back(spelled(
-            pattern, [](auto) { return "*"; }, [](char c) { return std::string(1, c); }));
+            pattern,
+            [&](std::string_view word) { return word == "SPLIT" ? candidates.split : "*"; },
+            [](char c) { return std::string(1, c); }));
       }
       by_split.emplace_back(candidates.split, std::move(names));
     }
@@ -306,16 +305,22 @@ std::string card_text(const ExportWork& work, const ExportFormat& format,
 
 }  // namespace
 
-void write_dataset_card(const ExportWork& work, const ExportFormat& format,
-                        const std::vector<const ExportShard*>& shards) {
+std::vector<std::string> write_dataset_card(const ExportWork& work, const ExportFormat& format,
+                                            const std::vector<const ExportShard*>& shards) {
   const std::string input = fmt::format("{} {}", input_hash(shards), work.input.missing().size());
   ExportFolder::Step step(work.folder, "card", input);
-  if (step.is_done()) return;
+  std::vector<std::string> notes;
+  if (step.is_done()) return notes;
   const std::vector<FilesOfKind> files = files_of(work, format);
   const std::string licence = licence_of(work.input, shards);
-  step.write(kCardName, card_text(work, format, shards, files, licence));
-  step.write(kCroissantName, croissant_text(work, format, files, licence));
+  for (const auto& [name, text] :
+       {std::pair(kCardName, card_text(work, format, shards, files, licence)),
+        std::pair(kCroissantName, croissant_text(work, format, files, licence))}) {
+    if (step.write_unless_edited(std::string(name), text)) continue;
+    notes.push_back(fmt::format("{} stays as you edited it: delete it to have it made anew", name));
+  }
   step.finish();
+  return notes;
 }
 
 }  // namespace eventgan

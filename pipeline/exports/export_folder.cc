@@ -83,6 +83,15 @@ std::set<std::string> read_journal(const fs::path& file) {
   return names;
 }
 
+bool is_record(const fs::path& path) {
+  return path.extension() == ".json" || path.extension() == kBegun;
+}
+
+/// The files that a receipt or a journal names.
+std::set<std::string> named_by(const fs::path& record) {
+  return record.extension() == kBegun ? read_journal(record) : files_of(record);
+}
+
 void append_to_journal(const fs::path& file, const std::set<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += "\n" + dump_json(nlohmann::json(name));
@@ -126,7 +135,8 @@ ExportFolder::ExportFolder(fs::path folder, const std::string& identity, bool ov
                        folder_.string() + " (--overwrite starts again):\n" + *found +
                        "instead of\n" + identity);
     }
-    discard();
+    require_nothing_else();
+    remove_other_steps();  // all
   }
   std::error_code none;
   if (!is_same && fs::exists(folder_, none)) {
@@ -159,7 +169,8 @@ fs::path ExportFolder::journal(const std::string& step) const {
 void ExportFolder::for_each_file(const std::function<void(const std::string&)>& take) const {
   std::set<fs::path> receipts;
   for (const auto& entry : fs::directory_iterator(folder_ / kReceipts)) {
-    if (entry.path().extension() == ".json") receipts.insert(entry.path());
+    const fs::path& path = entry.path();
+    if (path.extension() == ".json" && steps_.contains(path.stem())) receipts.insert(path);
   }
   for (const fs::path& receipt : receipts) {
     for (const std::string& name : files_of(receipt)) take(name);
@@ -173,14 +184,45 @@ void ExportFolder::make_folder(const fs::path& folder) {
   remove_stale_temporaries(folder);
 }
 
-void ExportFolder::discard() {
-  std::set<fs::path> records, files;
+void ExportFolder::require_nothing_else() const {
+  std::set<fs::path> own{kReceipts};
+  for (const auto& entry : fs::directory_iterator(folder_ / kReceipts)) {
+    if (!is_record(entry.path())) continue;
+    for (const std::string& name : named_by(entry.path())) {
+      for (fs::path path = name; !path.empty(); path = path.parent_path()) own.insert(path);
+    }
+  }
+  for (const fs::path& path : own) {
+    require_no_link(folder_, path.parent_path());
+    if (fs::is_directory(fs::symlink_status(folder_ / path))) {
+      remove_stale_temporaries(folder_ / path);
+    }
+  }
+  remove_stale_temporaries(folder_);
+  for (auto entry = fs::recursive_directory_iterator(folder_); entry != fs::end(entry); ++entry) {
+    const fs::path path = entry->path().lexically_relative(folder_);
+    if (path == kReceipts) entry.disable_recursion_pending();
+    if (own.contains(path)) continue;
+    throw UsageError("expected an export and nothing else, which --overwrite removes, got " +
+                     path.string() + ", in " + folder_.string() +
+                     " (move it away, or choose another --out)");
+  }
+}
+
+void ExportFolder::remove_other_steps() {
+  std::set<fs::path> records, others, files;
   for (const auto& entry : fs::directory_iterator(folder_ / kReceipts)) {
     const fs::path& path = entry.path();
-    if (path.extension() != ".json" && path.extension() != kBegun) continue;
-    records.insert(path);
-    const auto named = path.extension() == kBegun ? read_journal(path) : files_of(path);
-    files.insert(named.begin(), named.end());
+    if (!is_record(path)) continue;
+    (steps_.contains(path.stem()) ? others : records).insert(path);
+  }
+  if (records.empty()) return;
+  begin(records.begin()->stem());
+  for (const fs::path& record : records) {
+    for (const std::string& name : named_by(record)) files.insert(name);
+  }
+  for (const fs::path& record : others) {
+    for (const std::string& name : named_by(record)) files.erase(name);
   }
   std::set<fs::path> folders{""};
   for (const fs::path& relative : files) {
@@ -201,7 +243,10 @@ void ExportFolder::discard() {
 }
 
 ExportFolder::Step::Step(ExportFolder& folder, std::string name, std::string input)
-    : folder_(folder), name_(std::move(name)), input_(std::move(input)) {}
+    : folder_(folder), name_(std::move(name)), input_(std::move(input)) {
+  const std::lock_guard lock(folder_.mutex_);
+  folder_.steps_.insert(name_);
+}
 
 bool ExportFolder::Step::is_done() const {
   const nlohmann::json json = read_receipt(folder_.receipt(name_));
@@ -255,31 +300,51 @@ fs::path ExportFolder::Step::file(const std::string& relative) {
   require_export_name(relative, folder_.folder_);
   folder_.require_own_name(relative);
   require_no_link(folder_.folder_, fs::path(relative).parent_path());
-  folder_.begin(name_);
   const fs::path path = folder_.folder_ / relative;
   {
     const std::lock_guard lock(mutex_);
-    std::set<std::string> names{relative};
-    // What an earlier run has made counts as begun: it may not be made again.
-    if (files_.empty()) names.merge(files_of(folder_.receipt(name_)));
-    append_to_journal(folder_.journal(name_), names);
+    add_to_journal({relative});
     files_.insert(relative);
   }
   folder_.make_folder(path.parent_path());
   return path;
 }
 
+void ExportFolder::Step::add_to_journal(std::set<std::string> names) {
+  folder_.begin(name_);
+  // What an earlier run has made counts as begun: it may not be made again.
+  if (files_.empty()) names.merge(files_of(folder_.receipt(name_)));
+  append_to_journal(folder_.journal(name_), names);
+}
+
 void ExportFolder::Step::write(const std::string& relative, std::string_view bytes) {
   write_file_atomically(file(relative), bytes);
 }
 
+bool ExportFolder::Step::write_unless_edited(const std::string& relative, std::string_view bytes) {
+  const nlohmann::json receipt = read_receipt(folder_.receipt(name_));
+  const nlohmann::json::json_pointer place = nlohmann::json::json_pointer("/sha256") / relative;
+  const fs::path path = file(relative);
+  std::string reason;
+  const auto there = try_read_file(path, reason);
+  // One that was cut is no edit.
+  const bool is_edited = there && !bytes.starts_with(*there) && receipt.contains(place) &&
+                         receipt.at(place).is_string() && receipt.at(place) != sha256_hex(*there);
+  if (!is_edited) write_file_atomically(path, bytes);
+  const std::lock_guard lock(mutex_);
+  sha256_[relative] = is_edited ? receipt.at(place).get<std::string>() : sha256_hex(bytes);
+  return !is_edited;
+}
+
 void ExportFolder::Step::finish() {
+  if (files_.empty()) add_to_journal({});
   nlohmann::json files = nlohmann::json::object();
   for (const std::string& relative : files_) {
     files[relative] = fs::file_size(folder_.folder_ / relative);
   }
-  write_file_atomically(folder_.receipt(name_),
-                        dump_json(nlohmann::json{{"input", input_}, {"files", files}}) + "\n");
+  write_file_atomically(
+      folder_.receipt(name_),
+      dump_json(nlohmann::json{{"input", input_}, {"files", files}, {"sha256", sha256_}}) + "\n");
   const fs::path journal = folder_.journal(name_);
   for (const std::string& relative : read_journal(journal)) {
     if (files_.contains(relative)) continue;

@@ -34,7 +34,8 @@ class ExportFolder {
 
   /// Begins or resumes the export that `identity` describes, a line for each of its settings.
   /// Throws UsageError if the folder holds another one or other files. With `overwrite` another
-  /// export of the same job (its "job" line) is removed first, also that of a run that was killed.
+  /// export of the same job (its "job" line) is removed first, also that of a run that was killed;
+  /// nothing is, if there are other files beside it.
   ExportFolder(std::filesystem::path folder, const std::string& identity, bool overwrite);
 
   /// Files that are made together, and their receipt.
@@ -53,18 +54,29 @@ class ExportFolder {
     std::filesystem::path file(const std::string& relative);
     void write(const std::string& relative, std::string_view bytes);
 
+    /// The same of a file that people fill in: what they have made of an earlier run's stays, and
+    /// this is false.
+    bool write_unless_edited(const std::string& relative, std::string_view bytes);
+
     /// Writes the receipt; files of earlier runs that were not made again go.
     void finish();
 
    private:
+    void add_to_journal(std::set<std::string> names);
+
     ExportFolder& folder_;
     std::string name_;
     std::string input_;
     std::mutex mutex_;
     std::set<std::string> files_;
+    std::map<std::string, std::string> sha256_;  ///< as written, of files that people fill in
   };
 
   const std::filesystem::path& path() const { return folder_; }
+
+  /// Removes what earlier runs made in steps that this one has not had, such as those of shards
+  /// that are gone, and folders that are empty then.
+  void remove_other_steps();
 
   /// Calls take(name) for each file of the steps that are done, in the order of the steps' names.
   void for_each_file(const std::function<void(const std::string&)>& take) const;
@@ -73,13 +85,14 @@ class ExportFolder {
   std::filesystem::path receipt(const std::string& step) const;
   std::filesystem::path journal(const std::string& step) const;
   void make_folder(const std::filesystem::path& folder);
-  void discard();
+  void require_nothing_else() const;
   void begin(const std::string& step);
   void require_own_name(const std::string& relative);
 
   std::filesystem::path folder_;
   std::mutex mutex_;
   std::set<std::filesystem::path> made_;
+  std::set<std::string> steps_;  ///< of this run
   /// The first half of a SHA-256.
   using NameHash = std::array<std::uint64_t, 2>;
   static NameHash hash_of(const std::string& name);

@@ -41,22 +41,26 @@ std::string_view leading_part(std::string_view pattern) {
 
 }  // namespace
 
-bool fits(std::string_view name, std::string_view pattern) {
+bool fits(std::string_view name, std::string_view pattern, std::string_view split) {
   if (pattern.empty()) return name.empty();
   if (pattern.front() == '[') {
     const std::size_t end = pattern.find(']');
     const std::string inner(pattern.substr(1, end - 1));
     const std::string_view rest = pattern.substr(end + 1);
-    return fits(name, rest) || fits(name, inner + std::string(rest));
+    return fits(name, rest, split) || fits(name, inner + std::string(rest), split);
   }
   const std::string_view any = leading_part(pattern);
   if (any.empty()) {
     return !name.empty() && name.front() == pattern.front() &&
-           fits(name.substr(1), pattern.substr(1));
+           fits(name.substr(1), pattern.substr(1), split);
+  }
+  if (any == "SPLIT" && !split.empty()) {
+    return name.starts_with(split) &&
+           fits(name.substr(split.size()), pattern.substr(any.size()), split);
   }
   const std::size_t most = std::min(name.find('/'), name.size());
   for (std::size_t length = 1; length <= most; ++length) {
-    if (fits(name.substr(length), pattern.substr(any.size()))) return true;
+    if (fits(name.substr(length), pattern.substr(any.size()), split)) return true;
   }
   return false;
 }

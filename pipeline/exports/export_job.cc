@@ -140,12 +140,13 @@ ExportReport run_export(const std::filesystem::path& folder, const ExportOptions
     work.advance(shard->valid);
   }
   exporter->finish(work, shards);
-  write_dataset_card(work, *options.to, shards);
+  const std::vector<std::string> edited = write_dataset_card(work, *options.to, shards);
 
   // Of those left out too, since it counts their samples.
   std::vector<const ExportShard*> all;
   for (const ExportShard& shard : input.shards()) all.push_back(&shard);
   ExportFolder::Step step(out, kExportDescription, input_hash(all));
+  out.remove_other_steps();
   if (step.is_done()) {
     read_description(out.path() / kExportDescription, report);
   } else {
@@ -156,6 +157,7 @@ ExportReport run_export(const std::filesystem::path& folder, const ExportOptions
     report.left_out = description.left_out();
     report.notes = exporter->notes();
   }
+  report.notes.insert(report.notes.end(), edited.begin(), edited.end());
   if (progress) progress->finish();
   return report;
 }

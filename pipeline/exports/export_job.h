@@ -64,8 +64,8 @@ struct ExportFormat {
 /// All formats, in the order of the page.
 const std::vector<ExportFormat>& export_formats();
 
-/// Whether `pattern`, an ExportFile::name, means this name.
-bool fits(std::string_view name, std::string_view pattern);
+/// Whether `pattern`, an ExportFile::name, means this name. `split`: what SPLIT means; empty: any.
+bool fits(std::string_view name, std::string_view pattern, std::string_view split = {});
 
 /// A pattern with `any` of each SPLIT, NAME ... in it, and `text` of each character besides.
 std::string spelled(std::string_view pattern,

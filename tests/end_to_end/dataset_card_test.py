@@ -180,6 +180,23 @@ class DatasetCards(Export):
                     for pattern in patterns:
                         self.assertGreater(len(list(out.glob(pattern))), 0, pattern)
 
+    def test_what_you_fill_in_stays(self):
+        note = "note: README.md stays as you edited it"
+        card = self.out / "README.md"
+        self.assertNotIn(note, self.export("yolo", "--split", "val")[0])
+        written = card.read_text()
+        edited = written.replace("license: ", "license: other  # ")
+        card.write_text(edited)
+        self.assertIn(note, self.export("yolo", "--split", "val")[0])
+        self.assertNotIn(note, self.export("yolo", "--split", "val")[0])
+        self.assertEqual(card.read_text(), edited)
+        for cut in (None, written[:100]):
+            card.unlink()
+            if cut is not None:
+                card.write_text(cut)
+            self.assertNotIn(note, self.export("yolo", "--split", "val")[0])
+            self.assertEqual(card.read_text(), written)
+
     def test_a_split_with_a_hyphen(self):
         manifest = self.out.parent / "manifest.json"
         self.out.parent.mkdir(exist_ok=True)

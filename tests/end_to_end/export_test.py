@@ -313,6 +313,52 @@ class Formats(Export):
         self.assertEqual((alone / "person_keypoints_train.json").read_bytes(),
                          (self.out / "person_keypoints_train.json").read_bytes())
 
+    def converted_photographs(self, name, labels, *others, **source):
+        """Two photographs and the sources beside them, converted."""
+        folder = demo.folder / name
+        (folder / "images").mkdir(parents=True)
+        for image in ("a.png", "b.png"):
+            shutil.copy(demo.folder / "demo/kitti/training/image_2/000000.png", folder / "images" / image)
+        (folder / labels[0]).write_text(labels[1])
+        photographs = {"dataset": "frames", "root": "images", "pairs": {"from": "stills"}, "split": "val",
+                       "labels": {"path": labels[0], "format": "csv" if labels[0].endswith(".csv") else "coco"},
+                       **source}
+        manifest = folder / "manifest.json"
+        manifest.write_text(json.dumps(program.manifest([*others, photographs], generator={"kind": "difference"},
+                                                        output={"directory": "out"}, errors={
+                                                            "policy": "quarantine", "max_count": 1,
+                                                            "max_fraction": 0.5})))
+        run("convert", manifest, "--progress", "none")
+        return folder / "out"
+
+    def test_a_class_has_one_number_in_all_splits(self):
+        labels = "boxes.csv", "image,class,left,top,right,bottom\na.png,Zebra,290,80,330,110\nb.png,Zebra,300,80,330,100\n"
+        kitti = {"dataset": "kitti_object", "root": "../demo/kitti/training", "pairs": program.pairs([1])}
+        source = self.converted_photographs("zebras", labels, kitti)
+        self.export("coco", source=source)
+        both = json.loads((self.out / "instances_val.json").read_text())
+        alone = self.out.parent / "alone"
+        self.export("coco", "--split", "val", source=source, out=alone)
+        self.assertEqual(json.loads((alone / "instances_val.json").read_text())["categories"], both["categories"])
+        numbers = {category["name"]: category["id"] for category in both["categories"]}
+        self.assertGreater(numbers["Zebra"], numbers["Car"])
+        self.assertEqual({one["category_id"] for one in both["annotations"]}, {numbers["Zebra"]})
+
+    def test_coco_ids_are_kept_where_it_is_clear_whose_they_are(self):
+        annotations = [{"id": 7, "image_id": 1, "category_id": 2, "bbox": [290, 80, 30, 20], "area": 600, "iscrowd": 0},
+                       {"id": 8, "image_id": 1, "category_id": 9, "bbox": [290, 80, 30, 20], "area": 600, "iscrowd": 0}]
+        for rider, kept in (([290, 80, 30, 20], False), ([290, 80, 30, 21], True)):
+            annotations[0]["bbox"] = rider
+            labels = json.dumps({"images": [{"id": 1, "file_name": "a.png", "width": 621, "height": 188}],
+                                 "annotations": annotations, "categories": [{"id": 2, "name": "rider"},
+                                                                            {"id": 9, "name": "person"}]})
+            source = self.converted_photographs(f"riders_{kept}", ("labels.json", labels), classes=["person"])
+            out = self.out.parent / f"riders_{kept}"
+            self.export("coco", source=source, out=out)
+            found = json.loads((out / "instances_val.json").read_text())
+            self.assertEqual([(one["id"], one["category_id"]) for one in found["annotations"]],
+                             [(8, 9)] if kept else [(1, 1)])
+
     def test_mpii(self):
         self.out, out = demo.exported("mpii")
         self.assertIn("for MMPose --to coco", out)
@@ -641,8 +687,9 @@ class AgainAndAgain(Export):
                                          "--progress", "none")
                 self.assertEqual(done.code, -9)
                 (out / "a.txt").write_text("mine")
+                before = sorted(path.name for path in out.iterdir())
                 self.export("coco", "--split", "val", "--overwrite", out=out, expect=64)
-                self.assertEqual(sorted(path.name for path in out.iterdir()), [".export", "a.txt"])
+                self.assertEqual(sorted(path.name for path in out.iterdir()), before)
                 (out / "a.txt").unlink()
                 self.export("coco", "--split", "val", "--overwrite", out=out)
                 same_folder(out, expected)

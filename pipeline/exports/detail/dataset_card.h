@@ -21,9 +21,9 @@ inline constexpr char kCroissantName[] = "croissant.json";
 
 /// Writes README.md, a dataset card as the Hugging Face Hub reads it, and croissant.json, both from
 /// the format's row and the files that there are: a step, after those of all other files but
-/// export.json.
-void write_dataset_card(const ExportWork& work, const ExportFormat& format,
-                        const std::vector<const ExportShard*>& shards);
+/// export.json. What people have made of an earlier run's stays; the notes say so.
+std::vector<std::string> write_dataset_card(const ExportWork& work, const ExportFormat& format,
+                                            const std::vector<const ExportShard*>& shards);
 
 /// croissant.json: the files, and the records in them, in the words of MLCommons Croissant 1.0
 /// (docs.mlcommons.org/croissant). What nobody knows here is left out: `url`, `creator`,

@@ -3,13 +3,20 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <map>
+#include <set>
+#include <string>
+
 #include "manifests/values/faults.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
 
 TEST(ExportFolder, TakesNamesForTheSameIfTheyDifferInCaseAlone) {
@@ -21,6 +28,77 @@ TEST(ExportFolder, TakesNamesForTheSameIfTheyDifferInCaseAlone) {
   EXPECT_NO_THROW(step.write("Hkd9g51_o-47trwz.tar", ""));
   EXPECT_THAT([&] { step.write("A-sample-of-many.tar", ""); },
               ThrowsMessage<InputError>(HasSubstr("got A-sample-of-many.tar beside another")));
+}
+
+class ExportRuns : public ::testing::Test {
+ protected:
+  using Files = std::map<std::string, std::set<std::string>>;
+
+  /// A run that writes these files of each step, or finds them done.
+  void run(const Files& steps, const std::string& input = "input") const {
+    ExportFolder out(path_, "job a\n", /*overwrite=*/false);
+    for (const auto& [name, files] : steps) {
+      ExportFolder::Step step(out, name, input);
+      if (step.is_done()) continue;
+      for (const std::string& file : files) step.write(file, input);
+      step.finish();
+    }
+    out.remove_other_steps();
+    std::set<std::string> listed, expected;
+    out.for_each_file([&](const std::string& file) { listed.insert(file); });
+    for (const auto& [name, files] : steps) expected.insert(files.begin(), files.end());
+    EXPECT_EQ(listed, expected);
+    EXPECT_EQ(found(), expected);
+  }
+
+  std::set<std::string> found() const {
+    std::set<std::string> files;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(path_)) {
+      const auto relative = entry.path().lexically_relative(path_);
+      if (entry.is_regular_file() && *relative.begin() != ".export") files.insert(relative);
+    }
+    return files;
+  }
+
+  const testing::TemporaryFolder folder_;
+  const std::filesystem::path path_ = folder_ / "out";
+};
+
+TEST_F(ExportRuns, KeepWhatIsDone) {
+  const Files files{{"a", {"images/a/1.png", "data.yaml"}}, {"b", {"images/b/1.png"}}};
+  run(files);
+  const auto time = std::filesystem::last_write_time(path_ / "data.yaml");
+  run(files);
+  EXPECT_EQ(std::filesystem::last_write_time(path_ / "data.yaml"), time);
+}
+
+TEST_F(ExportRuns, RemoveWhatAStepNoLongerMakes) {
+  run({{"a", {"labels/a/1.txt", "labels/a/2.txt"}}, {"b", {"labels/b/3.txt"}}});
+  run({{"a", {"labels/a/2.txt"}}, {"b", {}}}, "another input");
+}
+
+TEST_F(ExportRuns, OverwriteNothingWhereAnotherFileLies) {
+  const auto overwrite = [&] { ExportFolder(path_, "job a\nother settings\n", true); };
+  run({{"a", {"labels/train/1.txt", "data.yaml"}}});
+  for (const char* name : {"labels/train.cache", "notes.txt", "mine/1.txt"}) {
+    testing::write_file(path_ / name, "mine");
+    const auto before = found();
+    EXPECT_THAT(overwrite, ThrowsMessage<UsageError>(HasSubstr(
+                               "expected an export and nothing else, which --overwrite removes, "
+                               "got " +
+                               std::string(name).substr(0, 4))));
+    EXPECT_EQ(found(), before);
+    std::filesystem::remove_all(path_ / name);
+    std::filesystem::remove(path_ / "mine");
+  }
+  EXPECT_NO_THROW(overwrite());
+  EXPECT_THAT(found(), IsEmpty());
+}
+
+TEST_F(ExportRuns, RemoveTheFilesOfAStepThatIsGoneButThoseThatAnotherMakes) {
+  run({{"a", {"images/a/1.png", "data.yaml"}}, {"b", {"images/b/1.png"}}});
+  run({{"b", {"images/b/1.png"}}, {"c", {"data.yaml"}}});
+  EXPECT_FALSE(std::filesystem::exists(path_ / "images/a"));
 }
 
 }  // namespace

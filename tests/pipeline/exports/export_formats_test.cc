@@ -122,5 +122,11 @@ TEST(ExportFormats, AFileIsOneOfThoseThatTheRowSays) {
                       "timestamps_us.npy"));
 }
 
+TEST(ExportFormats, ASplitIsItsNameAlsoWhereThatIsAWord) {
+  EXPECT_TRUE(fits("images/N/1.png", "images/SPLIT/NAME.png", "N"));
+  EXPECT_FALSE(fits("images/D/1.png", "images/SPLIT/NAME.png", "N"));
+  EXPECT_TRUE(fits("images/D/1.png", "images/SPLIT/NAME.png"));
+}
+
 }  // namespace
 }  // namespace eventgan
