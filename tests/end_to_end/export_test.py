@@ -332,7 +332,8 @@ class Formats(Export):
         return folder / "out"
 
     def test_a_class_has_one_number_in_all_splits(self):
-        labels = "boxes.csv", "image,class,left,top,right,bottom\na.png,Zebra,290,80,330,110\nb.png,Zebra,300,80,330,100\n"
+        labels = "boxes.csv", ("image,class,left,top,right,bottom\n"
+                               "a.png,Zebra,290,80,330,110\nb.png,Zebra,300,80,330,100\n")
         kitti = {"dataset": "kitti_object", "root": "../demo/kitti/training", "pairs": program.pairs([1])}
         source = self.converted_photographs("zebras", labels, kitti)
         self.export("coco", source=source)

@@ -1,18 +1,22 @@
 #include "stages/frames/naming/absent_frames.h"
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <string>
 #include <utility>
+
+#include "stages/frames/listing/image_folder.h"
+#include "stages/frames/listing/numbered_sequence.h"
 
 namespace eventgan {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// The image of a format that is not read, as the labels name it or instead; empty if none is
-/// there.
-std::string unread_image(const SourceRoot& root, const std::string& name) {
+/// An image that is there and is no frame, as the labels name it or of a format that is not read;
+/// empty if there is none.
+std::string passed_over_image(const SourceRoot& root, const std::string& name) {
   if (has_file(root.on_disk(name))) return name;
   for (const char* extension : {".heic", ".HEIC", ".heif", ".avif", ".jxl", ".jp2", ".gif"}) {
     const std::string other = fs::path(name).replace_extension(extension).generic_string();
@@ -52,12 +56,16 @@ void add_absent_frames(const OwnLabels& labels, std::vector<LabelledFrame>& fram
     frame.label_key = absent.key;
     frame.fault = absent.fault;
     const SourceRoot& root = labels.source().root;
-    const std::string other = frame.fault.empty() ? unread_image(root, absent.name) : "";
+    const std::string other = frame.fault.empty() ? passed_over_image(root, absent.name) : "";
     if (!other.empty()) {
-      frame.fault =
-          "expected a frame, got a file of another format, which ImageMagick converts "
-          "(mogrify -format png), in " +
-          root.written(other);
+      const bool is_read =
+          std::ranges::find(kImageExtensions, lower_extension(other)) != kImageExtensions.end();
+      frame.fault = (is_read ? "expected a frame, got an image that was passed over, in a folder "
+                               "beside images, more than two folders deep, or beside one of its "
+                               "name that counts, in "
+                             : "expected a frame, got a file of another format, which ImageMagick "
+                               "converts (mogrify -format png), in ") +
+                    root.written(other);
     }
     frames.push_back(std::move(frame));
   }

@@ -545,6 +545,11 @@ TEST_F(CocoLabels, WhatIsNoImageOfThatSizeOrFormatIsNamed) {
               "(mogrify -format png), in images/" +
                   std::string(name));
   }
+  write_flat_image(at("images/sub/c.png"), kImage, 7);
+  write_coco(image(1, "000001.png") + "," + image(7, "sub/c.png"), "");
+  EXPECT_THAT(open()->labelled_frames().at(1).fault,
+              StartsWith("expected a frame, got an image that was passed over, in a folder beside "
+                         "images"));
 }
 
 TEST_F(CocoLabels, AFileThatIsNoneIsRefused) {
