@@ -388,9 +388,9 @@ def represent(events: Any, representation: str, *, size: tuple[int, int],
         if ends_s.shape != (2,):
             raise ValueError(f"expected a window of two times, got {window_s!r} for window_s")
         begin, end = ends_s.tolist()
-        # Whole microseconds are not exact in seconds: what rounding lost must not cost the events at t1 and at tN.
         if not (times[1:] >= times[:-1]).all():
             raise ValueError("expected events in time order, got another order, or times that are NaN")
+        # Whole microseconds are not exact in seconds: what rounding lost must not cost the events at t1 and at tN.
         lost = 0 if unit == 1 else 2 * np.spacing(np.abs(ends_s))
         first, last = (ends_s + np.array([-1, 1]) * lost) / unit
         within = slice(np.searchsorted(times, first), np.searchsorted(times, last, side="right"))

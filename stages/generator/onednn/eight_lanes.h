@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstdint>
-
 // Eight float32 values as a register of AVX2 holds them. Inlined into functions that are compiled
 // for AVX2, and called only where the processor has it.
 

@@ -494,6 +494,7 @@ TEST_F(CocoLabels, TracksThatAreTextAreCounted) {
   };
   const auto of_tracks = StartsWith("2 tracks left out: expected a whole number as ");
   EXPECT_THAT(notes(R"(, "track_id": "7")"), Not(Contains(of_tracks)));
+  EXPECT_THAT(notes(R"(, "track_id": 3, "instance_id": "a-7")"), Not(Contains(of_tracks)));
   EXPECT_THAT(notes(R"(, "instance_id": "a-7")"), Contains(of_tracks));
 }
 
