@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <fstream>
 #include <stdexcept>
 #include <system_error>
 
@@ -47,13 +48,23 @@ double seconds_between(const timespec& first, const timespec& last) {
 /// that a file written now can bear a time before the precise clock's now.
 const timespec kProcessStart = now(CLOCK_REALTIME_COARSE);
 
+/// Of a process that has ended, whose parent has not asked how: a container's first process often
+/// never does.
+bool is_zombie(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");  // "PID (NAME) STATE ..."
+  std::string line;
+  std::getline(file, line);
+  const std::size_t name_end = line.rfind(')');
+  return name_end != std::string::npos && line.substr(name_end).starts_with(") Z");
+}
+
 WriterLife life_of(const TemporaryName& name, const timespec& last_write) {
   if (name.host != host_name()) return WriterLife::kUnknown;
   const bool own = name.pid == ::getpid();
   if (own && seconds_between(last_write, kProcessStart) > 0) return WriterLife::kDead;
   // A process of another user answers EPERM: it is alive.
   const bool gone = ::kill(name.pid, 0) != 0 && errno == ESRCH;
-  return gone ? WriterLife::kDead : WriterLife::kAlive;
+  return gone || is_zombie(name.pid) ? WriterLife::kDead : WriterLife::kAlive;
 }
 
 /// None if it is no temporary, or is one no more: its writer or another cleaner was faster.

@@ -135,6 +135,8 @@ struct Annotation {
   std::size_t of_other_classes = 0;  ///< boxes left out, since the source takes other classes
   /// What outlines in `boxes` are without: "expected X, got Y, in PATH:LINE" each.
   std::vector<std::string> outlines_mended = {};
+  /// Why tracks are not in `boxes`: "expected X, got Y, in PATH" each.
+  std::vector<std::string> tracks_left_out = {};
   bool operator==(const Annotation&) const = default;
 };
 

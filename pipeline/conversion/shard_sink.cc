@@ -100,6 +100,7 @@ void LabelLosses::add(const Annotation& annotation) {
   };
   count(annotation.left_out, boxes_);
   count(annotation.outlines_mended, outlines_);
+  count(annotation.tracks_left_out, tracks_);
   of_other_classes_ += annotation.of_other_classes;
 }
 
@@ -119,6 +120,7 @@ std::vector<std::string> LabelLosses::notes() const {
   tell(outlines_, "outline",
        outlines_.count == 1 ? " of labels taken without some of its parts: "
                             : " of labels taken without some of their parts: ");
+  tell(tracks_, "track", " of labels left out: ");
   return notes;
 }
 

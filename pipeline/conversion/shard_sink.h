@@ -16,12 +16,13 @@
 
 namespace eventgan {
 
-/// Counts what labels lost (Annotation::left_out, of_other_classes, outlines_mended), for people.
+/// Counts what labels lost (Annotation::left_out, of_other_classes, outlines_mended,
+/// tracks_left_out), for people.
 class LabelLosses {
  public:
   void add(const Annotation& annotation);
-  /// One on boxes and one on outlines that tells how many, and of the first of them why, and one on
-  /// boxes of other classes; none of none.
+  /// One on boxes, one on outlines and one on tracks that tells how many, and of the first of them
+  /// why, and one on boxes of other classes; none of none.
   std::vector<std::string> notes() const;
 
  private:
@@ -29,7 +30,7 @@ class LabelLosses {
     std::int64_t count = 0;
     std::vector<std::string> listed;
   };
-  Reasons boxes_, outlines_;
+  Reasons boxes_, outlines_, tracks_;
   std::size_t of_other_classes_ = 0;
 };
 

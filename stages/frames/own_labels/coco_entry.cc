@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "manifests/documents/json_text.h"
@@ -150,15 +151,15 @@ bool read_flag(const StrictValue& value) {
   return value.is_boolean() ? value.boolean() : value.integer(0, 1) == 1;
 }
 
-/// The object's number in its sequence: of CocoVID, TAO and PoseTrack, of BDD100K, of CVAT. -1 if
-/// there is none, or another value.
-constexpr std::uint64_t kMostTrack = std::numeric_limits<std::int64_t>::max();
-
-std::int64_t read_track(const nlohmann::json& annotation) {
+/// The object's number in its sequence: of CocoVID, TAO and PoseTrack, of BDD100K, of CVAT. If
+/// there is no whole number from 0, what there is instead, as JSON; "" if there is nothing, or -1.
+std::variant<std::int64_t, std::string> read_track(const nlohmann::json& annotation) {
+  constexpr std::uint64_t kMostTrack = std::numeric_limits<std::int64_t>::max();
   const auto member = [](const nlohmann::json& object, const char* key) {
     const auto found = object.is_object() ? object.find(key) : object.end();
     return object.is_object() && found != object.end() ? *found : nlohmann::json();
   };
+  std::string other;
   for (const nlohmann::json& track :
        {member(annotation, "track_id"), member(annotation, "instance_id"),
         member(member(annotation, "attributes"), "track_id")}) {
@@ -167,9 +168,11 @@ std::int64_t read_track(const nlohmann::json& annotation) {
       if (number && *number >= 0) return *number;
     }
     const bool fits = !track.is_number_unsigned() || track.get<std::uint64_t>() <= kMostTrack;
-    if (track.is_number_integer() && fits && track >= 0) return track;
+    if (track.is_number_integer() && fits && track >= 0) return track.get<std::int64_t>();
+    const bool is_none = track.is_null() || track == "" || track == -1;
+    if (other.empty() && !is_none) other = dump_json(track, JsonLayout::kAsciiLine);
   }
-  return Box().track_id;
+  return other;
 }
 
 /// COCO-WholeBody's joints beside the 17 of the body, in the order of its 133.
@@ -363,7 +366,8 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
   for (const char* const key : {"iscrowd", "ignore"}) {
     if (const auto flag = find_given(object, key)) box.ignore |= read_flag(*flag);
   }
-  box.track_id = read_track(entry.document());
+  const std::variant<std::int64_t, std::string> track = read_track(entry.document());
+  if (const auto* number = std::get_if<std::int64_t>(&track)) box.track_id = *number;
   if (const auto area = find_given(object, "area")) area->number(0, kFarthest_px * kFarthest_px);
   Person person;
   const std::size_t joints = schema.joint_names.size();
@@ -376,6 +380,10 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
   entry.check();
   if (!add_box(box, image, entry.place(), annotation)) return;
   note_parts_left_out(segmentation.without_area, segmentation.parts, entry.place(), annotation);
+  if (const auto* other = std::get_if<std::string>(&track); other && !other->empty()) {
+    annotation.tracks_left_out.push_back("expected a whole number from 0 as track, got " + *other +
+                                         ", in " + entry.place());
+  }
   if (is_person) {
     person.box = box.xyxy;
     person.head_box = head_box;

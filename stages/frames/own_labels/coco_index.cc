@@ -30,7 +30,6 @@ struct EntryFields {
   std::array<double, 4> box{};
   std::size_t box_sides = 0;
   bool is_crowd = false;
-  bool has_track = false, has_text_track = false;
   bool is_labelled = true;
   std::optional<std::int64_t> category;
   std::size_t joint_numbers = 0;  // x, y, v of each joint
@@ -81,9 +80,6 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
   bool binary(nlohmann::json::binary_t&) override { return false; }  // not in JSON text
 
   bool string(std::string& value) override {
-    if (depth_ == kInEntry && is_annotation() && (key_ == "track_id" || key_ == "instance_id")) {
-      (parse_whole(value) ? fields_.has_track : fields_.has_text_track) |= !value.empty();
-    }
     if (depth_ == kInEntry && is_image() && key_ == "file_name") {
       return set(fields_.file_name, std::move(value));
     }
@@ -221,9 +217,6 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
   bool take_integer(std::int64_t value) {
     take_number(static_cast<double>(value));
     note_crowd(value == 1);
-    if (depth_ == kInEntry && is_annotation() && (key_ == "track_id" || key_ == "instance_id")) {
-      fields_.has_track = true;
-    }
     if (depth_ == kInEntry && is_annotation() && key_ == "category_id") {
       if (classes.empty() || value != last_class_) classes.insert(last_class_ = value);
       fields_.category = value;
@@ -260,7 +253,6 @@ class CocoReader : public nlohmann::json_sax<nlohmann::json> {
       need(fields_.image_id, "image_id");
       annotations.push_back({*fields_.image_id, range});
       index.crowds += fields_.is_crowd;
-      index.tracks_of_text += fields_.has_text_track && !fields_.has_track;
       if (fields_.has_joints && fields_.category) {
         ++joints[*fields_.category][fields_.joint_numbers];
       }

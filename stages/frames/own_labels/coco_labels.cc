@@ -33,7 +33,6 @@ class CocoLabels : public OwnLabels {
     find_images();
     note_without_label(written_);
     note_joints();
-    note_tracks();
     warn_of_corners();
     warn_of_crowds();
   }
@@ -56,7 +55,7 @@ class CocoLabels : public OwnLabels {
     if (!index_.categories.empty()) {
       add_ignored_regions(entry, *size, index_, label_place(label_key), annotation);
     }
-    forget_shared_tracks(annotation.boxes);
+    forget_shared_tracks(label_place(label_key), annotation);
     return annotation;
   } catch (const std::runtime_error& error) {
     return SampleFault{error.what()};
@@ -86,13 +85,6 @@ class CocoLabels : public OwnLabels {
         "keypoints of {} left out, since their category names none and they differ in number, in "
         "{}",
         count_text(static_cast<std::int64_t>(index_.joints_left_out), "annotation"), written_));
-  }
-
-  void note_tracks() {
-    if (index_.tracks_of_text == 0) return;
-    notes_.push_back(fmt::format(
-        "{} left out: expected a whole number as \"track_id\" or \"instance_id\", got text, in {}",
-        count_text(static_cast<std::int64_t>(index_.tracks_of_text), "track"), written_));
   }
 
   /// Some tools write corners where COCO has a width and a height.

@@ -26,7 +26,7 @@ Outcome<Annotation> numbered(ImageLabels labels, const std::vector<std::string>&
       leave_out_again(named.again_at, annotation);
     }
   }
-  forget_shared_tracks(annotation.boxes);
+  forget_shared_tracks(place, annotation);
   return annotation;
 }
 
@@ -85,16 +85,18 @@ void note_parts_left_out(std::size_t count, std::size_t of_parts, const std::str
                   count, of_parts, place));
 }
 
-bool forget_shared_tracks(std::vector<Box>& boxes) {
+void forget_shared_tracks(const std::string& place, Annotation& annotation) {
   std::map<std::int64_t, int> times;
-  for (const Box& box : boxes) ++times[box.track_id];
-  bool any = false;
-  for (Box& box : boxes) {
-    if (box.track_id < 0 || times[box.track_id] == 1) continue;
-    box.track_id = Box().track_id;
-    any = true;
+  for (const Box& box : annotation.boxes) ++times[box.track_id];
+  times.erase(Box().track_id);
+  std::erase_if(times, [](const auto& track) { return track.second == 1; });
+  for (const auto& [track, boxes] : times) {
+    annotation.tracks_left_out.push_back(fmt::format(
+        "expected each track once in an image, got {} of {} boxes, in {}", track, boxes, place));
   }
-  return any;
+  for (Box& box : annotation.boxes) {
+    if (times.contains(box.track_id)) box.track_id = Box().track_id;
+  }
 }
 
 bool overlaps(const Rectangle& box, ImageSize image) {

@@ -355,6 +355,7 @@ class StillClips final : public WrappedDataset {
       labels.left_out.clear();
       labels.left_out_at.clear();
       labels.outlines_mended.clear();
+      labels.tracks_left_out.clear();
     }
     return labels;
   }

@@ -108,6 +108,16 @@ TEST_F(UnfinishedFiles, TellWhetherTheirWriterLivesOrTheirAgeAlone) {
   EXPECT_TRUE(is_stale(file_of("node7-1", kAlivePid, 3700)));
 }
 
+TEST_F(UnfinishedFiles, OfAZombieAreDead) {
+  const pid_t zombie = ::fork();
+  ASSERT_NE(zombie, -1);
+  if (zombie == 0) ::_exit(0);
+  siginfo_t ended{};
+  ASSERT_EQ(::waitid(P_PID, static_cast<id_t>(zombie), &ended, WEXITED | WNOWAIT), 0);
+  EXPECT_EQ(file_of(host_name(), zombie, 0).writer, WriterLife::kDead);
+  ::waitpid(zombie, nullptr, 0);
+}
+
 TEST_F(UnfinishedFiles, AnHourOfSilenceTellsThatAnotherHasTheNumberNow) {
   EXPECT_TRUE(is_stale(file_of(host_name(), kAlivePid, 3700)));
 }

@@ -214,11 +214,13 @@ TEST(LabelLosses, AreCountedByKindAndTheFirstNamed) {
                                   "in a.json (annotation 4)"));
   annotation.left_out = {"b", "c"};
   annotation.outlines_mended = {"d", "e", "f"};
+  annotation.tracks_left_out = {"g"};
   losses.add(annotation);
   EXPECT_THAT(losses.notes(),
               ::testing::ElementsAre("2 boxes of labels left out: b; c",
                                      "4 outlines of labels taken without some of their parts: no "
-                                     "area, in a.json (annotation 4); d; e; ..."));
+                                     "area, in a.json (annotation 4); d; e; ...",
+                                     "1 track of labels left out: g"));
 }
 
 TEST_F(ShardSinkTest, CountsWhatIsLeftOutOfSamplesThatAreNotTriedAgain) {

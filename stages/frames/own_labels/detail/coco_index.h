@@ -40,7 +40,6 @@ struct CocoIndex {
 
   std::size_t crowds = 0;  ///< annotations with `iscrowd` 1 or true
 
-  std::size_t tracks_of_text = 0;   ///< annotations whose `track_id` or `instance_id` is no number
   std::size_t joints_left_out = 0;  ///< annotations with joints that have no names
   bool has_body_parts = false;      ///< COCO-WholeBody's foot_kpts, face_kpts, ... are there
 

@@ -100,8 +100,8 @@ void note_parts_left_out(std::size_t count, std::size_t of_parts, const std::str
                          Annotation& annotation);
 
 /// Takes the track from all boxes of an image whose track another one has, too: it is no object's
-/// number then. True if there are any.
-bool forget_shared_tracks(std::vector<Box>& boxes);
+/// number then. Tells of each such track that it is left out.
+void forget_shared_tracks(const std::string& place, Annotation& annotation);
 
 /// Whether some of the box is within the image.
 bool overlaps(const Rectangle& box, ImageSize image);

@@ -487,15 +487,26 @@ TEST_F(CocoLabels, TracksAreCalledAsToolsCallThem) {
       << "it is no object's number";
 }
 
-TEST_F(CocoLabels, TracksThatAreTextAreCounted) {
-  const auto notes = [&](const std::string& more) {
-    of_one(box(1, 7, "[1, 2, 3, 4]", more) + "," + box(2, 7, "[1, 2, 5, 6]", more));
-    return open()->notes();
+TEST_F(CocoLabels, ItIsToldWhyATrackIsLeftOut) {
+  const auto left_out = [&](const std::string& first, const std::string& second) {
+    of_one(box(1, 7, "[1, 2, 3, 4]", first) + "," + box(2, 7, "[1, 2, 5, 6]", second));
+    return annotation().tracks_left_out;
   };
-  const auto of_tracks = StartsWith("2 tracks left out: expected a whole number as ");
-  EXPECT_THAT(notes(R"(, "track_id": "7")"), Not(Contains(of_tracks)));
-  EXPECT_THAT(notes(R"(, "track_id": 3, "instance_id": "a-7")"), Not(Contains(of_tracks)));
-  EXPECT_THAT(notes(R"(, "instance_id": "a-7")"), Contains(of_tracks));
+  const auto is_none = [&](const char* got) {
+    return ElementsAre(
+        StartsWith("expected a whole number from 0 as track, got "s + got + ", in "));
+  };
+  for (const char* more :
+       {"", R"(, "track_id": null)", R"(, "track_id": "")", R"(, "track_id": -1)",
+        R"(, "track_id": "7")", R"(, "track_id": "a-7", "instance_id": 3)"}) {
+    EXPECT_THAT(left_out(more, ""), IsEmpty()) << more;
+  }
+  EXPECT_THAT(left_out(R"(, "track_id": "a-7")", ""), is_none(R"("a-7")"));
+  EXPECT_THAT(left_out(R"(, "attributes": {"track_id": 4.5})", ""), is_none("4.5"));
+  EXPECT_THAT(left_out(R"(, "track_id": 9223372036854775808)", ""), is_none("9223372036854775808"));
+  EXPECT_THAT(left_out(R"(, "track_id": 1)", R"(, "track_id": 1)"),
+              ElementsAre("expected each track once in an image, got 1 of 2 boxes, in "
+                          "instances.json#images/7"));
 }
 
 TEST_F(CocoLabels, CrowdsAreToldByANumberOrABoolean) {

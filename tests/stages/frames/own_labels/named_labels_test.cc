@@ -151,6 +151,20 @@ TEST_F(NamedLabels, WhatVocHasBesideItsFormatIsANote) {
                           "20), in x/3.xml"));
 }
 
+TEST_F(NamedLabels, ATrackOfTwoBoxesIsLeftOut) {
+  images({"i/1.png"});
+  std::string two = cat("5", "5", "9", "<trackid>3</trackid>");
+  const std::size_t begin = two.find("<object>"), end = two.find("</annotation>");
+  two.insert(end, two.substr(begin, end - begin));
+  write("x/1.xml", two);
+  const Annotation read = annotation_of(*voc(), "1.xml");
+  ASSERT_EQ(read.boxes.size(), 2u);
+  EXPECT_EQ(read.boxes[0].track_id, -1);
+  EXPECT_EQ(read.boxes[1].track_id, -1);
+  EXPECT_THAT(read.tracks_left_out,
+              ElementsAre("expected each track once in an image, got 3 of 2 boxes, in x/1.xml"));
+}
+
 TEST_F(NamedLabels, NamesThatNoPlanCanHaveAreLeftOut) {
   images({"i/a.png", "i/stra\337e.png"});
   for (const char* name : {"x/a.xml", "x/stra\337e.xml"}) write(name, cat("5", "5", "9"));

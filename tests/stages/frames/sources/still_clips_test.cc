@@ -373,6 +373,7 @@ TEST_F(StillClipsTest, WhatLabelsLostIsToldOnceAClip) {
   still_.left_out = {"a box outside"};
   still_.left_out_at = {1};
   still_.outlines_mended = {"a part without an area"};
+  still_.tracks_left_out = {"a track twice"};
   for (const PairSide side : {PairSide::kBefore, PairSide::kAfter}) {
     pairs().side = side;
     const Dataset& dataset = open();
@@ -382,6 +383,7 @@ TEST_F(StillClipsTest, WhatLabelsLostIsToldOnceAClip) {
       const bool is_first = i == 0 || i == 25;  // of 25 frames each
       EXPECT_EQ(labels.left_out.size(), is_first) << i;
       EXPECT_EQ(labels.outlines_mended.size(), is_first) << i;
+      EXPECT_EQ(labels.tracks_left_out.size(), is_first) << i;
       EXPECT_EQ(labels.original, "text");
     }
   }
