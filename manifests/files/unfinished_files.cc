@@ -49,8 +49,10 @@ double seconds_between(const timespec& first, const timespec& last) {
 const timespec kProcessStart = now(CLOCK_REALTIME_COARSE);
 
 /// Of a process that has ended, whose parent has not asked how: a container's first process often
-/// never does.
+/// never does. False if /proc is that of other processes.
 bool is_zombie(pid_t pid) {
+  std::error_code error;
+  if (fs::read_symlink("/proc/self", error) != std::to_string(::getpid())) return false;
   std::ifstream file("/proc/" + std::to_string(pid) + "/stat");  // "PID (NAME) STATE ..."
   std::string line;
   std::getline(file, line);

@@ -37,7 +37,7 @@ std::string without_dots(std::string machine);
 
 /// Whether the process that writes a temporary file lives.
 enum class WriterLife {
-  kAlive,   ///< this host and pid namespace have a process of its number
+  kAlive,   ///< this host and pid namespace have a process of its number, no zombie
   kDead,    ///< of this host, and gone or a zombie
   kUnknown  ///< of another host: only its file's age tells
 };

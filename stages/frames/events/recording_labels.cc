@@ -159,7 +159,8 @@ class CsvLabels {
     for (std::size_t i = 0; i < edges.size(); ++i) {
       const std::optional<double> edge = parse_number<double>(row[1 + i]);
       if (!edge || std::abs(*edge) > kFarthest_px) {
-        return fault(fmt::format("{} as a number up to {:.0f}", kColumns[1 + i], kFarthest_px),
+        return fault(fmt::format("{} as a number from -{:.0f} to {:.0f}", kColumns[1 + i],
+                                 kFarthest_px, kFarthest_px),
                      quoted(row[1 + i]));
       }
       *edges[i] = *edge;

@@ -152,7 +152,8 @@ bool read_flag(const StrictValue& value) {
 }
 
 /// The object's number in its sequence: of CocoVID, TAO and PoseTrack, of BDD100K, of CVAT. If
-/// there is no whole number from 0, what there is instead, as JSON; "" if there is nothing, or -1.
+/// there is no whole number from 0, what there is instead, in quotes; "" if there is nothing, or
+/// -1.
 std::variant<std::int64_t, std::string> read_track(const nlohmann::json& annotation) {
   constexpr std::uint64_t kMostTrack = std::numeric_limits<std::int64_t>::max();
   const auto member = [](const nlohmann::json& object, const char* key) {
@@ -163,14 +164,15 @@ std::variant<std::int64_t, std::string> read_track(const nlohmann::json& annotat
   for (const nlohmann::json& track :
        {member(annotation, "track_id"), member(annotation, "instance_id"),
         member(member(annotation, "attributes"), "track_id")}) {
+    bool is_none = track.is_null() || track == "" || track == -1;
     if (track.is_string()) {
       const auto number = parse_whole(track.get_ref<const std::string&>());
       if (number && *number >= 0) return *number;
+      is_none |= number == -1;
     }
     const bool fits = !track.is_number_unsigned() || track.get<std::uint64_t>() <= kMostTrack;
     if (track.is_number_integer() && fits && track >= 0) return track.get<std::int64_t>();
-    const bool is_none = track.is_null() || track == "" || track == -1;
-    if (other.empty() && !is_none) other = dump_json(track, JsonLayout::kAsciiLine);
+    if (other.empty() && !is_none) other = in_quotes(dump_json(track));
   }
   return other;
 }

@@ -142,9 +142,9 @@ NamedBox box_of(const Row& row, bool has_sides, char separator) {
     const std::size_t column = kLeft + i + (has_sides && i >= 2 ? kWidth - kRight : 0);
     const auto edge = edge_of(row[column], separator);
     if (!edge || std::abs(*edge) > kFarthest_px) {
-      throw BadLabel(
-          fmt::format("{} as a number up to {:.0f}", kColumns[column].title, kFarthest_px),
-          in_quotes(row[column]));
+      throw BadLabel(fmt::format("{} as a number from -{:.0f} to {:.0f}", kColumns[column].title,
+                                 kFarthest_px, kFarthest_px),
+                     in_quotes(row[column]));
     }
     *edges[i] = *edge;
   }

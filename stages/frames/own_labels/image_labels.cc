@@ -91,8 +91,9 @@ void forget_shared_tracks(const std::string& place, Annotation& annotation) {
   times.erase(Box().track_id);
   std::erase_if(times, [](const auto& track) { return track.second == 1; });
   for (const auto& [track, boxes] : times) {
-    annotation.tracks_left_out.push_back(fmt::format(
-        "expected each track once in an image, got {} of {} boxes, in {}", track, boxes, place));
+    annotation.tracks_left_out.push_back(
+        fmt::format("expected each track once in an image, got track {} of {} boxes, in {}", track,
+                    boxes, place));
   }
   for (Box& box : annotation.boxes) {
     if (times.contains(box.track_id)) box.track_id = Box().track_id;

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -176,11 +177,21 @@ class FrameLabels {
       boxes[k] = frame_.moves_alone(k) ? object(k) : part_of_image(k);
     }
     for (const Person& person : still_.persons) add_person(person, moved);
-    for (auto& box : boxes) {
-      if (box && dataset_ == DatasetKind::kKittiObject && !box->ignore) {
-        box->difficulty = kitti_difficulty(*box);
+    std::set<std::int64_t> taken;
+    for (const Box& box : still_.boxes) taken.insert(box.track_id);
+    std::int64_t unused = 0;
+    for (std::size_t k = 0; k < boxes.size(); ++k) {
+      std::int64_t track = still_.boxes[k].track_id;
+      if (track < 0) {  // it gets a number, the same in all frames, whether it is seen or not
+        while (taken.contains(unused)) ++unused;
+        track = unused++;
       }
-      if (box) moved.boxes.push_back(std::move(*box));
+      if (!boxes[k]) continue;
+      boxes[k]->track_id = track;
+      if (dataset_ == DatasetKind::kKittiObject && !boxes[k]->ignore) {
+        boxes[k]->difficulty = kitti_difficulty(*boxes[k]);
+      }
+      moved.boxes.push_back(std::move(*boxes[k]));
     }
     return moved;
   }
@@ -217,7 +228,6 @@ class FrameLabels {
     }
     truncate(box, 1 - inside / pixels);
     box.occlusion = occluded(box.occlusion, 1 - seen / inside);
-    if (box.track_id < 0) box.track_id = static_cast<std::int64_t>(k);
     forget_space(box);
     return box;
   }
@@ -250,7 +260,6 @@ class FrameLabels {
     const Rectangle seen = cut(whole, frame_.area());
     const double share = area_of(whole) > 0 ? area_of(seen) / area_of(whole) : 0;
     if (share < kLeastSeen) return std::nullopt;
-    if (box.track_id < 0) box.track_id = static_cast<std::int64_t>(k);
     box.outline = frame_.outline(frame_.image_map(), std::move(box.outline));
     box.xyxy = seen;
     if (!box.ignore) truncate(box, 1 - share);

@@ -69,7 +69,8 @@ TEST_F(RecordingLabelsTest, CsvNamesEveryLineThatIsWrong) {
               "x,1,2,3,4,car,\n1,1,2,nan,4,car,\n1,1,2,3,4,,\n"
               "1,1,2,3,4,car,eazy\n1,2,3\n\xff\n1,1,2,3,4,\"a\"b,easy\n",
           {"expected a time in seconds, got \"x\", in " + place + " (line 2)",
-           "expected right as a number up to 1000000, got \"nan\", in " + place + " (line 3)",
+           "expected right as a number from -1000000 to 1000000, got \"nan\", in " + place +
+               " (line 3)",
            "expected a class, got none, in " + place + " (line 4)",
            "expected easy, hard, dont_care or nothing, got \"eazy\", in " + place + " (line 5)",
            "expected 7 fields, got 3, in " + place + " (line 6)",
@@ -158,8 +159,10 @@ TEST_F(RecordingLabelsTest, BothFormsTakePlacesWithinAMillionPixels) {
   const std::string place = at("a.csv").string();
   EXPECT_EQ(read("a.csv", kHeader + std::string("1,-1e6,0,1e6,9,car,\n")).annotations.size(), 1u);
   refuses("a.csv", kHeader + std::string("1,-1e300,0,1e300,9,car,\n1,0,0,1000001,9,car,\n"),
-          {"expected left as a number up to 1000000, got \"-1e300\", in " + place + " (line 2)",
-           "expected right as a number up to 1000000, got \"1000001\", in " + place + " (line 3)"});
+          {"expected left as a number from -1000000 to 1000000, got \"-1e300\", in " + place +
+               " (line 2)",
+           "expected right as a number from -1000000 to 1000000, got \"1000001\", in " + place +
+               " (line 3)"});
   refuses("a.json", R"({ "format": "eventgan-labels", "version": 1, "samples": [{ "time_s": 1,
             "boxes": [{ "left": -1e300, "top": 0, "right": 9, "bottom": 9, "class": "car" }] }] })",
           {"$.samples[0].boxes[0].left: expected a number -1e+06..1e+06"});

@@ -496,16 +496,17 @@ TEST_F(CocoLabels, ItIsToldWhyATrackIsLeftOut) {
     return ElementsAre(
         StartsWith("expected a whole number from 0 as track, got "s + got + ", in "));
   };
-  for (const char* more :
-       {"", R"(, "track_id": null)", R"(, "track_id": "")", R"(, "track_id": -1)",
-        R"(, "track_id": "7")", R"(, "track_id": "a-7", "instance_id": 3)"}) {
+  for (const char* more : {"", R"(, "track_id": null)", R"(, "track_id": "")",
+                           R"(, "track_id": -1)", R"(, "track_id": "7")", R"(, "track_id": "-1")",
+                           R"(, "track_id": "a-7", "instance_id": 3)"}) {
     EXPECT_THAT(left_out(more, ""), IsEmpty()) << more;
   }
-  EXPECT_THAT(left_out(R"(, "track_id": "a-7")", ""), is_none(R"("a-7")"));
-  EXPECT_THAT(left_out(R"(, "attributes": {"track_id": 4.5})", ""), is_none("4.5"));
-  EXPECT_THAT(left_out(R"(, "track_id": 9223372036854775808)", ""), is_none("9223372036854775808"));
+  EXPECT_THAT(left_out(R"(, "track_id": "a-7")", ""), is_none(R"('"a-7"')"));
+  EXPECT_THAT(left_out(R"(, "attributes": {"track_id": 4.5})", ""), is_none("'4.5'"));
+  EXPECT_THAT(left_out(R"(, "track_id": 9223372036854775808)", ""),
+              is_none("'9223372036854775808'"));
   EXPECT_THAT(left_out(R"(, "track_id": 1)", R"(, "track_id": 1)"),
-              ElementsAre("expected each track once in an image, got 1 of 2 boxes, in "
+              ElementsAre("expected each track once in an image, got track 1 of 2 boxes, in "
                           "instances.json#images/7"));
 }
 

@@ -161,8 +161,9 @@ TEST_F(NamedLabels, ATrackOfTwoBoxesIsLeftOut) {
   ASSERT_EQ(read.boxes.size(), 2u);
   EXPECT_EQ(read.boxes[0].track_id, -1);
   EXPECT_EQ(read.boxes[1].track_id, -1);
-  EXPECT_THAT(read.tracks_left_out,
-              ElementsAre("expected each track once in an image, got 3 of 2 boxes, in x/1.xml"));
+  EXPECT_THAT(
+      read.tracks_left_out,
+      ElementsAre("expected each track once in an image, got track 3 of 2 boxes, in x/1.xml"));
 }
 
 TEST_F(NamedLabels, NamesThatNoPlanCanHaveAreLeftOut) {

@@ -165,6 +165,19 @@ TEST_F(StillClipsTest, OneFrameIsTheSameInBothOfItsPairs) {
   }
 }
 
+TEST_F(StillClipsTest, ABoxWithoutTrackGetsANumberThatNoOtherHas) {
+  pairs().stills = StillsSpec{{0, 0}, 0, 0};
+  still_.boxes = {{.xyxy = {40, 40, 60, 60}},
+                  {.xyxy = {0, 0, 9, 9}},  // outside of the window
+                  {.xyxy = {50, 40, 70, 60}, .track_id = 0},
+                  {.xyxy = {60, 40, 80, 60}}};
+  const Annotation annotation = annotation_of(open(), 9);
+  ASSERT_EQ(annotation.boxes.size(), 3u);
+  EXPECT_EQ(annotation.boxes[0].track_id, 1);
+  EXPECT_EQ(annotation.boxes[1].track_id, 0);
+  EXPECT_EQ(annotation.boxes[2].track_id, 3);
+}
+
 TEST_F(StillClipsTest, WithoutMotionLabelsAreTheStillsInTheWindow) {
   pairs().stills = StillsSpec{{0, 0}, 0, 0};
   still_.boxes.push_back({.class_id = 0, .xyxy = {0, 0, 30, 30}, .ignore = true});
