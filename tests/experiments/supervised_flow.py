@@ -8,8 +8,8 @@ events of cameras.
 Each photograph is a clip, in which image and labelled objects move on their own; each way of making its events has a
 row, of the same motions. The network and its training are those of train_flow.py; networks see no recording. Scored is
 how far the previous frame, moved by the flow, is from the next one at pixels with events, as a share of that without
-flow. The controls have learnt nothing: among them is what the network has at first, planes in the time of events, and
-the best constant flow, which is chosen on the test. The same command resumes.
+flow. The controls have learnt nothing: among them is what the network has at first, the flow by least squares, and the
+best constant flow, which is chosen on the test. The same command resumes.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from self_supervised import CONTROLS, REAL, Pair
 TRAINER = pathlib.Path(train_flow.__file__)
 ROWS: dict[str, dict[str, Any]] = {"EventGAN 8": {"weights": "shipped:8"}, "EventGAN 16": {"weights": "shipped:16"},
                                    "esim": {"kind": "esim"}, "difference": {"kind": "difference"}}
-PLANES = "planes in the time of events"  # the network that has learnt nothing
+UNTAUGHT = "least squares"  # the network that has learnt nothing
 SIDE, CLIP = 160, 5  # pixels of the volumes; frames of each photograph
 # In pixels of the photographs, which are two to three times as large as the volumes: half of all pixels move by less
 # than 2 px there, a hundredth by more than 7.
@@ -124,7 +124,7 @@ def main() -> None:
 
     rows = {name: [kept(name, lambda pairs, name=name: self_supervised.control_scores(name, pairs)["error"])]
             for name in CONTROLS}
-    rows[PLANES] = [kept(PLANES, lambda pairs: error_of(train_flow.FlowNetwork(2 * recordings.BINS).eval(), pairs))]
+    rows[UNTAUGHT] = [kept(UNTAUGHT, lambda pairs: error_of(train_flow.FlowNetwork(2 * recordings.BINS).eval(), pairs))]
     plain = np.array([*rows[next(iter(CONTROLS))][0].values()])
     for seed in range(args.seeds):  # all rows of a seed first: they can be compared early
         for row in args.rows:

@@ -41,7 +41,7 @@ def test_a_small_run_fills_the_table_and_goes_on(recording_folder, tmp_path):
     rows = {row["learnt on"]: row for row in csv.DictReader((tmp_path / "out" / "table.csv").open())}
     assert set(rows) == {"previous frame as it is", "previous frame blurred by 1 px",
                          "previous frame moved by half a pixel", "best constant flow of the recording",
-                         "planes in the time of events", "difference", "esim"}
+                         "least squares", "difference", "esim"}
     assert float(rows["previous frame as it is"]["mean"]) == 1
     # by a pixel to the right, but for what comes in at the edge
     assert float(rows["best constant flow of the recording"]["mean"]) < 0.2

@@ -3,9 +3,10 @@
 
     train_flow.py --data out --test recordings --out flows
 
-It finds how each pixel has moved from the previous image to the next in an event volume: planes in the time of events
-say it roughly, and the flow network of the EventGAN paper, of a quarter of its width, corrects them. Shards with flow
-are of photographs, with `"flow": true` in their source.
+It finds how each pixel has moved from the previous image to the next in an event volume: a least-squares fit gives a
+first answer, and the flow network of the EventGAN paper, of a quarter of its width and with group normalization,
+corrects it. Shards with flow are of photographs, with `"flow": true` in their source; `"kind": "esim"` makes events
+that follow this motion.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import collections
 import json
 import math
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import cv2
@@ -30,28 +31,43 @@ from torch.nn import functional
 from torch.utils.data import Dataset
 
 LEVELS, RESIDUAL_BLOCKS, WIDTH = 4, 2, 8
-STEPS = 6000  # unless the options say
+STEPS = 1500  # unless the options say
 SIDE = 96  # of the crops, pixels
-WINDOWS = (4, 8, 16)  # pixels, of planes in the time of events
-RESTING, FARTHEST = 0.01, 16.0  # what is added to the planes' sums of squares; most pixels of their flow
+WINDOWS = (4, 8, 32)  # pixels, of planes in the time of events
+STEP_WINDOW = 16  # of the step by gradients
+# Added to the mean squares, of gradients as a share of the volume's: this favours no motion.
+RESTING, STEP_RESTING = 0.01, 0.03
+FARTHEST = 16.0  # most pixels of flow by least squares
 CHECKED = 64  # validation samples that are looked at while it learns
 # Polarities are exchanged, but not time: flow is at the pixels of one image, backwards of the other.
 AUGMENTATION = EventAugmentation(flip=0, invert=0.5, threshold=(0.0, 0.5), lost=(0.0, 0.4), isolated=(0.0, 0.02))
 
 
-def layer(inputs: int, outputs: int, kernel: int = 3, stride: int = 1, norm: bool = True,
+Norm = Callable[[int], nn.Module]  # of so many channels
+
+
+def batch_norm(channels: int) -> nn.Module:
+    return nn.BatchNorm2d(channels, momentum=0.01)
+
+
+def group_norm(channels: int) -> nn.Module:
+    """Groups of 8 channels, each sample alone: the same in training and in evaluation."""
+    return nn.GroupNorm(channels // 8, channels)
+
+
+def layer(inputs: int, outputs: int, kernel: int = 3, stride: int = 1, norm: Norm | None = None,
           activation: nn.Module | None = None) -> nn.Sequential:
     parts: dict[str, nn.Module] = {"conv2d": nn.Conv2d(inputs, outputs, kernel, stride, kernel // 2, bias=not norm)}
     if norm:
-        parts["norm_layer"] = nn.BatchNorm2d(outputs, momentum=0.01)
+        parts["norm_layer"] = norm(outputs)
     return nn.Sequential(collections.OrderedDict(parts, activation=activation or nn.LeakyReLU(0.01)))
 
 
 class ResidualBlock(nn.Module):
-    def __init__(self, channels: int) -> None:
+    def __init__(self, channels: int, norm: Norm) -> None:
         super().__init__()
         self.conv1, self.conv2 = (nn.Conv2d(channels, channels, 3, padding=1, bias=False) for _ in range(2))
-        self.bn1, self.bn2 = nn.BatchNorm2d(channels), nn.BatchNorm2d(channels)
+        self.bn1, self.bn2 = norm(channels), norm(channels)
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         return torch.relu(x + self.bn2(self.conv2(torch.relu(self.bn1(self.conv1(x))))))
@@ -66,18 +82,21 @@ class UNet(nn.Module):
         Channels.
     width : int
         Channels of the first layer; each of the four levels below has twice as many as the one above it.
+    norm : callable
+        The layer that normalizes so many channels.
     """
 
-    def __init__(self, inputs: int, outputs: int, width: int = WIDTH) -> None:
+    def __init__(self, inputs: int, outputs: int, width: int = WIDTH, norm: Norm = batch_norm) -> None:
         super().__init__()
         widths = [width << level for level in range(LEVELS + 1)]
-        self.head = layer(inputs, width, norm=False)
-        self.encoders = nn.ModuleList(layer(above, below, stride=2) for above, below in zip(widths, widths[1:]))
-        self.resblocks = nn.Sequential(*(ResidualBlock(widths[-1]) for _ in range(RESIDUAL_BLOCKS)))
+        self.head = layer(inputs, width)
+        self.encoders = nn.ModuleList(layer(above, below, stride=2, norm=norm)
+                                      for above, below in zip(widths, widths[1:]))
+        self.resblocks = nn.Sequential(*(ResidualBlock(widths[-1], norm) for _ in range(RESIDUAL_BLOCKS)))
         # Each but the lowest takes the prediction of the level below, too.
-        self.decoders = nn.ModuleList(layer(3 * each + (outputs if i else 0), each)
+        self.decoders = nn.ModuleList(layer(3 * each + (outputs if i else 0), each, norm=norm)
                                       for i, each in enumerate(widths[-2::-1]))
-        self.pred_layers = nn.ModuleList(layer(each, outputs, 1, norm=False, activation=nn.Tanh())
+        self.pred_layers = nn.ModuleList(layer(each, outputs, 1, activation=nn.Tanh())
                                          for each in widths[-2::-1])
         for parameter in self.parameters():
             if parameter.dim() == 4:
@@ -108,12 +127,40 @@ def begin_at_rest(network: UNet) -> UNet:
 
 def blurred(images: torch.Tensor, times: int = 1) -> torch.Tensor:
     """[B, C, H, W] by 1, 2, 1 along x and y, so many times."""
-    kernel = torch.tensor([1.0, 2.0, 1.0], device=images.device) / 4
-    kernel = (kernel[:, None] * kernel).expand(images.shape[1], 1, 3, 3)
     for _ in range(times):
-        images = functional.conv2d(functional.pad(images, (1, 1, 1, 1), mode="replicate"), kernel,
-                                   groups=images.shape[1])
+        images = functional.pad(images, (1, 1, 1, 1), mode="replicate")
+        images = (images[..., :-2] + 2 * images[..., 1:-1] + images[..., 2:]) / 4
+        images = (images[..., :-2, :] + 2 * images[..., 1:-1, :] + images[..., 2:, :]) / 4
     return images
+
+
+def moved(images: torch.Tensor, flow: torch.Tensor) -> torch.Tensor:
+    """Images [B, C, H, W], each pixel looked up where it and flow [B, 2, H, W], in pixels, lead; beyond the edge their
+    outermost pixels."""
+    height, width = flow.shape[2:]
+    y, x = torch.meshgrid(torch.arange(height, device=flow.device), torch.arange(width, device=flow.device),
+                          indexing="ij")
+    places = (torch.stack([x, y], 2) + flow.permute(0, 2, 3, 1)) / torch.tensor([width - 1, height - 1],
+                                                                              device=flow.device)
+    return functional.grid_sample(images, 2 * places - 1, padding_mode="border", align_corners=True)
+
+
+def least_squares(moments: torch.Tensor, side: int, resting: float | torch.Tensor) -> torch.Tensor:
+    """The flow [B, 2, H, W], pixels, that minimizes the mean of (g . flow - a)^2, plus resting |flow|^2, over the
+    windows of `side` pixels around. moments [B, 5, H, W]: g_x^2, g_x g_y, g_y^2, g_x a, g_y a."""
+    height, width = moments.shape[2:]
+    parts = functional.avg_pool2d(functional.pad(moments, (0, -width % side, 0, -height % side)), side)
+    xx, xy, yy, x, y = blurred(parts).unbind(1)
+    xx, yy = xx + resting, yy + resting
+    flow = torch.stack([yy * x - xy * y, xx * y - xy * x], 1) / (xx * yy - xy * xy)[:, None]
+    return functional.interpolate(flow.clamp(-FARTHEST, FARTHEST), scale_factor=side,
+                                  mode="bilinear")[..., :height, :width]
+
+
+def gradients(images: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Of images [B, C, H, W] along x, and along y."""
+    images = functional.pad(images, (1, 1, 1, 1), mode="replicate")
+    return ((images[..., 1:-1, 2:] - images[..., 1:-1, :-2]) / 2, (images[..., 2:, 1:-1] - images[..., :-2, 1:-1]) / 2)
 
 
 def planes(volume: torch.Tensor) -> tuple[torch.Tensor, list[torch.Tensor]]:
@@ -131,35 +178,45 @@ def planes(volume: torch.Tensor) -> tuple[torch.Tensor, list[torch.Tensor]]:
         float32 [B, 4, H, W]: of the positive and the negative events' mean time, from -1 to 1, along x, then along y,
         weighted by how many events there are.
     flows : list of torch.Tensor
-        float32 [B, 2, H, W], pixels, for each of WINDOWS: the motion of which the slopes around a pixel are, by least
-        squares that prefer no motion.
+        float32 [B, 2, H, W], pixels, for each of WINDOWS: the motion of which the slopes around a pixel are, by
+        least_squares.
     """
-    bins, (height, width) = volume.shape[1] // 2, volume.shape[2:]
+    bins = volume.shape[1] // 2
     time = torch.linspace(-1, 1, bins, device=volume.device)[:, None, None]
     events = volume.float().unflatten(1, (2, bins))
     count, times = blurred(torch.cat([events.sum(2), (events * time).sum(2)], 1), 3).chunk(2, 1)
-    mean = functional.pad(times / (count + 0.02), (1, 1, 1, 1), mode="replicate")
-    x, y = ((mean[..., 1:-1, 2:] - mean[..., 1:-1, :-2]) / 2, (mean[..., 2:, 1:-1] - mean[..., :-2, 1:-1]) / 2)
+    x, y = gradients(times / (count + 0.02))
     weight = count / (count + 0.1)
-    moments = torch.stack([weight * each for each in (x * x, x * y, y * y, x, y)], 1).sum(2)
-    flows = []
-    for side in WINDOWS:
-        parts = functional.avg_pool2d(functional.pad(moments, (0, -width % side, 0, -height % side)), side)
-        xx, xy, yy, sum_x, sum_y = blurred(parts).unbind(1)
-        xx, yy = xx + RESTING, yy + RESTING
-        flow = 2 * torch.stack([yy * sum_x - xy * sum_y, xx * sum_y - xy * sum_x], 1) / (xx * yy - xy * xy)[:, None]
-        flows.append(functional.interpolate(flow.clamp(-FARTHEST, FARTHEST), scale_factor=side,
-                                            mode="bilinear")[..., :height, :width])
-    return torch.cat([weight * x, weight * y], 1), flows
+    moments = torch.stack([weight * each for each in (x * x, x * y, y * y, 2 * x, 2 * y)], 1).sum(2)
+    return torch.cat([weight * x, weight * y], 1), [least_squares(moments, side, RESTING) for side in WINDOWS]
+
+
+def step_by_gradients(volume: torch.Tensor, flow: torch.Tensor, position: float) -> torch.Tensor:
+    """A better flow [B, 2, H, W], pixels: the gradients of the bins, blurred and moved by it to the first time
+    (position 0) or the last (1), at whose pixels it is, say what it lacks (Lucas and Kanade 1981, "An iterative image
+    registration technique")."""
+    bins = volume.shape[1] // 2
+    if bins < 3:
+        return flow
+    events = blurred(volume.float(), 3).unflatten(1, (2, bins))
+    events = torch.stack([moved(each, (i / (bins - 1) - position) * flow)
+                          for i, each in enumerate(events.unbind(2))], 2)
+    x, y = (each.unflatten(1, (2, bins))[:, :, 1:-1] for each in gradients(events.flatten(1, 2)))
+    time = (events[:, :, 2:] - events[:, :, :-2]) * (bins - 1) / 2
+    moments = torch.stack([each.sum((1, 2)) for each in (x * x, x * y, y * y, -x * time, -y * time)], 1)
+    resting = STEP_RESTING * (moments[:, 0] + moments[:, 2]).mean((1, 2), keepdim=True) + 1e-9  # not 0 without events
+    return (flow + least_squares(moments, STEP_WINDOW, resting)).clamp(-FARTHEST, FARTHEST)
 
 
 class FlowNetwork(nn.Module):
-    """The U-Net, which finds what is to be added to the flow of the largest planes. It sees slopes and flows of all
-    planes beside the volume. At first it adds nothing."""
+    """The U-Net, which finds what is to be added to the flow by least squares: of the largest planes, and a step by
+    gradients. It sees slopes and flows of all planes, and this one, beside the volume. At first it adds nothing. Flow
+    is at the pixels of the next image (position 1) or of the previous one (0)."""
 
-    def __init__(self, channels: int) -> None:
+    def __init__(self, channels: int, position: float = 1) -> None:
         super().__init__()
-        self.unet = begin_at_rest(UNet(channels + 4 + 2 * len(WINDOWS), 2))
+        self.position = position
+        self.unet = begin_at_rest(UNet(channels + 4 + 2 * (len(WINDOWS) + 1), 2, norm=group_norm))
         for prediction in self.unet.pred_layers:
             prediction.activation = nn.Identity()
 
@@ -167,17 +224,9 @@ class FlowNetwork(nn.Module):
         """Float [B, 2b, H, W] -> four flows in pixels, float32 [B, 2, h, w], coarse to fine, the last one of H x W."""
         with torch.autocast(volume.device.type, enabled=False):
             slopes, flows = planes(volume)
+            flows.append(step_by_gradients(volume, flows[-1], self.position))
         added = self.unet(torch.cat([volume, slopes, *(flow / 4 for flow in flows)], 1))
         return [functional.adaptive_avg_pool2d(flows[-1], each.shape[2:]) + each.float() for each in added]
-
-
-def moved(previous: torch.Tensor, flow: torch.Tensor) -> torch.Tensor:
-    """Frames [B, 1, H, W], each pixel looked up where it and flow [B, 2, H, W], in pixels, lead; beyond the edge their
-    outermost pixels."""
-    height, width = flow.shape[2:]
-    y, x = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
-    places = (torch.stack([x, y], 2) + flow.permute(0, 2, 3, 1)) / torch.tensor([width - 1, height - 1])
-    return functional.grid_sample(previous, 2 * places - 1, padding_mode="border", align_corners=True)
 
 
 def error_at_events(image: torch.Tensor, following: torch.Tensor, volume: torch.Tensor) -> float:
@@ -325,7 +374,7 @@ def main() -> None:
         raise SystemExit(f"expected flow at the pixels of the next image, or of the previous one (side), got both, in "
                          f"{args.data}")
     position = positions.pop()
-    network = FlowNetwork(len(items[0]["volume"]))
+    network = FlowNetwork(len(items[0]["volume"]), position)
     training.load_fitting(network, args.pretrained)
     network = network.to(args.device).to(memory_format=torch.channels_last)
 

@@ -216,25 +216,49 @@ def test_flow_network_learns_and_goes_on(tmp_path):
 
 @pytest.mark.parametrize("axis, sign", [(2, 1), (2, -1), (1, 1), (1, -1)])
 def test_planes_find_the_way_of_an_edge(monkeypatch, axis, sign):
-    """It goes over 128 pixels from time -1 to 1: an event a pixel, shared between two bins."""
+    """It goes over 256 pixels from time -1 to 1: an event a pixel, shared between two bins."""
     monkeypatch.syspath_prepend(str(EXAMPLES))
     import train_flow
 
-    at = torch.linspace(0, 8, 128)
+    at = torch.linspace(0, 8, 256)
     shares = (1 - (at - torch.arange(9)[:, None]).abs()).clamp(min=0)  # [bin, x]
-    volume = torch.zeros(18, 128, 128)
+    volume = torch.zeros(18, 256, 256)
     volume[:9] = shares[:, None]
     volume = volume if axis == 2 else volume.transpose(1, 2)
     slopes, flows = train_flow.planes((volume if sign == 1 else volume.flip(axis))[None])
-    slope, weight = 2 / 127 / 1.02, 1 / 1.1
+    slope, weight = 2 / 255 / 1.02, 1 / 1.1
     expected = torch.zeros(2)
     expected[2 - axis] = sign * 2 * weight * slope / (weight * slope**2 + train_flow.RESTING)
     for flow in flows:
-        found = flow[0, :, 62:66, 62:66]
+        found = flow[0, :, 126:130, 126:130]
         torch.testing.assert_close(found, expected[:, None, None].expand_as(found), rtol=1e-4, atol=1e-4)
-    assert slopes[0, 2 * (2 - axis), 64, 64] == pytest.approx(sign * weight * slope, rel=1e-4)
-    network = train_flow.FlowNetwork(18).eval()
-    assert torch.equal(train_flow.predict(network, volume), train_flow.planes(volume[None])[1][-1][0])
+    assert slopes[0, 2 * (2 - axis), 128, 128] == pytest.approx(sign * weight * slope, rel=1e-4)
+    network = train_flow.FlowNetwork(18)
+    for training in (True, False):  # it has learnt nothing, and has no statistics of batches
+        expected = train_flow.step_by_gradients(volume[None], train_flow.planes(volume[None])[1][-1], 1)
+        assert torch.equal(train_flow.predict(network.train(training), volume), expected[0])
+    torch.nn.init.ones_(network.unet.pred_layers[-1].conv2d.weight)
+    pair = torch.stack([volume, volume.roll(5, 1)])
+    torch.testing.assert_close(network.train()(pair)[-1][0], train_flow.predict(network.eval(), volume))
+    assert not torch.equal(train_flow.predict(network, volume), expected[0])
+
+
+@pytest.mark.parametrize("lacks", [(0, 0), (0.5, -0.5)])
+@pytest.mark.parametrize("position, rate", [(0, 0.1), (1, 0.1 / 1.1)])
+def test_a_step_by_gradients_finds_what_flow_lacks(monkeypatch, position, rate, lacks):
+    """A smooth pattern grows along x by a tenth: by x / 10 from the first pixels, by x / 11 to the last ones."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import train_flow
+
+    y, x = torch.meshgrid(torch.arange(96.0), torch.arange(128.0), indexing="ij")
+    volume = torch.stack([1 + torch.sin(x / (1 + 0.1 * t) / 4) * torch.cos(y / 5)
+                          for t in torch.linspace(0, 1, 9)]).repeat(2, 1, 1)[None]
+    flow = torch.stack([rate * x, 0 * y])
+    before = flow - torch.tensor(lacks)[:, None, None]
+    found = train_flow.step_by_gradients(volume, before[None], position)[0]
+    torch.testing.assert_close(found[:, 24:72, 24:96], flow[:, 24:72, 24:96], rtol=0, atol=0.1)
+    for nothing in (torch.zeros(1, 18, 96, 128), volume[:, :2]):  # no events; one bin
+        assert torch.equal(train_flow.step_by_gradients(nothing, before[None], position)[0], before)
 
 
 def test_flow_is_true_of_its_crop_and_moves_the_frames(monkeypatch):
