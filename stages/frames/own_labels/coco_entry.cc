@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "manifests/documents/json_text.h"
@@ -151,16 +150,15 @@ bool read_flag(const StrictValue& value) {
   return value.is_boolean() ? value.boolean() : value.integer(0, 1) == 1;
 }
 
-/// The object's number in its sequence: of CocoVID, TAO and PoseTrack, of BDD100K, of CVAT. If
-/// there is no whole number from 0, what there is instead, in quotes; "" if there is nothing, or
-/// -1.
-std::variant<std::int64_t, std::string> read_track(const nlohmann::json& annotation) {
+/// The object's number in its sequence: of CocoVID, TAO and PoseTrack, of BDD100K, of CVAT. -1 if
+/// there is none, or another value, of which `other` is the first one then, in quotes.
+std::int64_t read_track(const nlohmann::json& annotation, std::string& other) {
   constexpr std::uint64_t kMostTrack = std::numeric_limits<std::int64_t>::max();
   const auto member = [](const nlohmann::json& object, const char* key) {
     const auto found = object.is_object() ? object.find(key) : object.end();
     return object.is_object() && found != object.end() ? *found : nlohmann::json();
   };
-  std::string other;
+  std::string unread;
   for (const nlohmann::json& track :
        {member(annotation, "track_id"), member(annotation, "instance_id"),
         member(member(annotation, "attributes"), "track_id")}) {
@@ -171,10 +169,11 @@ std::variant<std::int64_t, std::string> read_track(const nlohmann::json& annotat
       is_none |= number == -1;
     }
     const bool fits = !track.is_number_unsigned() || track.get<std::uint64_t>() <= kMostTrack;
-    if (track.is_number_integer() && fits && track >= 0) return track.get<std::int64_t>();
-    if (other.empty() && !is_none) other = in_quotes(dump_json(track));
+    if (track.is_number_integer() && fits && track >= 0) return track;
+    if (unread.empty() && !is_none) unread = in_quotes(dump_json(track));
   }
-  return other;
+  other = unread;
+  return Box().track_id;
 }
 
 /// COCO-WholeBody's joints beside the 17 of the body, in the order of its 133.
@@ -368,8 +367,8 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
   for (const char* const key : {"iscrowd", "ignore"}) {
     if (const auto flag = find_given(object, key)) box.ignore |= read_flag(*flag);
   }
-  const std::variant<std::int64_t, std::string> track = read_track(entry.document());
-  if (const auto* number = std::get_if<std::int64_t>(&track)) box.track_id = *number;
+  std::string other_track;
+  box.track_id = read_track(entry.document(), other_track);
   if (const auto area = find_given(object, "area")) area->number(0, kFarthest_px * kFarthest_px);
   Person person;
   const std::size_t joints = schema.joint_names.size();
@@ -382,9 +381,9 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
   entry.check();
   if (!add_box(box, image, entry.place(), annotation)) return;
   note_parts_left_out(segmentation.without_area, segmentation.parts, entry.place(), annotation);
-  if (const auto* other = std::get_if<std::string>(&track); other && !other->empty()) {
-    annotation.tracks_left_out.push_back("expected a whole number from 0 as track, got " + *other +
-                                         ", in " + entry.place());
+  if (!other_track.empty()) {
+    annotation.tracks_left_out.push_back("expected a whole number from 0 as track, got " +
+                                         other_track + ", in " + entry.place());
   }
   if (is_person) {
     person.box = box.xyxy;

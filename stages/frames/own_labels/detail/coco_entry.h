@@ -38,8 +38,8 @@ LabelSchema coco_schema(const CocoIndex& index, const std::string& path);
 /// box that is left out. Its `segmentation` is the outline: polygons, of which those without area
 /// are left out, or run lengths of the image's size, plain or compressed; and without `bbox` the
 /// outline's bounds are the box. `track_id`, `instance_id` or `attributes.track_id` is the track,
-/// unless another object of the image has it (forget_shared_tracks). Not looked at is what no label
-/// comes of: num_keypoints, and joints that have no names (CocoIndex).
+/// unless another object of the image has it (forget_shared_tracks); another value is counted. Not
+/// looked at is what no label comes of: num_keypoints, and joints that have no names (CocoIndex).
 void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSize image,
                          const CocoIndex& index, const LabelSchema& schema, const std::string& path,
                          Annotation& annotation);
