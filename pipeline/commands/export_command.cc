@@ -138,7 +138,8 @@ void add_export_command(CLI::App& app, int& exit_code) {
                   "lines of text, t x y p (default), or HDF5 as MVSEC has it"),
               kEventFiles);
   add("--representation", arguments->representation,
-      "histogram:T (default: histogram:10), RVT's of 50 ms, or volume, that of each sample")
+      "rvt: histogram:T (default: histogram:10), its own of 50 ms, or volume, that of each sample; "
+      "webdataset: one of eventgan help representations in place of the volume")
       ->option_text("WORD");
   add("--frames-per-second", options.frames_per_second,
       "frames a second of images whose times are not known; default: 1")

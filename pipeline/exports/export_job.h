@@ -91,7 +91,8 @@ struct ExportOptions {
   /// How many events are drawn of a volume; unset: kPoisson, and of recordings the camera's own.
   std::optional<EventCounts> counts;
   EventFile event_file = EventFile::kText;
-  /// Of `rvt`: histogram:T, or volume; unset: histogram:10.
+  /// Of `rvt` histogram:T, or volume; unset: histogram:10. Of `webdataset` a word of
+  /// representations(); unset: the volume as stored.
   std::optional<std::string> representation;
   std::filesystem::path frames;  ///< where frame paths start; empty: as recorded by convert
   double frames_per_second = 1;  ///< of images whose times are not known, 1e-3..1e6

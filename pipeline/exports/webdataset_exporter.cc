@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string_view>
@@ -19,9 +20,10 @@
 #include "manifests/values/half.h"
 #include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
-#include "pipeline/exports/detail/exporter.h"
+#include "pipeline/exports/detail/sample_events.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/archives/numpy_arrays.h"
+#include "stages/events/representation.h"
 #include "stages/exports/array_files.h"
 #include "stages/shards/codec/volume_codec.h"
 #include "stages/shards/shard_tables.h"
@@ -122,8 +124,10 @@ const char* dtype_of(StoredType type) {
   return "|u1";
 }
 
-/// `volume` as the shard stores it, its `scale`, and of a sample with flow `flow` and `flow_valid`.
-std::string arrays_npz(const OutgoingSample& sample) {
+using Arrays = std::vector<std::pair<std::string, std::string>>;  ///< names and .npy files
+
+/// `volume` as the shard stores it, and its `scale`.
+Arrays volume_arrays(const OutgoingSample& sample) {
   const ShardHeader& header = sample.reader.header();
   const VolumeShape& shape = header.volume;
   const std::size_t size_bytes = shape.value_count() * stored_size(header.dtype);
@@ -136,19 +140,21 @@ std::string arrays_npz(const OutgoingSample& sample) {
   const std::vector<std::size_t> sides{static_cast<std::size_t>(shape.channels()),
                                        static_cast<std::size_t>(shape.size.height),
                                        static_cast<std::size_t>(shape.size.width)};
-  std::vector<std::pair<std::string, std::string>> arrays = {
-      {"volume", npy_file(dtype_of(header.dtype), sides, *stored)},
-      {"scale", npy_file("<f4", {}, std::vector<float>{sample.labels.scale})}};
-  if (!sample.labels.flow.empty()) {
-    const std::vector<Half>& halves = sample.reader.tables().flow;
-    const std::size_t pixels = shape.size.pixel_count();
-    const std::span row =
-        std::span(halves).subspan(2 * pixels * static_cast<std::size_t>(sample.slot), 2 * pixels);
-    arrays.emplace_back("flow", npy_file("<f2", {2, sides[1], sides[2]}, std::as_bytes(row)));
-    arrays.emplace_back("flow_valid",
-                        npy_file("|u1", {sides[1], sides[2]}, sample.labels.flow.valid));
-  }
-  return npz_file(arrays);
+  return {{"volume", npy_file(dtype_of(header.dtype), sides, *stored)},
+          {"scale", npy_file("<f4", {}, std::vector<float>{sample.labels.scale})}};
+}
+
+/// Of a sample with flow `flow` and `flow_valid`, else none.
+Arrays flow_arrays(const OutgoingSample& sample) {
+  if (sample.labels.flow.empty()) return {};
+  const ImageSize size = sample.reader.header().volume.size;
+  const std::vector<std::size_t> sides{static_cast<std::size_t>(size.height),
+                                       static_cast<std::size_t>(size.width)};
+  const std::size_t values = 2 * size.pixel_count();
+  const std::span row = std::span(sample.reader.tables().flow)
+                            .subspan(values * static_cast<std::size_t>(sample.slot), values);
+  return {{"flow", npy_file("<f2", {2, sides[0], sides[1]}, std::as_bytes(row))},
+          {"flow_valid", npy_file("|u1", sides, sample.labels.flow.valid)}};
 }
 
 std::string tar_name(const ExportShard& shard) {
@@ -158,9 +164,23 @@ std::string tar_name(const ExportShard& shard) {
 /// SHARD.tar with NAME.npz and NAME.json.
 class WebdatasetExporter : public Exporter {
  public:
-  WebdatasetExporter(const ExportInput&, const ExportOptions&) {}
+  WebdatasetExporter(const ExportInput& input, const ExportOptions& options)
+      : seed_(options.seed), events_(input, options) {
+    if (options.representation) {
+      representation_ = parse_representation(*options.representation);
+      word_ = *options.representation;
+    }
+  }
 
-  std::string settings() const override { return ""; }
+  std::string settings() const override {
+    return representation_
+               ? fmt::format("representation {}\n{}seed {}\n", word_, events_.settings(), seed_)
+               : "";
+  }
+
+  void check(const ExportInput&, const std::function<void()>&) const override {
+    if (representation_) events_.open();
+  }
 
   void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
                    ExportFolder::Step& step) const override {
@@ -184,6 +204,37 @@ class WebdatasetExporter : public Exporter {
     file.write(tar_end());
     file.publish();
   }
+
+ private:
+  std::string arrays_npz(const OutgoingSample& sample) const {
+    Arrays arrays =
+        representation_ ? Arrays{{"representation", represented(sample)}} : volume_arrays(sample);
+    for (auto& array : flow_arrays(sample)) arrays.push_back(std::move(array));
+    return npz_file(arrays);
+  }
+
+  /// The .npy file of what the sample's events become; the interval is the pair's.
+  std::string represented(const OutgoingSample& sample) const {
+    const ImageSize size = sample.reader.header().volume.size;
+    const double gap_s = known_gap_s(sample.labels.pair);
+    std::vector<Event> events = events_.of(sample, gap_s);
+    // A recording's times are rounded where its clock starts long before.
+    for (Event& event : events) event.t_s = std::clamp(event.t_s, 0.0, gap_s);
+    std::vector<std::size_t> sides{static_cast<std::size_t>(size.height),
+                                   static_cast<std::size_t>(size.width)};
+    const int channels = channels_of(*representation_);
+    if (channels > 0) sides.insert(sides.begin(), static_cast<std::size_t>(channels));
+    const std::size_t bytes = number_bytes(*representation_);
+    std::vector<std::byte> values(static_cast<std::size_t>(std::max(1, channels)) *
+                                  size.pixel_count() * bytes);
+    represent(events, *representation_, size, std::array{0.0, gap_s}, values);
+    return npy_file(bytes == 1 ? "|u1" : "<f4", sides, values);
+  }
+
+  std::uint64_t seed_;
+  SampleEvents events_;
+  std::optional<Representation> representation_;  ///< none: the volume as stored
+  std::string word_;                              ///< its
 };
 
 }  // namespace
@@ -194,8 +245,8 @@ ExportFormat webdataset_format() {
       .title = "tar files with a .npz and a .json for each sample",
       .need = LabelNeed::kNone,
       .tasks = {"object-detection", "keypoint-detection"},
-      .options = {},
-      .files = {{"SHARD.tar", "NAME.npz with the volume and NAME.json with the labels of samples"}},
+      .options = {"--counts", "--representation", "--seed"},
+      .files = {{"SHARD.tar", "NAME.npz with the events and NAME.json with the labels of samples"}},
       .make = make_exporter<WebdatasetExporter>};
 }
 

@@ -2,10 +2,12 @@
 as their pages describe the bytes."""
 
 import importlib
+import io
 import json
 import pathlib
 import shutil
 import sys
+import tarfile
 import tempfile
 import types
 import unittest.mock
@@ -682,6 +684,35 @@ class EventsOfACamera(Export):
             expected = self.expected(int(first * 1e6), int(last * 1e6))
             np.testing.assert_allclose(first + t, expected[0] * 1e-6, atol=1e-8)
             np.testing.assert_array_equal(others, expected[1:])
+
+    def test_webdataset_has_what_they_become(self):
+        source = self.convert()
+        for word, dtype, expected in (
+                ("count", np.float32, lambda t, pixel, p: np.stack([pixel(p == 1), pixel(p == 0)])),
+                ("histogram:4", np.uint8, lambda t, pixel, p: np.minimum(10, np.stack(
+                    [pixel((p == side) & (np.minimum(4 * t, 3).astype(int) == k))
+                     for side in (0, 1) for k in range(4)]))),
+                ("voxel:2", np.float32, lambda t, pixel, p: np.stack(
+                    [pixel((2 * p - 1) * share) for share in (1 - t, t)]))):
+            with self.subTest(word=word):
+                out = self.out / word.replace(":", "_")
+                self.export("webdataset", "--representation", word, source=source, out=out)
+                self.assertIn(f"representation {word}\ncounts recorded\n", self.described(out)["settings"])
+                with tarfile.open(next(out.glob("*.tar"))) as tar:
+                    arrays = {member.name: np.load(io.BytesIO(tar.extractfile(member).read()))
+                              for member in tar if member.name.endswith(".npz")}
+                self.assertEqual(len(arrays), len(self.FRAMES) - 1)
+                for first, last in zip(self.FRAMES, self.FRAMES[1:]):
+                    found = arrays[f"walk+{last:017.6f}".replace(".", "%2E") + ".npz"]
+                    self.assertEqual(found.files, ["representation"])
+                    ticks, x, y, p = self.expected(int(first * 1e6), int(last * 1e6))
+                    share = (ticks * 1e-6 - first) / (last - first)
+
+                    def pixel(weights, x=x, y=y):
+                        return np.histogram2d(y, x, bins=(48, 64), range=((0, 48), (0, 64)), weights=weights)[0]
+
+                    self.assertEqual(found["representation"].dtype, dtype)
+                    np.testing.assert_allclose(found["representation"], expected(share, pixel, p), atol=1e-5)
 
     def test_windows_that_begin_at_half_a_microsecond(self):
         """The label is in the middle of 33.333 ms: no event is moved to another microsecond."""

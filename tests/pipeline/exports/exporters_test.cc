@@ -304,6 +304,29 @@ TEST_F(Exporters, WebdatasetHasTheVolumeAsItIsStored) {
   EXPECT_EQ(tar_content(tar, "000002.json"), "") << "in quarantine";
 }
 
+TEST_F(Exporters, WebdatasetHasWhatTheEventsOfTheVolumeBecome) {
+  ExportOptions options;
+  options.representation = "count";
+  const std::filesystem::path tar = exported("webdataset", options) / "demo-val-00000-of-00001.tar";
+  testing::write_file(folder_ / "a.npz", tar_content(tar, "000004.npz"));
+  const ZipArchive arrays(folder_ / "a.npz");
+  const auto counts = parse_npy(arrays.read("representation.npy"), "counts");
+  EXPECT_THAT(counts.shape, ElementsAre(2u, 6u, 8u));
+  double sum = 0;
+  for (std::size_t i = 0; i < 2 * kPixels; ++i) sum += counts.number(i);
+  EXPECT_EQ(sum, static_cast<double>(event_count(4)));
+  EXPECT_FALSE(arrays.contains("volume.npy"));
+  EXPECT_TRUE(arrays.contains("flow.npy"));
+}
+
+TEST_F(Exporters, WebdatasetKnowsTheWordsOfRepresentations) {
+  ExportOptions options;
+  options.representation = "histogram:65";
+  EXPECT_THAT([&] { exported("webdataset", options); },
+              ThrowsMessage<UsageError>(HasSubstr("\"histogram:65\"")));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "webdataset"));
+}
+
 /// A place in a sample's JSON, and what is there.
 struct WebdatasetCase {
   const char* sample;
