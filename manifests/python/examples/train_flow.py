@@ -50,9 +50,16 @@ def batch_norm(channels: int) -> nn.Module:
     return nn.BatchNorm2d(channels, momentum=0.01)
 
 
+class GroupNorm(nn.GroupNorm):
+    """Computed in float32: PyTorch 1.13 on a processor takes no input in bfloat16 beside weights in float32."""
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return super().forward(x.float()).to(x.dtype)
+
+
 def group_norm(channels: int) -> nn.Module:
     """Groups of 8 channels, each sample alone: the same in training and in evaluation."""
-    return nn.GroupNorm(channels // 8, channels)
+    return GroupNorm(channels // 8, channels)
 
 
 def layer(inputs: int, outputs: int, kernel: int = 3, stride: int = 1, norm: Norm | None = None,

@@ -241,6 +241,11 @@ def test_planes_find_the_way_of_an_edge(monkeypatch, axis, sign):
     pair = torch.stack([volume, volume.roll(5, 1)])
     torch.testing.assert_close(network.train()(pair)[-1][0], train_flow.predict(network.eval(), volume))
     assert not torch.equal(train_flow.predict(network, volume), expected[0])
+    with torch.autocast("cpu", torch.bfloat16):
+        flow = network.train()(pair)[-1]
+    torch.testing.assert_close(flow[0], train_flow.predict(network, volume), rtol=0.05, atol=0.5)
+    flow.mean().backward()
+    assert all(parameter.grad.isfinite().all() for parameter in network.parameters() if parameter.grad is not None)
 
 
 @pytest.mark.parametrize("lacks", [(0, 0), (0.5, -0.5)])
