@@ -6,6 +6,7 @@
 #include <array>
 #include <istream>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <stdexcept>
 #include <streambuf>
 #include <string_view>
@@ -78,6 +79,10 @@ class HashedFile : public std::streambuf {
   Sha256 hash_;
 };
 
+class DamagedPlan : public std::runtime_error {
+  using runtime_error::runtime_error;
+};
+
 /// Reads FOLDER/plan.json with `read` (a stream and a name to a plan, or a part of one).
 template <class Frozen, class Read>
 Frozen read_plan_file(const fs::path& folder, const Read& read) {
@@ -100,8 +105,8 @@ Frozen read_plan_file(const fs::path& folder, const Read& read) {
   } catch (const UnreadableVersion&) {
     throw;
   } catch (const std::runtime_error&) {
-    std::throw_with_nested(std::runtime_error("expected a whole plan, got a damaged one, in " +
-                                              file.string() + " (--overwrite starts again)"));
+    std::throw_with_nested(DamagedPlan("expected a whole plan, got a damaged one, in " +
+                                       file.string() + " (--overwrite starts again)"));
   }
 }
 
@@ -335,22 +340,42 @@ void require_own_shard(const fs::path& folder, const std::string& shard) {
   if (!fs::exists(file)) require_replaceable(record, OwnFile::kCommitRecord);
 }
 
+namespace {
+
+/// The shards that a folder's plan names; where it is damaged, those that lie there.
+std::set<std::string> shards_of(const fs::path& folder) {
+  std::set<std::string> shards;
+  try {
+    for (ShardOutline& shard : read_frozen_outline(folder).plan.shards) {
+      shards.insert(std::move(shard.name));
+    }
+  } catch (const DamagedPlan&) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+      const fs::path& file = entry.path();
+      const bool is_record = file.extension() == ".json";
+      const std::string shard = fs::path(file.filename()).replace_extension(".h5").string();
+      if (is_shard_name(shard) && (is_record || file.extension() == ".h5") &&
+          is_replaceable(file, is_record ? OwnFile::kCommitRecord : OwnFile::kShard)) {
+        shards.insert(shard);
+      }
+    }
+  }
+  return shards;
+}
+
+}  // namespace
+
 void discard_output(const fs::path& folder, const Fingerprint& fingerprint,
                     const fs::path& manifest_folder) {
   if (!fs::exists(folder / kPlanName)) return;
   refuse_another_job(folder, fingerprint, manifest_folder, /*discards=*/true);
-  std::vector<ShardOutline> shards;
-  try {
-    shards = read_frozen_outline(folder).plan.shards;
-  } catch (const std::runtime_error&) {
-    // A damaged plan names no shards; those that are left are made again, or reported by `verify`.
-  }
+  const std::set<std::string> shards = shards_of(folder);
   // What says that something is whole goes before what it says it of; the plan last, so that after
   // an interruption the next run finds the rest.
   for (const char* name : {kDescriptionName, kViewName, "report.html"}) fs::remove(folder / name);
-  for (const ShardOutline& shard : shards) {
-    fs::remove(folder / commit_record_name(shard.name));
-    fs::remove(folder / shard.name);
+  for (const std::string& shard : shards) {
+    fs::remove(folder / commit_record_name(shard));
+    fs::remove(folder / shard);
   }
   fs::remove(folder / "amendments.json");
   fs::remove(folder / kPlanName);

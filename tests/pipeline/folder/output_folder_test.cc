@@ -6,6 +6,8 @@
 #include <system_error>
 #include <thread>
 
+#include "manifests/documents/commit_record.h"
+#include "manifests/documents/format_version.h"
 #include "manifests/documents/job_manifest.h"
 #include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
@@ -278,6 +280,34 @@ TEST(DiscardOutput, OfADamagedPlanLeavesTheShardsItCannotName) {
   for (const char* name : {"plan.json", kShard, "dataset.json"}) write_file(folder / name, "x");
   discard_output(folder.path(), plan("w").fingerprint, "/jobs");
   EXPECT_THAT(names_in(folder.path()), ElementsAre(kShard));
+}
+
+TEST(DiscardOutput, OfADamagedPlanRemovesTheShardsThatAreItsOwn) {
+  const TemporaryFolder folder;
+  CommitRecord record;
+  record.shard = "job-val-00003-of-00007.h5";
+  record.plan_hash = record.sha256 = std::string(64, 'a');
+  write_file(folder / "job-val-00003-of-00007.json", to_json(record));
+  for (const char* name : {"plan.json", "job-val-00003-of-00007.h5", "mine.h5",
+                           "mine-train-00000-of-00001.h5", "mine-train-00000-of-00001.json"}) {
+    write_file(folder / name, "x");
+  }
+  discard_output(folder.path(), plan("w").fingerprint, "/jobs");
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("mine-train-00000-of-00001.h5",
+                                                   "mine-train-00000-of-00001.json", "mine.h5"));
+}
+
+TEST(DiscardOutput, OfAPlanThatALaterProgramWroteIsRefused) {
+  const TemporaryFolder folder;
+  std::string text = to_json(plan("w"));
+  const std::string version = "\"version\":\"1.";
+  const std::size_t at = text.find(version);
+  ASSERT_NE(at, text.npos) << text.substr(0, 80);
+  write_file(folder / "plan.json", text.replace(at, version.size(), "\"version\":\"2."));
+  write_file(folder / kShard, "x");
+  EXPECT_THROWS(discard_output(folder.path(), plan("w").fingerprint, "/jobs"), UnreadableVersion,
+                "plan.json");
+  EXPECT_THAT(names_in(folder.path()), ElementsAre(kShard, "plan.json"));
 }
 
 TEST(OutdateDataset, RemovesWhatNamesTheShardOrIsDamagedAndNothingOfAPerson) {
