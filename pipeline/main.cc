@@ -61,6 +61,7 @@ void become(const eventgan::HandOver& other, char** argv) {
 int main(int argc, char** argv) {
   const eventgan::StandardStreams streams(argc, argv);
   std::signal(SIGXFSZ, SIG_IGN);  // a write beyond ulimit -f fails then, as any other may
+  std::signal(SIGCHLD, SIG_DFL);  // ignored, as a caller may leave it, children would tell no end
   eventgan::keep_big_buffers();
   cv::setNumThreads(1);  // the flow graph is the only source of parallelism
 

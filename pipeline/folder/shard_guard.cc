@@ -133,10 +133,15 @@ std::string read_to_end(int descriptor) {
 }
 
 int in_child(const fs::path& shard, const std::function<int()>& read) {
+  const auto fail_to = [&](const char* action, int error) {
+    throw std::runtime_error(std::string("cannot ") + action + " a process to read " +
+                             shard.string() + ": " + std::strerror(error));
+  };
   int errors[2];
   std::cout.flush();
-  if (::pipe(errors) != 0) throw std::runtime_error(std::strerror(errno));
+  if (::pipe(errors) != 0) fail_to("start", errno);
   const pid_t child = ::fork();
+  const int fork_error = errno;
   if (child == 0) {
     ::close(errors[0]);
     live(shard, read, errors[1]);
@@ -144,9 +149,10 @@ int in_child(const fs::path& shard, const std::function<int()>& read) {
   ::close(errors[1]);
   const std::string said = read_to_end(errors[0]);
   ::close(errors[0]);
-  if (child < 0) throw std::runtime_error("cannot start a process to read " + shard.string());
+  if (child < 0) fail_to("start", fork_error);
   int status = 0;
-  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  while (::waitpid(child, &status, 0) < 0) {
+    if (errno != EINTR) fail_to("wait for", errno);
   }
   if (WIFEXITED(status)) {
     std::cerr << said << std::flush;

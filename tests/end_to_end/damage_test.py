@@ -7,6 +7,7 @@ import pathlib
 import pickle
 import re
 import shutil
+import signal
 import subprocess
 import tempfile
 
@@ -276,6 +277,14 @@ class Flips(program.InFolder):
                 self.assertEqual(done.stdout, "")
 
         failing_files.for_each(inspect, sorted({*self.KNOWN, *range(0, 8192, 256)}))
+
+    def test_a_damaged_lone_shard_is_no_success_whatever_the_caller_ignores(self):
+        lone = self.folder / "lone.h5"
+        lone.write_bytes(self.whole[:len(self.whole) // 2])
+        done = subprocess.run([program.PROGRAM, "inspect", str(lone)], capture_output=True, text=True,
+                              preexec_fn=lambda: signal.signal(signal.SIGCHLD, signal.SIG_IGN))
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn(str(lone), done.stderr)
 
     def test_a_lone_shard_is_previewed_apart(self):
         for place in self.KNOWN[2:5]:

@@ -81,6 +81,13 @@ TEST_F(ReadGuarded, WhatEndsTheChildFromOutsideIsNoDamage) {
   }
 }
 
+TEST_F(ReadGuarded, AChildWhoseEndNobodyTellsIsNoSuccess) {
+  std::signal(SIGCHLD, SIG_IGN);
+  EXPECT_THROWS(read_apart(folder_.path(), [] { return 1; }), std::runtime_error,
+                "cannot wait for a process to read " + folder_.path().string());
+  std::signal(SIGCHLD, SIG_DFL);
+}
+
 TEST_F(ReadGuarded, ALoopWithoutEndIsDamage) {
   expect_damaged(
       [] {
