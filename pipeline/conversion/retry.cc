@@ -204,6 +204,7 @@ bool add_classes(const fs::path& folder, const FrozenPlan& frozen,
                            {thread_count(options.threads), [&] { return options.stop_requested(); },
                             options.trace, options.show_phase});
   report_damage(earlier.faults, report);
+  if (options.stop_requested()) return false;  // shards may not have been looked at
   for (const CommittedShard& committed : earlier.done) {
     if (options.stop_requested()) return false;
     const auto source = static_cast<std::size_t>(committed.shard->source);

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <utility>
 
 #include "manifests/documents/report.h"
@@ -16,6 +17,26 @@
 namespace eventgan {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+/// Looks at the shards once more, now that FOLDER/dataset.json names them: a `retry` or a `convert`
+/// beside this, which removes that of shards it changes, may have changed some before it was there.
+/// Then it goes, and std::runtime_error is thrown.
+void require_unchanged(const fs::path& folder, const DatasetParts& parts) {
+  for (const ShardState& shard : parts.done) {
+    const ShardState now = shard_state(folder, shard.outline, parts.frozen.hash);
+    if (now.done() && now.record->sha256 == shard.record->sha256) continue;
+    fs::remove(folder / kDescriptionName);
+    throw std::runtime_error(
+        fmt::format("expected shards that nobody changes meanwhile, got {}, in {} (run eventgan "
+                    "finalize again)",
+                    now.done() ? "one that was committed again" : to_string(now.condition),
+                    (folder / shard.outline.name).string()));
+  }
+}
+
+}  // namespace
 
 FinalizationReport finalize(const std::filesystem::path& folder,
                             const FinalizationOptions& options) {
@@ -47,6 +68,7 @@ FinalizationReport finalize(const std::filesystem::path& folder,
   }
   const ViewReceipt receipt = write_dataset_view(folder / kViewName, views);
   write_file_atomically(description, describe_dataset(parts, views, receipt));
+  require_unchanged(folder, parts);
   return report;
 }
 

@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <stdexcept>
 
 #include "manifests/documents/commit_record.h"
@@ -112,6 +115,28 @@ TEST(Finalize, ACompleteFolder) {
   EXPECT_EQ(report.views, 1);
   EXPECT_EQ(names_in(folder.path()).size(), before.size() + 2);
   EXPECT_EQ(nlohmann::json::parse(description(folder))["view"]["sha256"], sha256_hex(view(folder)));
+}
+
+TEST(Finalize, AShardThatIsCommittedAgainMeanwhileLeavesNoDescription) {
+  const ConvertedFolder folder;
+  int asked = 0;
+  const auto clock = [&] {
+    // At the start, and for each of four shards once it has been looked at.
+    if (++asked == 5) {
+      CommitRecord record = folder.record(2);
+      record.sha256 = std::string(64, 'b');
+      folder.write_commit_record(2, record);
+    }
+    return std::chrono::steady_clock::now();
+  };
+  std::ostringstream shown;
+  FinalizationOptions options;
+  options.show_phase = [&](const ProgressUnit& unit, std::int64_t total) {
+    return std::make_unique<Progress>(shown, ProgressStyle::kNone, nullptr, total, clock, unit);
+  };
+  EXPECT_THROWS(finalize(folder.path(), options), std::runtime_error,
+                "got one that was committed again, in " + folder.shard(2).string());
+  EXPECT_THAT(names_in(folder.path()), Not(Contains("dataset.json")));
 }
 
 TEST(Finalize, TheNotesOnTheInputsAreKept) {
