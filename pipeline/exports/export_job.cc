@@ -86,11 +86,16 @@ bool has_use_for(LabelNeed need, const ExportSource& source) {
          (source.has_joints() && need != LabelNeed::kBoxes);
 }
 
-/// What an earlier run has counted and noted.
-void read_description(const std::filesystem::path& description, ExportReport& report) {
-  const auto json = nlohmann::json::parse(read_text_file(description));
-  report.left_out = json.at("left_out").get<LeftOut>();
-  report.notes = json.at("notes").get<std::vector<std::string>>();
+/// What an earlier run has counted and noted. False if that is damaged.
+bool read_description(const std::filesystem::path& description, ExportReport& report) {
+  try {
+    const auto json = nlohmann::json::parse(read_text_file(description));
+    report.left_out = json.at("left_out").get<LeftOut>();
+    report.notes = json.at("notes").get<std::vector<std::string>>();
+    return true;
+  } catch (const nlohmann::json::exception&) {
+    return false;
+  }
 }
 
 }  // namespace
@@ -147,9 +152,7 @@ ExportReport run_export(const std::filesystem::path& folder, const ExportOptions
   for (const ExportShard& shard : input.shards()) all.push_back(&shard);
   ExportFolder::Step step(out, kExportDescription, input_hash(all));
   out.remove_other_steps();
-  if (step.is_done()) {
-    read_description(out.path() / kExportDescription, report);
-  } else {
+  if (!step.is_done() || !read_description(out.path() / kExportDescription, report)) {
     Description description(work, *exporter, identity);
     description.left_out() = sources_left_out;
     description.write(shards, step.file(kExportDescription));

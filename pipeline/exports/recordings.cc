@@ -26,6 +26,7 @@ namespace {
 
 constexpr double kMicroseconds = 1e6;                                            // in a second
 constexpr std::int64_t kLongest_us = std::numeric_limits<std::uint32_t>::max();  // DSEC's times
+constexpr double kLast = 1e12;  ///< of a clock, seconds or frames
 
 /// A sample before it has found its recording.
 struct LaidSample {
@@ -50,7 +51,6 @@ std::optional<std::string> sequence_of(const OutgoingSample& sample) {
 /// The sample on its sequence's clock: by the times of its frames, or else by their numbers. None
 /// if neither tells when it is.
 std::optional<LaidSample> on_clock(const OutgoingSample& sample) {
-  constexpr double kLast = 1e12;
   const FramePair& pair = sample.labels.pair;
   if (!sequence_of(sample)) return std::nullopt;
   LaidSample laid{.window = {.shard = &sample.shard, .slot = sample.slot},
@@ -80,6 +80,12 @@ void set_windows(std::vector<LaidSample>& samples, double frames_per_second) {
   }
   for (LaidSample& sample : samples) {
     const double seconds = sample.is_timed ? 1 : 1 / (frame * frames_per_second);
+    if (!(sample.between[1] * seconds <= kLast)) {
+      throw UsageError(fmt::format(
+          "expected a sequence that ends before {:g} s, got frame {:.0f} at {:g} a second, in {} "
+          "(--frames-per-second)",
+          kLast, sample.between[1], frames_per_second, sample.window.shard->outline.name));
+    }
     const auto at_us = [&](double place) -> std::int64_t {
       return std::llround(place * seconds * kMicroseconds);
     };

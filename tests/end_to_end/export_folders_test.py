@@ -73,6 +73,15 @@ class AgainAndAgain(Export):
                     run(*arguments, "--out", out)
                     same_folder(out, expected)
 
+    def test_a_damaged_description_is_made_again(self):
+        self.export("webdataset", "--split", "val")
+        description = self.out / "export.json"
+        whole = description.read_bytes()
+        for damaged in (whole[:-9].ljust(len(whole), b"\0"), whole.replace(b'"left_out"', b'"left_off"')):
+            description.write_bytes(damaged)
+            self.export("webdataset", "--split", "val")
+            self.assertEqual(description.read_bytes(), whole)
+
     def test_a_killed_run_is_overwritten_by_another(self):
         expected, _ = self.whole("coco")
         for rule in ("kill-before rename 2", "kill-before rename 5", "kill-within write 4"):

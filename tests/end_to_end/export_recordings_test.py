@@ -344,6 +344,15 @@ class Recordings(Export):
         windows = read_windows(self.out / "raw" / "train" / "clip_windows.txt")
         self.assertEqual([window[:2] for window in windows], [(0, 40000), (40000, 80000), (80000, 120000)])
 
+    def test_a_clock_beyond_all_times_is_refused(self):
+        frames = self.converted_frames("clip", range(99999999990, 99999999993))
+        _, err = self.export("raw", "--frames-per-second", "0.001", source=frames, expect=64)
+        self.assertRegex(err, r"expected a sequence that ends before 1e\+12 s, got frame 9999999999\d at 0.001 a "
+                              r"second, in .*\.h5 \(--frames-per-second\)")
+        self.export("raw", source=frames, out=self.out / "slower")
+        windows = read_windows(self.out / "slower" / "raw" / "train" / "clip_windows.txt")
+        self.assertEqual([window[:2] for window in windows], [(0, 10 ** 6), (10 ** 6, 2 * 10 ** 6)])
+
     def test_a_folder_of_images_is_one_sequence(self):
         self.export("dsec", source=self.converted_frames("", range(4), frames_per_second=20))
         recording, = (self.out / "dsec" / "train").iterdir()
