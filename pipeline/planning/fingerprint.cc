@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
+#include <set>
 #include <sstream>
 #include <string_view>
 
@@ -108,15 +109,20 @@ bool any_video(const std::vector<PlannedShard>& shards) {
   });
 }
 
-/// Whether an image's orientation counts.
+/// Whether an image's orientation counts: of one's own images. A source whose frames are of videos
+/// has none; those that its labels name and that are not there tell nothing.
 bool turns_images(const JobManifest& manifest, const Plan& plan) {
-  return std::ranges::any_of(plan.shards, [&](const PlannedShard& shard) {
+  std::set<int> own, of_videos;
+  for (const PlannedShard& shard : plan.shards) {
     const SourceSpec& source = manifest.sources[static_cast<std::size_t>(shard.source)];
-    return is_own(source.dataset) &&
-           std::ranges::any_of(shard.samples, [](const PlannedSample& sample) {
-             return sample.pair.next.video_frame < 0 || sample.pair.previous.video_frame < 0;
-           });
-  });
+    if (!is_own(source.dataset) || shard.samples.empty()) continue;
+    own.insert(shard.source);
+    const bool is_of_videos = std::ranges::any_of(shard.samples, [](const PlannedSample& sample) {
+      return sample.pair.next.video_frame >= 0 && sample.pair.previous.video_frame >= 0;
+    });
+    if (is_of_videos) of_videos.insert(shard.source);
+  }
+  return own.size() > of_videos.size();
 }
 
 /// The file of a library that is loaded in this process; empty: it is none, or a part of the

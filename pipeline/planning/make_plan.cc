@@ -592,7 +592,7 @@ void renew_samples(const JobManifest& manifest,
       const LabelledFrame* frame = frame_of(*datasets[source], manifest.sources[source], sample);
       if (frame != nullptr) {
         renew_sample(*datasets[source], *frame, manifest.sources[source], sample);
-      } else if (sample.fault.empty()) {
+      } else {
         sample.fault = "expected the labelled frame that was planned, got none any more, in " +
                        sample.pair.next.path + " (" + sample.sample_id + ")";
       }

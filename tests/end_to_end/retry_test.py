@@ -357,6 +357,18 @@ class RetryOfClasses(program.InFolder):
         self.assertIn("nothing to retry", out)
         self.assertNotIn("classes were added", out)
 
+    def test_a_label_that_is_gone_is_no_fault_any_more(self):
+        """The row named an image that is not there: once it names one that is, the sample has none."""
+        self.table()
+        table = self.folder / "boxes.csv"
+        whole = table.read_text()
+        table.write_text(whole + "000099.png,car,4,4,20,20\n")
+        self.convert({"format": "csv", "path": "boxes.csv"})
+        table.write_text(whole)
+        out, _ = run("retry", self.out)
+        self.assertIn("expected the labelled frame that was planned, got none any more", out)
+        self.assertNotIn("got no file", out)
+
     def test_boxes_that_mended_labels_lose_are_counted(self):
         self.table(of_5="bike")
         self.spoil_row()

@@ -80,6 +80,16 @@ TEST_F(Fingerprint, HasFfmpegWhereFramesComeFromVideos) {
   EXPECT_THAT(make().at("libraries"), ::testing::ContainsRegex(", FFmpeg [0-9]+\\.[0-9]+"));
 }
 
+// Labels may name frames beyond a video's end, and be corrected.
+TEST_F(Fingerprint, HasNoOrientationOfVideosWhateverTheirLabelsName) {
+  manifest_.sources[0].dataset = DatasetKind::kFrames;
+  EXPECT_TRUE(make().contains("orientation"));
+  plan_.shards.push_back(plan_.shards[0]);
+  PlannedSample& sample = plan_.shards[0].samples[0];
+  sample.pair.previous.video_frame = sample.pair.next.video_frame = 0;
+  EXPECT_FALSE(make().contains("orientation"));
+}
+
 TEST_F(Fingerprint, NoticesAnInputOfAnotherSize) {
   const auto before = make();
   testing::write_file(folder_ / "a.png", "123456");
