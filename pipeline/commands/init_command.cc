@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
-#include <iterator>
 #include <memory>
 #include <optional>
+#include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,6 +20,7 @@
 #include "pipeline/commands/commands.h"
 #include "pipeline/planning/draft_manifest.h"
 #include "pipeline/runtime/errors.h"
+#include "stages/frames/listing/source_folders.h"
 #include "stages/frames/sources/find_source.h"
 
 namespace eventgan {
@@ -33,6 +35,19 @@ struct InitArguments {
   DraftWishes wishes;
 };
 
+/// The split that a PATH's last folder is named after; empty if none.
+std::string_view split_named(const fs::path& path) {
+  const fs::path folder = (path / "").lexically_normal().parent_path();
+  return split_of(folder.filename().string());
+}
+
+/// Whether they are the splits of one dataset: train and test, as their names say.
+bool are_splits(std::span<const std::string> paths) {
+  std::set<std::string_view> splits;
+  for (const std::string& path : paths) splits.insert(split_named(path));
+  return splits.size() > 1 && !splits.contains("");
+}
+
 std::vector<FoundSource> find_all(const std::vector<std::string>& where) {
   const std::vector<std::string_view> words = recognised_datasets();
   const DatasetRow* const named = where.size() < 2 ? nullptr : find_dataset(where.front());
@@ -43,13 +58,18 @@ std::vector<FoundSource> find_all(const std::vector<std::string>& where) {
                     named->word));
   }
   const auto dataset = named == nullptr ? std::nullopt : std::optional(named->value);
+  const bool split_by_names = are_splits(std::span(where).subspan(dataset ? 1 : 0));
   std::vector<FoundSource> found;
   for (std::size_t i = dataset ? 1 : 0; i < where.size(); ++i) {
     if (i == 0 && where.size() > 1 && !fs::exists(where[i])) {  // it may have been meant as a word
       throw UsageError(fmt::format("DATASET or PATH: expected one of {}, or what exists, got {}",
                                    fmt::join(words, ", "), where[i]));
     }
-    std::ranges::move(find_sources(where[i], dataset), std::back_inserter(found));
+    for (FoundSource& source : find_sources(where[i], dataset)) {
+      const std::string_view split = split_by_names ? split_named(where[i]) : "";
+      if (source.split.empty() && split != "train") source.split = split;
+      found.push_back(std::move(source));
+    }
   }
   return found;
 }

@@ -97,6 +97,21 @@ class WithoutManifest(program.InFolder):
         run("preview", out, "--out", self.folder / "images", "--count", 1)
         run("finalize", out)
 
+    def test_a_folder_of_one_folder_of_videos_is_that_one(self):
+        for name in ("a", "b"):
+            write_video(self.folder / "data" / "videos" / f"{name}.mp4", 4)
+        text, _ = self.init(self.folder / "data")
+        self.assertIn(f'"root": "{self.folder}/data/videos"', text)
+
+    def test_paths_named_after_splits_are_these(self):
+        for split in ("train", "valid", "test"):
+            write_video(self.folder / split / f"{split}.mp4", 4)
+        text, _ = self.init(*(self.folder / split for split in ("test", "train", "valid")))
+        self.assertEqual(re.findall(r'"root": ".*/(\w+)",\n(?: *"split": "(\w+)")?', text),
+                         [("test", "test"), ("train", ""), ("valid", "val")])
+        text, _ = self.init(self.folder / "test")
+        self.assertNotIn('"split"', text)
+
     def test_a_video_is_handed_over_and_everything_is_told_once(self):
         write_video(self.folder / "one.mp4", 4)
         for line in ["manifest: {0}/manifest.json\n", "manifest: {0}/manifest.json, kept"]:

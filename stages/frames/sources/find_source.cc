@@ -75,6 +75,10 @@ std::optional<Place> look_around(const fs::path& path, std::optional<DatasetKind
   }
   if (below.size() == 1) return below.front();
   below = look_below(/*own_too=*/true);
+  const auto has_videos = [](const Place& place) {
+    return std::ranges::any_of(look_into(place.root).files, is_video_name);
+  };
+  if (below.size() == 1 && has_videos(below.front())) return below.front();
   if (below.size() < 2) return std::nullopt;
   std::string names, frames, events;
   for (const Place& found : below) {
