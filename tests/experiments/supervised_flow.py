@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import hashlib
 import io
 import json
 import pathlib
@@ -29,9 +30,11 @@ import recordings
 import self_supervised
 import torch
 import train_flow
+import training
 from self_supervised import CONTROLS, REAL, Pair
 
 TRAINER = pathlib.Path(train_flow.__file__)
+SOURCES = [TRAINER, pathlib.Path(training.__file__)]  # of what a network is and how it learns
 ROWS: dict[str, dict[str, Any]] = {"EventGAN 8": {"weights": "shipped:8"}, "EventGAN 16": {"weights": "shipped:16"},
                                    "esim": {"kind": "esim"}, "difference": {"kind": "difference"}}
 UNTAUGHT = "least squares"  # the network that has learnt nothing
@@ -86,9 +89,15 @@ def photographs(args: argparse.Namespace, row: str) -> pathlib.Path:
     return folder
 
 
-def learnt(args: argparse.Namespace, row: str, seed: int) -> train_flow.FlowNetwork:
-    """The row's network, in its evaluation mode; what has been trained is kept."""
-    out = args.out / "networks" / f"{row}-{args.steps}-{seed}".replace(" ", "-")
+def version(args: argparse.Namespace) -> str:
+    """Another one once the trainer, or what of its options decides a result, has changed."""
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in SOURCES)).hexdigest()[:8]
+    return f"trainer {digest}{' bfloat16' * args.bfloat16}"
+
+
+def learnt(args: argparse.Namespace, row: str, name: str, seed: int) -> train_flow.FlowNetwork:
+    """The row's network, in its evaluation mode; what has been trained is kept under the name."""
+    out = args.out / "networks" / name.replace(",", "").replace(" ", "-")
     if not (out / "scores.json").exists():
         subprocess.run([sys.executable, TRAINER, "--data", photographs(args, row), "--out", out, "--seed", str(seed),
                         "--steps", str(args.steps), "--threads", str(args.threads), "--images", "2",
@@ -124,13 +133,14 @@ def main() -> None:
 
     rows = {name: [kept(name, lambda pairs, name=name: self_supervised.control_scores(name, pairs)["error"])]
             for name in CONTROLS}
-    rows[UNTAUGHT] = [kept(UNTAUGHT, lambda pairs: error_of(train_flow.FlowNetwork(2 * recordings.BINS).eval(), pairs))]
+    rows[UNTAUGHT] = [kept(f"{UNTAUGHT}, {version(args)}",
+                           lambda pairs: error_of(train_flow.FlowNetwork(2 * recordings.BINS).eval(), pairs))]
     plain = np.array([*rows[next(iter(CONTROLS))][0].values()])
     for seed in range(args.seeds):  # all rows of a seed first: they can be compared early
         for row in args.rows:
-            name = f"{row}, {args.steps} steps, seed {seed}"
+            name = f"{row}, {args.steps} steps, seed {seed}, {version(args)}"
             if name not in results:
-                network = learnt(args, row, seed)
+                network = learnt(args, row, name, seed)
                 kept(name, lambda pairs, network=network: error_of(network, pairs))
             rows.setdefault(row, []).append(results[name])
             print(name, round(float(np.mean([*results[name].values()] / plain)), 3), flush=True)

@@ -1,8 +1,11 @@
-"""supervised_flow.py: a small run fills the table and goes on."""
+"""supervised_flow.py: a small run fills the table and goes on, and nothing of another trainer's is kept."""
 
+import argparse
 import csv
 import json
 import os
+import pathlib
+import shutil
 import subprocess
 import sys
 
@@ -14,6 +17,20 @@ pytest.importorskip("torch")
 pytest.importorskip("matplotlib")
 pytest.importorskip("h5py")
 cv2 = pytest.importorskip("cv2")
+
+import supervised_flow
+
+
+def test_results_are_those_of_a_version_of_the_trainer(tmp_path, monkeypatch):
+    args = argparse.Namespace(bfloat16=False)
+    versions = [supervised_flow.version(args), supervised_flow.version(argparse.Namespace(bfloat16=True))]
+    copies = [pathlib.Path(shutil.copy(path, tmp_path)) for path in supervised_flow.SOURCES]
+    monkeypatch.setattr(supervised_flow, "SOURCES", copies)
+    assert supervised_flow.version(args) == versions[0]
+    for path in copies:
+        path.write_text(path.read_text() + "WIDTH = 16\n")
+        versions.append(supervised_flow.version(args))
+    assert len(set(versions)) == 4
 
 
 @nightly
@@ -36,6 +53,7 @@ def test_a_small_run_fills_the_table_and_goes_on(recording_folder, tmp_path):
 
     run("--with", "difference")
     results = json.loads((tmp_path / "out" / "results.json").read_text())
+    assert f"difference, 2 steps, seed 0, {supervised_flow.version(argparse.Namespace(bfloat16=False))}" in results
     said = run("--with", "difference", "esim")
     assert "epoch" in said and "difference, 2 steps" in said
     rows = {row["learnt on"]: row for row in csv.DictReader((tmp_path / "out" / "table.csv").open())}

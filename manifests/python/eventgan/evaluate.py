@@ -221,8 +221,11 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
     Raises
     ------
     ValueError
-        No sample has boxes, or an entry of the predictions is not valid.
+        No sample has boxes, or an entry of the predictions or one of the numbers above is not valid.
     """
+    if not (0 <= confidence <= 1 and 0 <= nms <= 1 and 0 < iou <= 1):
+        raise ValueError("expected confidence and nms from 0 to 1, and iou above 0 and up to 1, got confidence "
+                         f"{confidence:g}, nms {nms:g} and iou {iou:g}")
     shards, numbers = samples.shards, {name: i for i, name in enumerate(samples.classes)}
     unknown = [name for name in listed(classes or (), "classes") if name not in numbers]
     if unknown:
@@ -245,10 +248,12 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
     if classes is None:
         there = np.concatenate([found.label, truth.label[~truth.ignore]])
         classes = [name for name, label in numbers.items() if name != DONT_CARE and (there == label).any()]
+    ours = np.isin(found.label, [numbers[name] for name in classes])
     counts = {"samples": int(labelled.sum()),
               "samples_without_prediction": int(labelled.sum() - len(np.unique(found.image))),
               "ignored": int(truth.ignore.sum()), "predictions": len(entries),
-              "not_of_these_samples": len(entries) - len(found.score), "after_suppression": int(sure.sum())}
+              "not_of_these_samples": len(entries) - len(found.score), "not_of_these_classes": int((~ours).sum()),
+              "after_suppression": int((sure & ours).sum())}
     result = {"settings": {"confidence": confidence, "nms": nms, "iou": iou}, "counts": counts,
               "classes": detection_scores(found, truth, {name: numbers[name] for name in classes}, iou, sure)}
     kitti = _of_kitti(shards, found, truth, numbers, classes)
@@ -396,12 +401,14 @@ def _text(value: float | str, digits: int) -> str:
 def detection_tables(result: Mapping[str, Any]) -> str:
     """The result of `evaluate_detections` as text."""
     counts, settings, classes = result["counts"], result["settings"], result["classes"]
+    others = {what: counts[f"not_of_these_{what}"] for what in ("samples", "classes")}
     first = (f"{counts['samples']} samples ({counts['samples_without_prediction']} without a prediction), "
              f"{classes['all']['truths']} ground-truth boxes, {counts['ignored']} ignored; average precisions use all "
-             f"{counts['predictions']} predictions; precision, recall and F1 use {counts['after_suppression']}, after "
-             f"confidence {settings['confidence']:g} and non-maximum suppression at IoU {settings['nms']:g}")
-    if counts["not_of_these_samples"]:
-        first += f"; {counts['not_of_these_samples']} are of other samples"
+             f"{counts['predictions'] - sum(others.values())} predictions; precision, recall and F1 use "
+             f"{counts['after_suppression']}, after confidence {settings['confidence']:g} and non-maximum suppression "
+             f"at IoU {settings['nms']:g}")
+    if any(others.values()):
+        first += f"; left out: {', '.join(f'{n} of other {what}' for what, n in others.items() if n)}"
     tables = [first, table("", classes, {"truths": "boxes", "easy": "easy", "hard": "hard", **PAPER_COLUMNS}),
               table("average precision", classes,
                     {"ap_voc": "VOC, area", "ap_voc_11": "VOC, 11 points", "ap_coco_101": "COCO, 101 points",

@@ -16,6 +16,7 @@ import argparse
 import csv
 import json
 import pathlib
+import re
 import sys
 
 import numpy as np
@@ -41,9 +42,12 @@ class Detector:
 
 def columns(events):
     """t in microseconds, x, y and p (positive: 1) of a structured array, or of arrays by their names."""
-    known = getattr(getattr(events, "dtype", None), "names", None) or [*events]
-    t, x, y, p = (np.asarray(events[next(name for name in names if name in known)]) for names in
-                  (("t", "t_us", "ts", "timestamp"), ("x",), ("y",), ("p", "pol", "polarity")))
+    known = events.dtype.names or () if hasattr(events, "dtype") else [*events]
+    found = [next((name for name in names if name in known), None) for names in
+             (("t", "t_us", "ts", "timestamp"), ("x",), ("y",), ("p", "pol", "polarity"))]
+    if None in found:
+        raise ValueError(f"expected columns t, x, y and p, got {', '.join(map(str, known)) or 'none with a name'}")
+    t, x, y, p = (np.asarray(events[name]) for name in found)
     return np.rint(t * 1e6 if t.dtype.kind == "f" else t).astype(int), x.astype(int), y.astype(int), (p > 0).astype(int)
 
 
@@ -73,11 +77,30 @@ def main():
     parser.add_argument("--score", type=float, help="least score of a box (default: as the training says)")
     parser.add_argument("--images", type=pathlib.Path, help="folder for a picture of each window")
     args = parser.parse_args()
-    detector, (events, size) = Detector(pathlib.Path(__file__).with_name("detector.pt")), read(args.recording)
+    if args.sensor is not None and not re.fullmatch("[1-9][0-9]*x[1-9][0-9]*", args.sensor):
+        sys.exit(f"expected --sensor as 346x260, got {args.sensor}")
+    for name, least, most in (("window_ms", 0.001, 1e9), ("score", 0, 1)):
+        value = getattr(args, name)
+        if value is not None and not least <= value <= most:
+            sys.exit(f"expected --{name.replace('_', '-')} from {least:g} to {most:g}, got {value:g}")
+    model = pathlib.Path(__file__).with_name("detector.pt")
+    for path in (model, args.recording):
+        if not path.is_file():
+            sys.exit(f"expected a file, got none, in {path}")
+    detector = Detector(model)
+    try:
+        events, size = read(args.recording)
+    except Exception as error:  # each reader has its own
+        sys.exit("expected a recording (.npy, .npz, HDF5 in MVSEC's or DSEC's layout), got one that cannot be read "
+                 f"({error}), in {args.recording}")
     if not events.size:
         sys.exit(f"expected events, got none, in {args.recording}")
     size = [int(side) for side in args.sensor.split("x")][::-1] if args.sensor else size or (events[[2, 1]].max(1) + 1)
-    window_us, t = 1000 * (args.window_ms or detector.told["window_ms"]), events[0]
+    outside = ((events[[2, 1]] < 0) | (events[[2, 1]] >= np.reshape(size, (2, 1)))).any(0)
+    if outside.any():
+        x, y = events[1:3, outside.argmax()]
+        sys.exit(f"expected events within {size[1]}x{size[0]}, got one at {x}, {y}, in {args.recording}")
+    window_us, t = 1000 * (detector.told["window_ms"] if args.window_ms is None else args.window_ms), events[0]
     # each window begins after the end of the one before
     ends = t[0] + window_us * np.arange(1, max(np.ceil((t[-1] - t[0]) / window_us), 1) + 1)
     places = [0, *np.searchsorted(t, ends, side="right").tolist()]

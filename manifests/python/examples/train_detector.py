@@ -321,7 +321,8 @@ def main() -> None:
                          f"have {', '.join(there) or 'no boxes that are not to be ignored'}")
     larger = warn_of_small(sides, area, args.scale)
     model = train(training.untuned(args), items, classes, AUGMENTATION, validation)
-    poor = advice(json.loads(pathlib.Path(args.out, "metrics.json").read_text(encoding="utf-8")), len(items), larger)
+    metrics = json.loads(pathlib.Path(args.out, "metrics.json").read_text(encoding="utf-8"))
+    poor = None if tuned else advice(metrics, len(items), larger)
     if tuned:
         args = training.tuning(args, len(tuned))
         model = train(args, items, classes, AUGMENTATION, validation, tuned=tuned)

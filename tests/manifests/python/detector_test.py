@@ -206,6 +206,40 @@ def test_recordings_are_read_by_their_names(tmp_path):
         assert sorted(found.T.tolist()) == sorted(expected.T.tolist())  # those of one time in any order
 
 
+def test_what_detect_cannot_use_is_told_in_a_line(tmp_path):
+    h5py, events = pytest.importorskip("h5py"), camera(500)
+    takeaway.write(tmp_path, detector.Detector(1, 1).eval(), detector.likeliest, 1, (96, 128), {
+        "classes": ["Car"], "bins": 9, "normalize": "none", "channels": "signed", "score": 0.3, "window_ms": 50})
+    np.save(tmp_path / "good.npy", events)
+    np.save(tmp_path / "bare.npy", np.zeros((5, 4)))
+    events["x"][7] = -1
+    np.save(tmp_path / "negative.npy", events)
+    (tmp_path / "camera.raw").write_bytes(b"% evt 3.0\n")
+    with h5py.File(tmp_path / "eventgan.hdf5", "w") as file:
+        file["davis/events/data"] = np.zeros((5, 4))
+    (tmp_path / "alone").mkdir()
+    shutil.copy(tmp_path / "detect.py", tmp_path / "alone")
+    for script, name, options, error in (
+            ("detect.py", "none.npz", [], f"expected a file, got none, in {tmp_path / 'none.npz'}"),
+            ("alone/detect.py", "good.npy", [], f"expected a file, got none, in {tmp_path / 'alone' / 'detector.pt'}"),
+            ("detect.py", "camera.raw", [], "(Unable to "),
+            ("detect.py", "eventgan.hdf5", [], "object 'events' doesn't exist"),
+            ("detect.py", "bare.npy", [], "(expected columns t, x, y and p, got none with a name), in "),
+            ("detect.py", "negative.npy", [], f"got one at -1, {events['y'][7]}, in {tmp_path / 'negative.npy'}"),
+            ("detect.py", "good.npy", ["--sensor", "32x30"], "expected events within 32x30, got one at "),
+            ("detect.py", "good.npy", ["--sensor", "64"], "expected --sensor as 346x260, got 64"),
+            ("detect.py", "good.npy", ["--window-ms", "0"], "expected --window-ms from 0.001 to 1e+09, got 0"),
+            ("detect.py", "good.npy", ["--window-ms", "-5"], "expected --window-ms from 0.001 to 1e+09, got -5"),
+            ("detect.py", "good.npy", ["--score", "nan"], "expected --score from 0 to 1, got nan")):
+        said, code = run_script(tmp_path / script, tmp_path / name, *options)
+        assert code == 1 and error in said and said.count("\n") == 1, said
+        assert options or f"in {tmp_path}" in said
+    said, code = run_script(tmp_path / "detect.py", tmp_path / "good.npy", "--window-ms", "400", "--score", "0")
+    assert code == 0, said
+    assert {int(row["t_us"]) - int(events["t"][0]) for row in csv.DictReader(io.StringIO(said))} == {
+        400_000, 800_000, 1_200_000}
+
+
 def convert_camera(folder, name, window_us):
     """FOLDER/NAME.npy with a box in each of its first three windows, which FOLDER/shards has; their ends."""
     folder.mkdir()
@@ -262,11 +296,12 @@ def test_tuned_on_the_camera_s_own_windows(data, tmp_path, monkeypatch):
     line = [EXAMPLES / "train_detector.py", "--data", data, "--out", out, "--dataset", "kitti_object", "--threads", "1",
             "--batch", "4", "--images", "1", "--every", "9", "--epochs", "2"]
     said, code = run_script(*line)
-    assert code == 0, said
+    assert code == 0 and "is next to nothing" in said, said
     before = (out / "weights.pt").read_bytes(), (out / "predictions.json").read_bytes()
     for more in ("step     4", "resuming after epoch"):
         said, code = run_script(*line, "--tune", own, "--test", tmp_path / "other" / "shards")
         assert code == 0 and more in said and "says nothing of other recordings" not in said, said
+        assert "is next to nothing" not in said, said  # of the detector before
     assert ((out / "weights.pt").read_bytes(), (out / "predictions.json").read_bytes()) == before
     first, then = (json.loads((folder / "metrics.json").read_text()) for folder in (out, out / "tuned"))
     assert then["lr"] == first["lr"] / 4 and then["history"][-1]["step"] == 4

@@ -19,7 +19,7 @@ from eventgan import Shards
 from eventgan.detection_scores import (COCO_IOUS, KITTI_CLASSES, KITTI_LEVELS, Detections, GroundTruth,
                                        average_precisions, detection_scores, kitti_average_precision, match_as_coco,
                                        match_as_voc, non_maximum_suppression)
-from eventgan.evaluate import Samples, evaluate_detections, evaluate_flows, evaluate_poses
+from eventgan.evaluate import Samples, detection_tables, evaluate_detections, evaluate_flows, evaluate_poses
 from eventgan.flow_scores import flow_errors, flow_scores
 from eventgan.pose_scores import Persons, head_lengths, pose_scores
 
@@ -522,7 +522,8 @@ def test_detections_of_a_folder(folder, tmp_path):
     result, _, truth = evaluate_detections(found, Samples(folder, None, None, None))
     car = result["classes"]["Car"]
     assert result["counts"] == {"samples": 4, "samples_without_prediction": 1, "ignored": int(truth.ignore.sum()),
-                                "predictions": 3, "not_of_these_samples": 0, "after_suppression": 2}
+                                "predictions": 3, "not_of_these_samples": 0, "not_of_these_classes": 0,
+                                "after_suppression": 2}
     assert (car["truths"], car["found"], car["right"]) == (2, 2, 1)
     numbered = write(tmp_path / "numbered.json",
                      [box(1, 1, [1, 1, 3.25, 3.5]), box(2, 1, [0, 0, 3, 3], 0.5), box(3, 1, [0, 0, 3, 3], 0.1)])
@@ -530,6 +531,32 @@ def test_detections_of_a_folder(folder, tmp_path):
     (tmp_path / "ids.txt").write_text("000000\n000003\n")
     part, _, _ = evaluate_detections(found, Samples(folder, None, None, tmp_path / "ids.txt"))
     assert part["counts"]["not_of_these_samples"] == 1 and part["classes"]["Car"]["precision"] == 1
+
+
+def test_predictions_that_are_not_scored_are_told_apart(folder, tmp_path):
+    with h5py.File(folder / NAME, "r+") as file:
+        attributes = file["labels/boxes/class_id"].attrs
+        attributes["class_names"] = [*attributes["class_names"], "Van"]
+    found = write(tmp_path / "found.json",
+                  [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000000", "Car", [5, 1, 2, 2], 0.1),
+                   box("000000", "Van", [1, 1, 3, 3]), box("000001", "Van", [1, 1, 3, 3]),
+                   box("000003", "Van", [1, 1, 3, 3])])
+    (tmp_path / "ids.txt").write_text("000000\n000001\n")
+    result, _, _ = evaluate_detections(found, Samples(folder / NAME, None, None, tmp_path / "ids.txt"), ["Car"])
+    counts = result["counts"]
+    assert [counts[key] for key in ("predictions", "not_of_these_samples", "not_of_these_classes",
+                                    "after_suppression")] == [5, 1, 2, result["classes"]["all"]["found"]]
+    said = detection_tables(result)
+    assert "average precisions use all 2 predictions; precision, recall and F1 use 1, after" in said
+    assert "; left out: 1 of other samples, 2 of other classes\n" in said
+
+
+@pytest.mark.parametrize(("name", "value"), [("confidence", math.nan), ("confidence", -0.1), ("nms", math.nan),
+                                             ("nms", 1.5), ("iou", math.nan), ("iou", 0), ("iou", 5)])
+def test_thresholds_that_are_no_shares_are_refused(folder, tmp_path, name, value):
+    found = write(tmp_path / "found.json", [])
+    with pytest.raises(ValueError, match=f"iou above 0 and up to 1, got .*{name} {value:g}"):
+        evaluate_detections(found, Samples(folder, None, None, None), **{name: value})
 
 
 def test_numbers_are_refused_where_an_export_keeps_those_of_coco_s_labels(folder, tmp_path, monkeypatch):
@@ -738,7 +765,8 @@ def test_the_command_prints_tables_json_and_images(folder, tmp_path):
     assert "nowhere" in evaluate("detections", poses, "--truth", tmp_path / "nowhere", expect=1)
     for more, error in ((("--split", "val"), "expected a split of train, got 'val'"),
                         (("--dataset", "mpii"), "('kitti_object'), got 1 that it does not"),
-                        (("--classes", "Bus"), "expected classes of Car, DontCare, got Bus")):
+                        (("--classes", "Bus"), "expected classes of Car, DontCare, got Bus"),
+                        (("--iou", "5"), "got confidence 0.2, nms 0.2 and iou 5")):
         assert error in evaluate("detections", poses, "--truth", folder, *more, expect=1)
     for depth in (900, 100_000):  # as Python's reader of JSON gives it back, and as it does not
         (tmp_path / "deep.json").write_text('[{"image_id": ' + depth * "[" + depth * "]"
