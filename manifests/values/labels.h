@@ -133,6 +133,7 @@ struct Annotation {
   /// Where each of these stands among all boxes that the annotation has, counted from 0.
   std::vector<std::size_t> left_out_at = {};
   std::size_t of_other_classes = 0;  ///< boxes left out, since the source takes other classes
+  bool is_repeat = false;  ///< of a clip's still, whose losses the clip's first frame tells
   /// What outlines in `boxes` are without: "expected X, got Y, in PATH:LINE" each.
   std::vector<std::string> outlines_mended = {};
   /// Why tracks are not in `boxes`: "expected X, got Y, in PATH" each.

@@ -308,6 +308,19 @@ class Stills(program.InFolder):
                 self.assertEqual(len(sequence.random_access(5)), windows - 4)
                 self.assertEqual([len(data) for data, _ in sequence.streams(5)], [5, 5, 5, 5, 1])
 
+    def test_what_labels_of_clips_lose_counts_once_a_photograph(self):
+        rows = [f"{path.name},{row}" for path in self.photos("voc100", 3).iterdir()
+                for row in ("a,9,9,90,90", "b,9,9,90,90", "a,9,9,9,90")]
+        (self.folder / "boxes.csv").write_text("\n".join(["image,class,left,top,right,bottom", *rows]) + "\n")
+        self.convert(manifest([{"dataset": "frames", "root": "photos", "classes": ["a"],
+                                "labels": {"format": "csv", "path": "boxes.csv"},
+                                "pairs": {**stills(), "frames": 4}}],
+                              generator={"kind": "difference"}, image={"width": 64, "height": 48}))
+        described = json.loads((self.folder / "out" / "dataset.json").read_text())
+        self.assertEqual(described["counts"]["total"]["boxes"], 12)
+        self.assertEqual([note.split(":")[0] for note in described["sources"][0]["notes"] if "left out" in note],
+                         ["3 boxes of labels left out", '3 boxes of other classes left out ("classes")'])
+
     def test_simulated_clips_have_the_scenes_and_the_labels_of_converted_ones(self):
         self.photos("pennfudan", 2)
         for path in (self.folder / "photos").iterdir():

@@ -42,8 +42,9 @@ class RenumberedDataset final : public WrappedDataset {
   Outcome<Annotation> renumbered(Outcome<Annotation> read) const {
     if (is_fault(read)) return read;
     for (Box& box : read->boxes) box.class_id = numbers_.at(static_cast<std::size_t>(box.class_id));
-    read->of_other_classes +=
+    const std::size_t erased =
         std::erase_if(read->boxes, [](const Box& box) { return box.class_id == kLeftOut; });
+    if (!read->is_repeat) read->of_other_classes += erased;
     return read;
   }
 

@@ -360,7 +360,8 @@ class StillClips final : public WrappedDataset {
     const StillPose pose = poses(*scene.still, **still, scene.frame).back();
     const Frame frame((*still)->size, pose);
     Annotation labels = FrameLabels(**still, frame, spec_.dataset).labels();
-    if (scene.frame != first_frame()) {  // what the still's labels lost is told once
+    labels.is_repeat = scene.frame != first_frame();
+    if (labels.is_repeat) {  // what the still's labels lost is told once
       labels.left_out.clear();
       labels.left_out_at.clear();
       labels.outlines_mended.clear();

@@ -394,6 +394,7 @@ TEST_F(StillClipsTest, WhatLabelsLostIsToldOnceAClip) {
     for (std::size_t i = 0; i < all.size(); ++i) {
       const Annotation labels = *dataset.annotation(all[i].label_key);
       const bool is_first = i == 0 || i == 25;  // of 25 frames each
+      EXPECT_EQ(labels.is_repeat, !is_first) << i;
       EXPECT_EQ(labels.left_out.size(), is_first) << i;
       EXPECT_EQ(labels.outlines_mended.size(), is_first) << i;
       EXPECT_EQ(labels.tracks_left_out.size(), is_first) << i;
