@@ -82,6 +82,23 @@ std::map<int, std::int64_t> read_gaps(const StrictValue& value, int samples) {
   return gaps;
 }
 
+LabelLosses::Reasons read_reasons(const StrictValue& value) {
+  StrictObject object = value.object();
+  LabelLosses::Reasons reasons;
+  reasons.count = object.at("count").integer<std::int64_t>(0, INT64_MAX);
+  const StrictValue first = object.at("first");
+  for (const StrictValue& element : first.elements()) reasons.first.push_back(element.text());
+  object.finish();
+  if (value.faults().empty() && std::ssize(reasons.first) > reasons.count) {
+    first.fault("an array of at most " + std::to_string(reasons.count) + " (a reason each)");
+  }
+  return reasons;
+}
+
+nlohmann::json json_of(const LabelLosses::Reasons& reasons) {
+  return {{"count", reasons.count}, {"first", reasons.first}};
+}
+
 void require_seconds(double seconds, const std::string& of) {
   if (seconds >= 0 && seconds <= kMostSeconds) return;  // false for NaN
   throw std::invalid_argument("expected seconds of 0 or more, got " + std::to_string(seconds) +
@@ -134,8 +151,18 @@ CommitRecord read_document(const nlohmann::json& document, FaultList& faults) {
     const auto count = [&](const char* key) {
       return counts.at(key).integer<std::int64_t>(0, INT64_MAX);
     };
-    record.outlines = {count("given"), count("cut"), count("ellipses")};
+    record.inputs.outlines = {count("given"), count("cut"), count("ellipses")};
     counts.finish();
+  }
+  if (const auto found = object.find("label_losses")) {
+    StrictObject losses = found->object();
+    record.inputs.losses = {read_reasons(losses.at("boxes")), read_reasons(losses.at("outlines")),
+                            read_reasons(losses.at("tracks")),
+                            losses.at("of_other_classes").integer<std::int64_t>(0, INT64_MAX)};
+    losses.finish();
+  }
+  if (const auto pairs = object.find("same_images")) {
+    record.inputs.same_images = pairs->integer(0, record.samples);
   }
   if (const auto peak = object.find("peak_bytes")) {
     record.peak_bytes = peak->integer<std::int64_t>(0, INT64_MAX);
@@ -183,11 +210,18 @@ std::string to_json(const CommitRecord& record) {
                          {"stage_seconds", record.stage_seconds},
                          {"wall_seconds", record.wall_seconds},
                          {"peak_bytes", record.peak_bytes}};
-  if (record.outlines != OutlineCounts()) {
-    json["outlines"] = {{"given", record.outlines.given},
-                        {"cut", record.outlines.cut},
-                        {"ellipses", record.outlines.ellipses}};
+  const auto& [losses, same_images, outlines] = record.inputs;
+  if (outlines != OutlineCounts()) {
+    json["outlines"] = {
+        {"given", outlines.given}, {"cut", outlines.cut}, {"ellipses", outlines.ellipses}};
   }
+  if (losses != LabelLosses()) {
+    json["label_losses"] = {{"boxes", json_of(losses.boxes)},
+                            {"outlines", json_of(losses.outlines)},
+                            {"tracks", json_of(losses.tracks)},
+                            {"of_other_classes", losses.of_other_classes}};
+  }
+  if (same_images > 0) json["same_images"] = same_images;
   return indented(json);
 }
 

@@ -10,9 +10,9 @@
 
 #include "manifests/values/events.h"
 #include "manifests/values/frames.h"
+#include "manifests/values/input_counts.h"
 #include "manifests/values/job.h"
 #include "manifests/values/labels.h"
-#include "manifests/values/outlines.h"
 
 namespace eventgan {
 
@@ -112,7 +112,7 @@ struct CommitRecord {
   int valid = 0;
   std::vector<QuarantinedSample> quarantined;
   ShardContents contents;
-  OutlineCounts outlines = {};                  ///< of objects that move on their own
+  InputCounts inputs = {};                      ///< of the valid samples
   std::map<std::string, double> stage_seconds;  ///< busy time by stage
   double wall_seconds = 0;  ///< since the writer's previous commit, or the start of its run
   /// Most memory of the writer's process up to the commit; 0: not known.

@@ -131,7 +131,6 @@ Report table_of(const ConversionReport& report) {
 void add_shard(const CommitRecord& record, std::int64_t volume_bytes, ConversionReport& report) {
   ++report.shards_done;
   report.written += record.valid;
-  report.outlines += record.outlines;
   report.stored_bytes += record.size_bytes;
   report.volume_bytes += volume_bytes;
   for (const auto& [name, count] : record.contents.classes) report.boxes[name] += count;

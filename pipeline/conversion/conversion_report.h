@@ -26,7 +26,6 @@ struct ConversionReport {
   std::int64_t stored_bytes = 0;     ///< size of the shards
   std::map<std::string, std::int64_t> boxes;  ///< by class
   std::int64_t persons = 0;
-  OutlineCounts outlines;         ///< of objects that move on their own
   std::int64_t volume_bytes = 0;  ///< size of their volumes uncompressed, in the stored type
   std::map<std::string, double> stage_seconds;  ///< busy time by stage, of this run
   double wall_seconds = 0;
@@ -38,8 +37,8 @@ struct ConversionReport {
   /// Pairs that cannot be, since a sequence ends too early (SourceSummary), and their frames.
   std::int64_t unpaired = 0;
   std::int64_t unpaired_frames = 0;
-  bool is_labelled = true;                 ///< a source has labels, as far as the manifest says
-  std::vector<std::string> notes;          ///< on the inputs as they are, of the whole plan
+  bool is_labelled = true;         ///< a source has labels, as far as the manifest says
+  std::vector<std::string> notes;  ///< on the inputs as they are: the plan's, the part's shards'
   std::int64_t quarantined_elsewhere = 0;  ///< in other parts, when it started
   bool too_many_faults = false;  ///< the manifest's limits for quarantined samples are passed
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
+#include <map>
 #include <optional>
 #include <stdexcept>
 #include <system_error>
@@ -131,9 +132,14 @@ EarlierShards look_back(const ConversionJob& job, const ConversionOptions& optio
   return earlier;
 }
 
-void add_made(const ConversionJob& job, const std::vector<CommittedShard>& by_this_run,
-              const PlannedShards& by_others, ConversionReport& report) {
+/// Reports what was made since look_back found `earlier`, and the notes on the inputs of all these.
+void add_made(const ConversionJob& job, const std::vector<CommittedShard>& earlier,
+              const std::vector<CommittedShard>& by_this_run, const PlannedShards& by_others,
+              ConversionReport& report) {
+  std::map<const PlannedShard*, InputCounts> counts;  // in the plan's order, whoever made them
+  for (const CommittedShard& done : earlier) counts[done.shard] = done.record.inputs;
   for (const CommittedShard& made : by_this_run) {
+    counts[made.shard] = made.record.inputs;
     add_shard(made.record, volume_bytes(job.manifest, *made.shard), report);
     for (const auto& [stage, seconds] : made.record.stage_seconds) {
       report.stage_seconds[stage] += seconds;
@@ -143,8 +149,12 @@ void add_made(const ConversionJob& job, const std::vector<CommittedShard>& by_th
     const ShardState state = shard_state(job.folder, outline_of(*shard), job.frozen.hash);
     if (!state.done()) continue;  // the last look tells of it
     ++report.shards_done_by_others;
+    counts[shard] = state.record->inputs;
     add_shard(*state.record, volume_bytes(job.manifest, *shard), report);
   }
+  InputCounts inputs;
+  for (const auto& [shard, of_shard] : counts) inputs += of_shard;
+  std::ranges::copy(inputs.notes(), std::back_inserter(report.notes));
 }
 
 /// A last look at the part, so that "complete" is what is in the folder: beside this run
@@ -207,11 +217,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
   SharedFolder shared(folder, frozen.hash, std::move(earlier.distrusted));
   ShardSink sink(job, shared, report.quarantined_in_plan());
   const PlannedShards by_others = run_conversion("make shards", job, earlier.left, sink, &shared);
-  add_made(job, sink.committed(), by_others, report);
-  std::ranges::copy(sink.notes(), std::back_inserter(report.notes));
-  if (report.outlines != OutlineCounts()) {
-    report.notes.push_back(note_of(report.outlines));
-  }
+  add_made(job, earlier.done, sink.committed(), by_others, report);
   report.too_many_faults =
       beyond_limits(manifest.errors, report.quarantined_in_plan(), report.plan_pairs);
   report.stopped = options.stop_requested() && !report.complete();

@@ -19,7 +19,6 @@
 #include "manifests/values/job.h"
 #include "manifests/values/text.h"
 #include "pipeline/conversion/shard_rewrite.h"
-#include "pipeline/conversion/shard_sink.h"
 #include "pipeline/folder/amendments.h"
 #include "pipeline/folder/shard_backup.h"
 #include "pipeline/folder/shard_scan.h"
@@ -237,11 +236,7 @@ class RetrySink final : public SampleSink {
   void add(const SampleMessage& message) override {
     const int slot = record_->quarantined.at(static_cast<std::size_t>(message.slot)).slot;
     rewrite_->redo(slot, message);
-    if (!message.failed()) {
-      losses_.add(message.sample.annotation);
-      outlines_ += message.outlines;
-      return;
-    }
+    if (!message.failed()) return;
     failed_.push_back({record_->shard, slot, message.sample.sample_id, message.sample.fault});
   }
 
@@ -249,6 +244,7 @@ class RetrySink final : public SampleSink {
     TraceSpan span(trace_, "commit shard", "shard");
     span.note("shard", record_->shard);
     report_.shards_rewritten += rewrite_->commit();
+    mended_ += rewrite_->mended();
     rewrite_.reset();
     const std::int64_t tried = std::ssize(record_->quarantined);
     const std::int64_t mended = tried - std::ssize(failed_);
@@ -257,8 +253,7 @@ class RetrySink final : public SampleSink {
     report_.quarantined -= mended;
     report_.failed.insert(report_.failed.end(), failed_.begin(), failed_.end());
     failed_.clear();
-    report_.notes = losses_.notes();
-    if (outlines_ != OutlineCounts()) report_.notes.push_back(note_of(outlines_));
+    report_.notes = mended_.notes();
     return true;
   }
 
@@ -277,8 +272,7 @@ class RetrySink final : public SampleSink {
   const CommitRecord* record_ = nullptr;                   // of the shard under way
   std::unique_ptr<ShardRewrite> rewrite_;                  // of the shard under way
   std::vector<QuarantinedSlot> failed_;                    // of the shard under way
-  LabelLosses losses_;
-  OutlineCounts outlines_;
+  InputCounts mended_;
   RetryReport& report_;
   TraceRecorder* trace_;
 };

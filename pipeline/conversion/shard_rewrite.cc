@@ -37,7 +37,7 @@ ShardRewrite::ShardRewrite(std::filesystem::path folder, CommitRecord record,
   if (class_names) name_classes(*class_names);
   record_.shard = before_.shard;
   record_.plan_hash = before_.plan_hash;
-  record_.outlines = before_.outlines;
+  record_.inputs = before_.inputs;
   // What the shard has cost so far; the work of a retry comes on top.
   record_.stage_seconds = before_.stage_seconds;
   record_.wall_seconds = before_.wall_seconds;
@@ -66,7 +66,9 @@ void ShardRewrite::redo(int slot, const SampleMessage& message) {
   if (!writer_) writer_ = std::make_unique<ShardWriter>(folder_, header_);
   copy_before(slot);
   append(message.sample, message.chunk);
-  if (message.sample.valid) record_.outlines += message.outlines;
+  if (message.sample.valid) {
+    mended_.add(message.sample.annotation, message.same_image, message.outlines);
+  }
 }
 
 bool ShardRewrite::is_news(int slot, const ShardSample& sample) const {
@@ -107,6 +109,7 @@ bool ShardRewrite::commit() {
   record_.sha256 = receipt.sha256;
   record_.size_bytes = receipt.size_bytes;
   record_.contents = std::move(receipt.contents);
+  record_.inputs += mended_;
   const std::string text = to_json(record_);
   try {
     write_file_atomically(commit_record_file, text);

@@ -42,6 +42,9 @@ class ShardRewrite {
   /// restore_shards does. Once.
   bool commit();
 
+  /// Of the samples that were redone and are good.
+  const InputCounts& mended() const { return mended_; }
+
  private:
   void name_classes(const std::vector<std::string>& class_names);
   bool is_news(int slot, const ShardSample& sample) const;
@@ -54,6 +57,7 @@ class ShardRewrite {
   ShardHeader header_;                   // of what is written
   std::unique_ptr<ShardWriter> writer_;  // from the first difference on
   CommitRecord record_;                  // of what is written
+  InputCounts mended_;
 };
 
 }  // namespace eventgan

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstddef>
-#include <functional>
 #include <iterator>
 #include <string>
 #include <utility>
@@ -13,7 +12,6 @@
 #include "manifests/files/atomic_file.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
-#include "manifests/values/text.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/memory.h"
@@ -90,44 +88,6 @@ void add_write_seconds(std::int64_t start_ns, CommitRecord& record) {
 
 }  // namespace
 
-void LabelLosses::add(const Annotation& annotation) {
-  constexpr std::size_t kListed = 3;
-  const auto count = [](const std::vector<std::string>& found, Reasons& reasons) {
-    for (const std::string& reason : found) {
-      ++reasons.count;
-      if (reasons.listed.size() < kListed) reasons.listed.push_back(reason);
-    }
-  };
-  count(annotation.left_out, boxes_);
-  count(annotation.outlines_mended, outlines_);
-  count(annotation.tracks_left_out, tracks_);
-  of_other_classes_ += annotation.of_other_classes;
-}
-
-std::vector<std::string> LabelLosses::notes() const {
-  std::vector<std::string> notes;
-  const auto tell = [&](const Reasons& reasons, const char* what, const char* lost) {
-    if (reasons.count == 0) return;
-    const char* const more = reasons.count > std::ssize(reasons.listed) ? "; ..." : "";
-    notes.push_back(count_text(reasons.count, what, lost) +
-                    joined(reasons.listed, "; ", std::identity()) + more);
-  };
-  tell(boxes_, "box", " of labels left out: ");
-  if (of_other_classes_ > 0) {
-    notes.push_back(count_text(static_cast<std::int64_t>(of_other_classes_), "box",
-                               " of other classes left out (\"classes\")"));
-  }
-  tell(outlines_, "outline",
-       outlines_.count == 1 ? " of labels taken without some of its parts: "
-                            : " of labels taken without some of their parts: ");
-  tell(tracks_, "track", " of labels left out: ");
-  return notes;
-}
-
-std::string note_of(const OutlineCounts& outlines) {
-  return "outlines of objects that move on their own: " + to_text(outlines);
-}
-
 ShardSink::ShardSink(const ConversionJob& job, SharedFolder& shared,
                      std::int64_t quarantined_before)
     : job_(job),
@@ -162,10 +122,8 @@ void ShardSink::add(const SampleMessage& message) {
     record_.quarantined.push_back({message.slot, message.sample.sample_id, message.sample.fault});
   } else {
     ++record_.valid;
-    record_.outlines += message.outlines;
-    losses_.add(message.sample.annotation);
+    record_.inputs.add(message.sample.annotation, message.same_image, message.outlines);
   }
-  same_images_ += message.same_image ? 1 : 0;
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     record_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }
@@ -208,15 +166,6 @@ bool ShardSink::commit() {
   quarantined_ += std::ssize(record_.quarantined);
   committed_.push_back({shard_, std::move(record_)});
   return true;
-}
-
-std::vector<std::string> ShardSink::notes() const {
-  std::vector<std::string> notes = losses_.notes();
-  if (same_images_ > 0) {
-    notes.push_back(
-        count_text(same_images_, "pair", " of the same image twice: nothing moves there"));
-  }
-  return notes;
 }
 
 void ShardSink::abandon() {

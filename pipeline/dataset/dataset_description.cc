@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -201,6 +202,17 @@ Json shard_entry(const DatasetParts& parts, const ShardState& shard) {
           {"sha256", shard.record->sha256}};
 }
 
+/// Those of planning, and those that the source's shards tell of.
+std::vector<std::string> source_notes(const DatasetParts& parts, std::size_t index) {
+  InputCounts inputs;
+  for (const ShardState& shard : parts.done) {
+    if (std::cmp_equal(shard.outline.source, index)) inputs += shard.record->inputs;
+  }
+  std::vector<std::string> notes = parts.frozen.plan.sources.at(index).notes;
+  std::ranges::copy(inputs.notes(), std::back_inserter(notes));
+  return notes;
+}
+
 Json source_entry(const DatasetParts& parts, std::size_t index) {
   const SourceSpec& spec = parts.manifest.sources[index];
   const SourceSummary& summary = parts.frozen.plan.sources.at(index);
@@ -209,7 +221,7 @@ Json source_entry(const DatasetParts& parts, std::size_t index) {
                  {"labelled_frames", summary.labelled_frames},
                  {"unpaired", summary.unpaired},
                  {"unpaired_frames", summary.unpaired_ids.size()},
-                 {"notes", summary.notes},
+                 {"notes", source_notes(parts, index)},
                  {"class_names", nullptr},
                  {"joint_names", nullptr}};
   // Names are in the shards; a source of which no shard is done yet keeps them to itself.

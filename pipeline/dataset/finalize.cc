@@ -51,7 +51,7 @@ FinalizationReport finalize(const std::filesystem::path& folder,
   report.folder = folder.string();
   report.shards_planned = static_cast<int>(parts.frozen.plan.shards.size());
   report.missing = parts.missing;
-  report.notes = notes_of(parts.frozen.plan.sources, unknown_places(parts.frozen.plan, parts.done));
+  report.notes = notes_of(parts.frozen.plan, parts.done);
   for (const ShardState& shard : parts.done) add(*shard.record, report.counts);
   report.too_many_faults =
       beyond_limits(options.errors.value_or(parts.manifest.errors), report.counts.quarantined(),

@@ -79,7 +79,7 @@ class Observer {
     status.plan_hash = frozen_.hash;
     status.shards_planned = static_cast<int>(shards_.size());
     status.samples_planned = frozen_.plan.sample_count();
-    status.notes = notes_of(frozen_.plan.sources, unknown_places(frozen_.plan, shards_));
+    status.notes = notes_of(frozen_.plan, shards_);
     add_files(status);
     std::vector<CommitTiming> commits;
     for (const ShardState& shard : shards_) {

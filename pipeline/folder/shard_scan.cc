@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <iterator>
+#include <set>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -199,13 +201,17 @@ ShardState shard_state(const fs::path& folder, const ShardOutline& shard,
   return Look(folder, shard, plan_hash).run(depth);
 }
 
-std::set<std::string> unknown_places(const PlanOutline& plan,
-                                     const std::vector<ShardState>& shards) {
-  std::set<std::string> places = plan.unknown;
+std::vector<std::string> notes_of(const PlanOutline& plan, const std::vector<ShardState>& shards) {
+  InputCounts inputs;
+  std::set<std::string> unknown = plan.unknown;
   for (const ShardState& shard : shards) {
-    if (shard.record) places.insert(shard.record->unknown.begin(), shard.record->unknown.end());
+    if (!shard.record) continue;
+    inputs += shard.record->inputs;
+    unknown.insert(shard.record->unknown.begin(), shard.record->unknown.end());
   }
-  return places;
+  std::vector<std::string> notes = notes_of(plan.sources, unknown);
+  std::ranges::copy(inputs.notes(), std::back_inserter(notes));
+  return notes;
 }
 
 std::vector<ShardState> scan_shards(const fs::path& folder, const std::vector<ShardOutline>& shards,

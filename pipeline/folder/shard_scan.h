@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -73,9 +72,9 @@ struct ScanOptions {
   ShowPhase show_phase{};
 };
 
-/// What plan and commit records have that this program does not know, of a later minor version.
-std::set<std::string> unknown_places(const PlanOutline& plan,
-                                     const std::vector<ShardState>& shards);
+/// What a person should know of the inputs of a plan and of those `shards` of it that are done; and
+/// what their files have that this program does not know, of a later minor version.
+std::vector<std::string> notes_of(const PlanOutline& plan, const std::vector<ShardState>& shards);
 
 /// What the folder holds of each of `shards`, in their order.
 std::vector<ShardState> scan_shards(const std::filesystem::path& folder,

@@ -524,7 +524,7 @@ std::string shards(const Survey& survey, const PageContext& context) {
   std::string html =
       "<section><h2>Shards</h2>" + table({"shard", "", "#samples", "#quarantined", "#size"}, rows);
   if (shown < all) html += fmt::format("<p class=note>… and {} more</p>", grouped(all - shown));
-  const std::vector<std::string> notes = notes_of(parts.frozen.plan.sources);
+  const std::vector<std::string> notes = notes_of(parts.frozen.plan, parts.done);
   if (!notes.empty()) {
     html += "<h3>Notes on the inputs</h3><ul>";
     for (std::size_t i = 0; i < std::min(notes.size(), kMostRows); ++i) {

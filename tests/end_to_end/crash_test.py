@@ -2,13 +2,16 @@
 
 import json
 import random
+import re
 import shutil
+
+import numpy as np
 
 import failing_files
 import program
 from folders import content, records, same_content, same_folder, temporaries
 from program import run
-from small_job import LENIENT, broken_cars, small_job
+from small_job import LENIENT, broken_cars, save_image, small_job
 
 
 class Crash(program.InFolder):
@@ -73,6 +76,39 @@ class Crash(program.InFolder):
         self.convert(out)
         same_folder(out, self.expected)
         run("verify", out, "--deep")
+
+    def test_what_labels_lost_is_told_of_the_shards_before_the_kill_too(self):
+        dice = np.random.default_rng(7)
+        (self.folder / "labels").mkdir()
+        (self.folder / "labels" / "classes.txt").write_text("car\n")
+        for k in range(7):
+            save_image(self.folder / "images" / f"{k:06d}.png", dice)
+            (self.folder / "labels" / f"{k:06d}.txt").write_text("0 1.009 0.5 0.001 0.5\n")  # beside the image
+        source = {"dataset": "frames", "root": "images", "labels": {"format": "yolo", "path": "labels"},
+                  "pairs": program.pairs([1])}
+        self.manifest = self.write_manifest(program.manifest(
+            [source], generator={"kind": "difference"}, output={"directory": "out", "samples_per_shard": 2}))
+
+        def notes(told):
+            return re.findall("(?m)^  note: (.*)$", told)
+
+        whole = self.convert(self.folder / "whole", "")
+        expected = notes(whole.out)
+        self.assertIn("6 boxes of labels left out: expected ", expected[-1])
+        second = next(n for n, call in enumerate(failing_files.changes(whole.calls), 1)
+                      if call.kind == "rename" and call.path.name == "job-train-00001-of-00003.json")
+        killed = self.folder / "killed"
+        self.assertEqual(self.convert(killed, f"kill-after any {second}").code, -9)
+        self.assertEqual(len(records(killed)), 2)
+        for _ in range(2):  # the second finds all done
+            self.assertEqual(notes(self.convert(killed)[0]), expected)
+        same_folder(killed, self.folder / "whole")
+        parts = self.folder / "parts"
+        for part in ("0/2", "1/2"):
+            self.convert(parts, more=["--shards", part])
+        for command in ("finalize", "status"):
+            self.assertEqual(notes(run(command, parts)[0]), expected)
+        self.assertEqual(json.loads((parts / "dataset.json").read_text())["sources"][0]["notes"], expected)
 
     def test_overwrite_killed_while_discarding(self):
         """Of the folder's two plans one is in force, and no shard of the other counts."""

@@ -88,8 +88,14 @@ TEST(CommitRecord, TextIsCanonical) {
 TEST(CommitRecord, GoesThereAndBack) {
   CommitRecord record = sample_commit_record();
   EXPECT_EQ(parse_commit_record(to_json(record), "m"), record);
-  record.outlines = {120, 300, 12};
+  record.inputs = {.losses = {.boxes = {4, {"a\nb", "c", "d"}},
+                              .outlines = {1, {"e"}},
+                              .tracks = {},
+                              .of_other_classes = 5},
+                   .same_images = 2,
+                   .outlines = {120, 300, 12}};
   EXPECT_EQ(parse_commit_record(to_json(record), "m"), record);
+  record.inputs = {};
   record.quarantined = {};
   record.valid = record.samples = 0;
   record.contents.boxes = record.contents.persons = {};
@@ -195,10 +201,16 @@ TEST(CommitRecord, EveryRuleIsChecked) {
       {"/peak_bytes", "-1", "$.peak_bytes: expected an integer 0..9223372036854775807, got -1"},
       {"/stage_seconds/write", "-1", "$.stage_seconds.write: expected a number 0..1e+12, got -1"},
       {"/stage_seconds", "[]", "$.stage_seconds: expected an object, got an array of 0"},
+      {"/same_images", "5", "$.same_images: expected an integer 0..4, got 5"},
+      {"/label_losses", "{}", "$.label_losses.boxes: expected an object, got nothing"},
+      {"/label_losses", R"({"boxes": {"count": 1, "first": ["a", "b"]}})",
+       "$.label_losses.boxes.first: expected an array of at most 1 (a reason each), got an array "
+       "of 2"},
       {"/host", R"("x")",
        "$.host: expected one of the keys format, version, shard, plan_hash, sha256, size_bytes, "
        "samples, valid, quarantined, boxes, persons, classes, gaps, optional_columns, "
-       "stage_seconds, wall_seconds, outlines, peak_bytes, got an unknown key"},
+       "stage_seconds, wall_seconds, outlines, label_losses, same_images, peak_bytes, got an "
+       "unknown key"},
   };
   for (const BadCommitRecord& bad : table) {
     auto document = nlohmann::json::parse(to_json(sample_commit_record()));

@@ -60,6 +60,23 @@ TEST_F(Convert, SaysHowManyPairsAreTheSameImageTwice) {
               ::testing::ElementsAre("3 pairs of the same image twice: nothing moves there"));
 }
 
+TEST_F(Convert, SaysWhatLabelsLostInAllItsShardsWheneverTheyWereMade) {
+  std::string rows = "image,class,left,top,right,bottom\n";
+  for (int frame = 0; frame < 12; ++frame) {
+    rows += image(frame).filename().string() + ",car,40,1,49,9\n";
+  }
+  testing::write_file(folder_ / "boxes.csv", rows);
+  manifest_.sources[0].labels = {LabelFormat::kCsv, "boxes.csv"};
+  manifest_.errors = {ErrorPolicy::kQuarantine, 0, 0};
+  const std::vector<std::string> notes = run().notes;
+  ASSERT_THAT(notes, ::testing::Contains(::testing::StartsWith("11 boxes of labels left out: ")));
+  EXPECT_EQ(run().notes, notes);
+  fs::remove(out("job-train-00000-of-00003.json"));
+  const ConversionReport resumed = run();
+  EXPECT_EQ(resumed.shards_done_before, 2);
+  EXPECT_EQ(resumed.notes, notes);
+}
+
 TEST_F(Convert, GivesTheSameBytesForAnyNumberOfThreadsAndAgain) {
   run("one", 1);
   run("two", 2);

@@ -163,6 +163,17 @@ TEST_F(ShardRewriteTest, AMendedSampleGivesTheShardThatWasMeantFromTheStart) {
   EXPECT_EQ(files(), 2) << "no temporary is left";
 }
 
+TEST_F(ShardRewriteTest, WhatLabelsOfMendedSamplesLostIsAdded) {
+  before_.inputs.losses.boxes = {1, {"a"}};
+  ShardRewrite rewrite(folder_.path(), before_);
+  SampleMessage mended = message(whole_, 0);
+  mended.sample.annotation.left_out = {"b"};
+  rewrite.redo(0, mended);
+  EXPECT_TRUE(rewrite.commit());
+  EXPECT_THAT(rewrite.mended().notes(), ElementsAre("1 box of labels left out: b"));
+  EXPECT_THAT(record().inputs.notes(), ElementsAre("2 boxes of labels left out: a; b"));
+}
+
 TEST_F(ShardRewriteTest, NothingIsTouchedIfAllFailAsBefore) {
   ShardRewrite rewrite(folder_.path(), before_);
   rewrite.redo(0, message(broken_, 0));

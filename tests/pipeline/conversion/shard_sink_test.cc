@@ -202,32 +202,24 @@ class ShardSinkTest : public ::testing::Test {
   std::optional<ShardSink> sink_;
 };
 
-TEST(LabelLosses, AreCountedByKindAndTheFirstNamed) {
-  LabelLosses losses;
-  losses.add({});
-  EXPECT_TRUE(losses.notes().empty());
-  Annotation annotation;
-  annotation.outlines_mended = {"no area, in a.json (annotation 4)"};
-  losses.add(annotation);
-  EXPECT_THAT(losses.notes(), ::testing::ElementsAre(
-                                  "1 outline of labels taken without some of its parts: no area, "
-                                  "in a.json (annotation 4)"));
-  annotation.left_out = {"b", "c"};
-  annotation.outlines_mended = {"d", "e", "f"};
-  annotation.tracks_left_out = {"g"};
-  losses.add(annotation);
-  EXPECT_THAT(losses.notes(),
-              ::testing::ElementsAre("2 boxes of labels left out: b; c",
-                                     "4 outlines of labels taken without some of their parts: no "
-                                     "area, in a.json (annotation 4); d; e; ...",
-                                     "1 track of labels left out: g"));
-}
-
-TEST_F(ShardSinkTest, CountsWhatIsLeftOutOfSamplesThatAreNotTriedAgain) {
+TEST_F(ShardSinkTest, RecordsWhatIsLeftOutOfSamplesThatAreNotTriedAgain) {
   open_sink();
   accept(frozen_.plan.shards[0], 0);
   accept(frozen_.plan.shards[0], 1, /*valid=*/false);
-  EXPECT_THAT(sink_->notes(), ElementsAre("1 box of labels left out: job-a-00000-of-00001.h5/0"));
+  EXPECT_THAT(sink_->committed().at(0).record.inputs.notes(),
+              ElementsAre("1 box of labels left out: job-a-00000-of-00001.h5/0"));
+}
+
+TEST_F(ShardSinkTest, WhatADroppedShardCountedIsGoneWithIt) {
+  open_sink();
+  accept(frozen_.plan.shards[0], 0);
+  sink_->abandon();
+  for (const int slot : {0, 1}) accept(frozen_.plan.shards[0], slot);
+  for (const int slot : {0, 1}) accept(frozen_.plan.shards[1], slot);
+  for (const CommittedShard& made : sink_->committed()) {
+    EXPECT_EQ(made.record.inputs.losses.boxes.count, 2) << made.record.shard;
+  }
+  EXPECT_EQ(sink_->committed().size(), 2u);
 }
 
 TEST_F(ShardSinkTest, CommitsEachShardWithItsCommitRecord) {

@@ -141,12 +141,19 @@ TEST(Finalize, AShardThatIsCommittedAgainMeanwhileLeavesNoDescription) {
 
 TEST(Finalize, TheNotesOnTheInputsAreKept) {
   const ConvertedFolder folder;
+  for (const int number : {2, 3}) {
+    CommitRecord record = folder.record(number);
+    record.inputs.losses.boxes = {1, {"why " + std::to_string(number)}};
+    folder.write_commit_record(number, record);
+  }
+  const std::string lost = "2 boxes of labels left out: why 2; why 3";
   const FinalizationReport report = finalize(folder.path(), {});
-  EXPECT_EQ(report.notes, std::vector<std::string>{"clip.mp4: 60 of 100 frames"});
-  EXPECT_THAT(to_text(report), HasSubstr("1 note on the inputs:\n  note: clip.mp4: 60 of 100"));
+  EXPECT_EQ(report.notes, (std::vector<std::string>{"clip.mp4: 60 of 100 frames", lost}));
+  EXPECT_THAT(to_text(report), HasSubstr("2 notes on the inputs:\n  note: clip.mp4: 60 of 100"));
   const auto json = nlohmann::json::parse(description(folder));
   EXPECT_EQ(json["sources"][0]["notes"], nlohmann::json::array());
   EXPECT_EQ(json["sources"][1]["notes"], nlohmann::json{"clip.mp4: 60 of 100 frames"});
+  EXPECT_EQ(json["sources"][2]["notes"], nlohmann::json{lost});
 }
 
 TEST(Finalize, TheSameBytesHoweverOftenAndWhereverTheFolderIs) {
