@@ -47,8 +47,8 @@ class Recording {
   /// Events with t(first frame) < t ≤ t(last frame), in time order; none for one frame twice. A
   /// frame outside the time of the events is no error: there are fewer events then. Throws
   /// InputError where the data read are malformed: times that fall (by less than two milliseconds
-  /// they are lifted, but of ECD's and AEDAT4's files), pixels outside the image, values that are
-  /// not finite; std::out_of_range if the last frame is before the first.
+  /// they are lifted, but of ECD's and AEDAT's files and of ROS bags), pixels outside the image,
+  /// values that are not finite; std::out_of_range if the last frame is before the first.
   virtual std::vector<Event> events_between(std::int64_t first_frame,
                                             std::int64_t last_frame) const = 0;
 
