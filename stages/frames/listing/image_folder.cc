@@ -157,6 +157,34 @@ ImageFolder list_image_folder(const fs::path& folder) {
   return listed;
 }
 
+namespace {
+
+bool is_label_folder(const std::string& name) {
+  const std::string small = in_small_letters(name);
+  return small == "masks" || small == "instances" || small == "annotations" || small == "labels";
+}
+
+bool has_images_or_videos(const fs::path& folder, int levels) {
+  const FolderListing listing = look_into(folder);
+  const auto is_one = [](const fs::path& name) {
+    return is_video_name(name) || extension_rank(name) < kImageExtensions.size();
+  };
+  const auto has_some = [&](const std::string& name) {
+    return !name.starts_with('.') && !is_label_folder(name) &&
+           has_images_or_videos(folder / name, levels - 1);
+  };
+  return std::ranges::any_of(listing.files, is_one) ||
+         (levels > 0 && std::ranges::any_of(listing.folders, has_some));
+}
+
+}  // namespace
+
+void drop_label_folders(const fs::path& root, std::vector<std::string>& names) {
+  constexpr int kDeep = 2;
+  const bool has_some = std::ranges::any_of(names, is_label_folder);
+  if (has_some && has_images_or_videos(root, kDeep)) std::erase_if(names, is_label_folder);
+}
+
 void require_no_images(const fs::path& folder) {
   const auto refuse = [&](const std::string& name) {
     throw UsageError("expected a folder without images or videos that eventgan did not draw, got " +

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "stages/frames/listing/image_folder.h"
+#include "stages/frames/listing/numbered_sequence.h"
 #include "stages/frames/naming/found_frames.h"
 #include "stages/frames/naming/frame_names.h"
 
@@ -27,6 +28,11 @@ fs::path label_folder_in(const fs::path& above, std::string_view name, Find find
     if (folder.empty()) return {};
   }
   return folder;
+}
+
+/// A name as "frame_000012" or "000012".
+bool is_of_any_video(const NumberInName& name) {
+  return !name.digits.empty() && name.after.empty() && names_no_video(name.before);
 }
 
 }  // namespace
@@ -60,7 +66,8 @@ fs::path find_label_files(const FoundFrames& frames, const LabelFiles& names) {
   const auto is_of_frame = [&](const fs::path& name) {
     const std::string stem = name.stem().string();
     if (!frames.is_video) return frames.stems.contains(stem);
-    return frames.stems.contains(stem.substr(0, stem.rfind('_')));
+    return frames.stems.contains(stem.substr(0, stem.rfind('_'))) ||
+           (frames.stems.size() == 1 && is_of_any_video(find_number(stem)));
   };
   const auto has_files = [&](const fs::path& folder) { return !files_in(folder).empty(); };
   std::vector<fs::path> folders = {label_folder_of(frames.root, names)};
@@ -184,17 +191,27 @@ void FilePerImage::find_of_videos() {
       give_absent(frame_name, key);
     }
   };
+  const std::vector<SourceFrame>& frames = source().frames;
+  const bool is_only = !frames.empty() && frames.front().sequence == frames.back().sequence;
   for (const std::string& name : files_in(folder)) {
-    const std::string stem = fs::path(name).stem().string();
-    const std::size_t mark = stem.rfind('_');
-    take(joined(folder, name),
-         mark == std::string::npos ? stem : stem.substr(0, mark) + "/" + stem.substr(mark + 1));
+    std::string stem = fs::path(name).stem().string();
+    const NumberInName number = find_number(stem);
+    if (is_only && is_of_any_video(number)) {
+      stem = frames.front().sequence + "/" + number.digits;
+    } else if (const std::size_t mark = stem.rfind('_'); mark != std::string::npos) {
+      stem[mark] = '/';
+    }
+    take(joined(folder, name), stem);
   }
   for (const std::string& clip : root_.folders_in(folder)) {
     for (const std::string& name : files_in(joined(folder, clip))) {
-      take(joined(joined(folder, clip), name), clip + "/" + fs::path(name).stem().string());
+      const std::string stem = fs::path(name).stem().string();
+      const NumberInName number = find_number(stem);
+      take(joined(joined(folder, clip), name),
+           clip + "/" + (is_of_any_video(number) ? number.digits : stem));
     }
   }
+  warn_of_counts_from_1(absent(), names, root_.written(""));
 }
 
 }  // namespace eventgan

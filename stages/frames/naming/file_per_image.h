@@ -36,8 +36,8 @@ std::filesystem::path find_label_files(const FoundFrames& frames, const LabelFil
 /// Labels of which each image has a file, NAME.EXTENSION of NAME.png. It is at the image's own path
 /// with the folder of images replaced by that of labels, if that is below `path`; else at the
 /// image's path below ROOT, below `path`/LABELS or `path`. Of frame 12 of clip.mp4 it is
-/// clip_000012 or clip/000012 there, with any number of zeros. The label_key is the file's path
-/// below `path`.
+/// clip_000012 or clip/000012 there, or frame_000012 or 000012 of the only video, with any number
+/// of zeros. The label_key is the file's path below `path`.
 class FilePerImage : public OwnLabels {
  public:
   std::string label_place(const std::string& label_key) const override {

@@ -5,7 +5,6 @@
 
 #include "manifests/files/input_file.h"
 #include "stages/frames/listing/image_folder.h"
-#include "stages/frames/listing/numbered_sequence.h"
 
 namespace eventgan {
 namespace fs = std::filesystem;
@@ -87,39 +86,35 @@ namespace {
 
 FrameNames& names_of(const FoundFrames& frames) {
   if (frames.names) return *frames.names;
-  const std::vector<std::string>& names = image_names_of(frames);
+  if (frames.is_video) {
+    frames.first_frames = std::make_shared<std::vector<std::string>>();
+    for (const std::string& stem : frames.stems) frames.first_frames->push_back(stem + "/0");
+  }
+  const std::vector<std::string>& names =
+      frames.is_video ? *frames.first_frames : image_names_of(frames);
   const std::vector<std::string_view> views(names.begin(), names.end());
-  frames.names = std::make_shared<FrameNames>(views, frames.root, /*is_video=*/false);
+  frames.names = std::make_shared<FrameNames>(views, frames.root, frames.is_video);
   return *frames.names;
-}
-
-/// Of a video the names of its frames tell which one it is.
-bool is_of_video(const FoundFrames& frames, const std::string& name) {
-  const fs::path path(video_frame_name(name));
-  if (frames.stems.contains(path.parent_path().filename().string())) return true;
-  const NumberInName number = find_number(fs::path(name).stem().string());
-  const std::string& before = number.before;
-  if (number.digits.empty() || !number.after.empty()) return false;
-  const bool may_be_any = before.empty() || before.starts_with("frame");
-  return (may_be_any && frames.stems.size() == 1) ||
-         (!before.empty() && frames.stems.contains(before.substr(0, before.size() - 1)));
 }
 
 }  // namespace
 
 std::size_t count_among(const FoundFrames& frames, const std::vector<std::string>& names) {
-  if (frames.is_video) {
-    return static_cast<std::size_t>(std::ranges::count_if(
-        names, [&](const std::string& name) { return is_of_video(frames, name); }));
-  }
   FrameNames& known = names_of(frames);
+  // Of a video the first frame stands for all: how many there are, only opening it tells.
+  const auto name_of = [&](const std::string& name) {
+    return frames.is_video ? first_frame_name(name) : name;
+  };
+  const auto is_theirs = [&](const FrameNames::Match& match) {
+    return match.frame < FrameNames::kSeveral ||
+           (match.frame == FrameNames::kSeveral && !frames.is_video);
+  };
   std::size_t count = 0;
-  for (const std::string& name : names)
-    count += known.find_exactly(name).frame != FrameNames::kNone;
+  for (const std::string& name : names) count += is_theirs(known.find_exactly(name_of(name)));
   constexpr std::size_t kMost = 1000;
   const std::size_t step = std::max<std::size_t>(1, names.size() / kMost);
   for (std::size_t i = 0; count == 0 && i < names.size(); i += step) {
-    count += known.find(names[i]).frame != FrameNames::kNone;
+    count += is_theirs(known.find(name_of(names[i])));
   }
   return count;
 }

@@ -56,7 +56,8 @@ struct FoundFrames {
   WholeFiles* files;
   /// Names of all images below the root, once they are asked for.
   mutable std::shared_ptr<std::vector<std::string>> image_names = {};
-  mutable std::shared_ptr<FrameNames> names = {};
+  mutable std::shared_ptr<std::vector<std::string>> first_frames = {};  ///< of videos, as well
+  mutable std::shared_ptr<FrameNames> names = {};                       ///< of either
 };
 
 /// The first bytes of a file, where a format shows; a byte order mark left out.

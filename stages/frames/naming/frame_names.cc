@@ -65,10 +65,14 @@ std::vector<std::string> parts_of(const std::string& name) {
   return parts;
 }
 
-std::string joined_from(const std::vector<std::string>& parts, std::size_t first) {
+std::string joined(const std::vector<std::string>& parts, std::size_t first, std::size_t end) {
   std::string path;
-  for (std::size_t i = first; i < parts.size(); ++i) path += (i > first ? "/" : "") + parts[i];
+  for (std::size_t i = first; i < end; ++i) path += (i > first ? "/" : "") + parts[i];
   return path;
+}
+
+std::string joined_from(const std::vector<std::string>& parts, std::size_t first) {
+  return joined(parts, first, parts.size());
 }
 
 void add(std::unordered_map<std::string, std::size_t>& places, const std::string& name,
@@ -94,6 +98,18 @@ std::string video_frame_name(const std::string& name) {
   const fs::path above = path.parent_path();
   return ((is_video_name(above) ? above.parent_path() / above.stem() : above) / stem.substr(zeros))
       .generic_string();
+}
+
+std::string first_frame_name(const std::string& name) {
+  const fs::path path(name);
+  const NumberInName number = find_number(path.stem().string());
+  if (number.digits.empty()) return "";
+  return (path.parent_path() / (number.before + "0" + number.after)).generic_string();
+}
+
+bool names_no_video(std::string before) {
+  before.erase(before.find_last_not_of("_-. ") + 1);
+  return before.empty() || in_small_letters(before) == "frame";
 }
 
 FrameNames::FrameNames(std::vector<std::string_view> names, const fs::path& root, bool is_video)
@@ -199,38 +215,53 @@ FrameNames::Match FrameNames::find_near(const std::string& name, bool is_in_root
     const bool is_other = dropped > 0 && (is_other_sequence(parts, dropped) ||
                                           is_other_image(parts, dropped, found->second));
     if (is_other) return {};
-    const std::vector<std::string> front(parts.begin(),
-                                         parts.begin() + static_cast<std::ptrdiff_t>(dropped));
-    return {.frame = found->second, .is_near = true, .dropped = joined_from(front, 0)};
+    return {.frame = found->second, .is_near = true, .dropped = joined(parts, 0, dropped)};
   }
   return {};
 }
 
-/// "videos/STEM/12", and "STEM_000012.png" and "frame_000012.png" as tools name the images of a
-/// video.
-FrameNames::Match FrameNames::find_near_in_video(const std::vector<std::string>& parts) const {
+/// "videos/STEM/12", and "STEM_000012.png", "STEM/frame_000012.png" and "frame_000012.png" as tools
+/// name the images of a video.
+FrameNames::Match FrameNames::find_near_in_video(const std::vector<std::string>& parts) {
+  const auto match = [&](std::size_t frame, std::size_t dropped) -> Match {
+    if (frame >= kSeveral) return {frame == kSeveral && dropped == 0 ? kSeveral : kNone};
+    const std::string clip = fs::path(names_[frame]).parent_path().string();
+    const bool has_clip = dropped > 0 && video_frame_name(parts[dropped - 1] + "/0") == clip + "/0";
+    if (has_clip) --dropped;
+    const bool is_other =
+        dropped > 0 && (is_other_sequence(parts, dropped) || is_other_image(parts, dropped, frame));
+    if (is_other) return {};
+    return {.frame = frame, .is_near = true, .dropped = joined(parts, 0, dropped)};
+  };
   for (std::size_t dropped = 1; dropped + 1 < parts.size(); ++dropped) {
     const std::size_t frame = look_up(joined_from(parts, dropped));
-    if (frame != kNone) return {frame, {}, /*is_near=*/true};
+    if (frame != kNone) return match(frame, dropped);
   }
   const auto [stem, digits, after, number, time] =
       find_number(fs::path(parts.back()).stem().string());
   if (stem.empty() || digits.empty() || !after.empty()) return {};
+  const std::size_t folders = parts.size() - 1;
   std::size_t frame = look_up(stem.substr(0, stem.size() - 1) + "/" + digits);
-  if (frame == kNone && stem.starts_with("frame")) frame = look_up(digits);  // of the only video
-  return {frame, {}, /*is_near=*/frame < kSeveral};
+  if (frame == kNone && names_no_video(stem)) {
+    if (folders > 0) frame = look_up(parts[folders - 1] + "/" + digits);
+    if (frame == kNone) frame = look_up(digits);  // of the only video
+  }
+  return match(frame, folders);
 }
 
 namespace {
 
+constexpr int kLevels = 3;  // from ROOT up, in which a name's folders may lie
+
 bool is_number(std::string_view name) { return std::ranges::all_of(name, is_digit); }
 
 /// A folder's name that says nothing of what is in it.
-bool is_general(const std::string& name) {
+bool is_general(const std::string& name, bool of_videos) {
   constexpr std::array<std::string_view, 16> kGeneral = {
       "data", "dataset", "default",    "frames",   "image",  "images", "img",    "img1",
       "imgs", "media",   "jpegimages", "pictures", "photos", "rgb",    "upload", "uploads"};
-  return !split_of(name).empty() || std::ranges::find(kGeneral, name) != kGeneral.end();
+  return !split_of(name).empty() || std::ranges::find(kGeneral, name) != kGeneral.end() ||
+         (of_videos && (name == "clips" || name == "video" || name == "videos"));
 }
 
 /// "MOT17-02" and "MOT17-04", "seqA" and "seqB".
@@ -265,19 +296,19 @@ bool FrameNames::is_other_sequence(const std::vector<std::string>& parts,
     const bool is_own = std::ranges::find(own, name) != own.end();
     const auto is_sibling = [&](const std::string& folder) { return are_siblings(name, folder); };
     // A number is a task's or a sequence's, which only a root tells that is one as well.
-    if (!is_own && !is_general(name) &&
+    if (!is_own && !is_general(name, is_video_) &&
         (is_number(name) ? is_number(own.front()) : std::ranges::any_of(own, is_sibling))) {
       return true;
     }
     if (!is_number(name)) last = is_own ? "" : name;
   }
-  return !last.empty() && !is_general(last) && !is_general(own.front());
+  return !last.empty() && !is_general(last, is_video_) && !is_general(own.front(), is_video_);
 }
 
 /// Whether folders that were dropped from a name tell that it is of another image: of another
 /// split, or there in another place.
 bool FrameNames::is_other_image(const std::vector<std::string>& parts, std::size_t dropped,
-                                std::size_t frame) const {
+                                std::size_t frame) {
   std::string_view own;
   for (const fs::path& folder : (root_ / fs::path(names_[frame]).parent_path())) {
     if (const auto split = split_of(folder.string()); !split.empty()) own = split;
@@ -286,13 +317,34 @@ bool FrameNames::is_other_image(const std::vector<std::string>& parts, std::size
     const std::string_view split = split_of(parts[i]);
     if (!split.empty() && !own.empty() && split != own) return true;
   }
-  constexpr int kLevels = 3;
+  if (is_video_) {
+    const std::string folders = joined(parts, 0, dropped);
+    const std::string stem = fs::path(names_[frame]).parent_path().string();
+    const auto [other, is_new] = other_videos_.try_emplace(folders + "/" + stem);
+    if (is_new) other->second = has_other_video(folders, stem);
+    return other->second;
+  }
   fs::path above = root_;
   const std::string path = joined_from(parts, 0);
   for (int level = 0; level < kLevels; ++level, above = above.parent_path()) {
     std::error_code unknown;
     if (has_file(above / path) && !fs::equivalent(above / path, root_ / names_[frame], unknown)) {
       return true;
+    }
+  }
+  return false;
+}
+
+/// Whether a video of that name, which is not the one in ROOT, lies in these folders.
+bool FrameNames::has_other_video(const std::string& folders, const std::string& stem) const {
+  fs::path above = root_;
+  for (int level = 0; level < kLevels; ++level, above = above.parent_path()) {
+    for (const fs::path name : look_into(above / folders).files) {
+      std::error_code unknown;
+      if (is_video_name(name) && name.stem() == stem &&
+          !fs::equivalent(above / folders / name, root_ / name, unknown)) {
+        return true;
+      }
     }
   }
   return false;

@@ -109,6 +109,7 @@ void OwnLabels::give_named(const std::vector<NamedLabel>& named, const std::stri
     notes_.push_back(count_text(std::ssize(others), "image", " named otherwise in " + labels_path) +
                      ": " + some_of(others, 3));
   }
+  warn_of_counts_from_1(absent, names, labels_path);
   constexpr std::size_t kMany = 10;
   if (absent.size() >= kMany && 4 * absent.size() > named.size()) {
     std::vector<std::string> left_out;
@@ -121,6 +122,35 @@ void OwnLabels::give_named(const std::vector<NamedLabel>& named, const std::stri
   }
   for (auto* const frames : {&absent, &elsewhere}) {
     for (AbsentFrame& frame : *frames) absent_.push_back(std::move(frame));
+  }
+}
+
+void OwnLabels::warn_of_counts_from_1(const std::vector<AbsentFrame>& absent, FrameNames& names,
+                                      const std::string& labels_path) {
+  if (!source_.is_video) return;
+  struct Clip {
+    std::int64_t count = 0, first = -1, last = -1;  ///< of labels the lowest and the highest number
+  };
+  std::map<std::string, Clip> clips;
+  for (std::size_t i = 0; i < labels_.size(); ++i) {
+    Clip& clip = clips[source_.frames[i].sequence];
+    ++clip.count;
+    if (clip.first < 0 && !labels_[i].key.empty()) clip.first = source_.frames[i].number;
+  }
+  for (const AbsentFrame& frame : absent) {
+    const std::size_t of_clip = names.find(first_frame_name(frame.name)).frame;
+    if (of_clip >= labels_.size()) continue;
+    Clip& clip = clips[source_.frames[of_clip].sequence];
+    const std::string stem = std::filesystem::path(frame.name).stem().string();
+    clip.last = std::max(clip.last, find_number(stem).number);
+  }
+  for (const auto& [name, clip] : clips) {
+    if (clip.first != 1 || clip.last != clip.count) continue;
+    warnings_.push_back("frames of " + name + " are named by the numbers 1 to " +
+                        std::to_string(clip.count) + " in " + labels_path + ", and " + name +
+                        "/0 has no label: if these count from 1, all labels are one frame late; "
+                        "count from 0 then");
+    break;
   }
 }
 

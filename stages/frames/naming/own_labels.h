@@ -17,6 +17,7 @@
 
 namespace eventgan {
 
+class FrameNames;  // stages/frames/naming/frame_names.h
 class ImageSizes;  // stages/frames/decoding/frame_decoder.h
 
 /// A frame of a source of images or videos, as labels may name it.
@@ -104,6 +105,11 @@ class OwnLabels {
   /// that several folders of ROOT have, and for names that fit only without their folders where
   /// these are several.
   void give_named(const std::vector<NamedLabel>& named, const std::string& labels_path);
+
+  /// Warns where a video's labels are of frames 1 to COUNT, since it has 0 to COUNT - 1; called
+  /// once all are given. `absent`: what the labels name and the source does not have.
+  void warn_of_counts_from_1(const std::vector<AbsentFrame>& absent, FrameNames& names,
+                             const std::string& labels_path);
 
   /// Tells how many frames have no label; called once all are given.
   void note_without_label(const std::string& labels_path);

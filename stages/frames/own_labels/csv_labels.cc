@@ -357,6 +357,21 @@ bool has_score_column(std::string_view text) {
   return header && std::ranges::any_of(header->fields, is_score);
 }
 
+bool has_box_header(std::string_view text) {
+  const std::optional<CsvRecord> header = CsvReader(text, separator_of(text)).next();
+  return header && header->fault.empty() && !is_fault(columns_of(*header));
+}
+
+bool has_box_columns(std::string_view text) {
+  const std::optional<CsvRecord> header = CsvReader(text, separator_of(text)).next();
+  const auto has = [&](std::size_t column) {
+    return std::ranges::any_of(header->fields,
+                               [&](std::string_view field) { return is_column(column, field); });
+  };
+  return header && has(kImage) && has(kLeft) && has(kTop) &&
+         ((has(kRight) && has(kBottom)) || (has(kWidth) && has(kHeight)));
+}
+
 constinit const LabelReader kCsvReader{LabelFormat::kCsv, open_labels<CsvLabels>, find_csv};
 
 }  // namespace eventgan

@@ -35,7 +35,7 @@ FoundFrames frames_in(const fs::path& root, WholeFiles& files) {
   }
   const FolderListing seen = look_into(root);
   if (seen.files.empty() && seen.folders.empty()) return frames;
-  const ImageFolder listed = list_image_folder(root);
+  ImageFolder listed = list_image_folder(root);
   for (const auto& [number, name] : listed.frames.frames()) {
     frames.stems.insert(fs::path(name).stem().string());
   }
@@ -48,13 +48,16 @@ FoundFrames frames_in(const fs::path& root, WholeFiles& files) {
   const auto has_frames = [](const fs::path& folder) {
     return !look_into(folder).files.empty() && !list_image_folder(folder).frames.empty();
   };
+  drop_label_folders(root, listed.folders);
   for (const std::string& name : listed.folders) {
     if (has_frames(root / name) || has_frames(root / name / "img1")) {
       frames.folders.push_back(name);
       continue;
     }
     if (is_image_folder(name)) continue;
-    for (const std::string& below : look_into(root / name).folders) {  // two deep
+    std::vector<std::string> two_deep = look_into(root / name).folders;
+    drop_label_folders(root / name, two_deep);
+    for (const std::string& below : two_deep) {
       if (is_image_folder(below) || !has_frames(root / name / below)) continue;
       frames.folders.push_back(name + "/" + below);
     }
@@ -114,6 +117,7 @@ std::vector<fs::path> places_in(const fs::path& root) {
   };
   const auto folders_of = [](const fs::path& folder, bool train) {
     std::vector<std::string> names = look_into(folder).folders;
+    drop_label_folders(folder, names);
     std::erase_if(names, [&](const std::string& name) {
       const bool is_train = name.starts_with("train") || split_of(name) == "train";
       return name.starts_with('.') || is_train != train;
@@ -373,8 +377,9 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
   if (sources.empty()) sources.push_back(std::move(found));
   for (const auto& other : others) {
     const auto& [place, labels] = other;
-    const bool is_of_source = std::ranges::any_of(
-        sources, [&](const FoundSource& source) { return is_below(other.first, source.root); });
+    const bool is_of_source = std::ranges::any_of(sources, [&](const FoundSource& source) {
+      return is_below(other.first, source.root) || is_below(source.root, other.first);
+    });
     if (is_of_source) continue;
     sources.front().remarks.push_back("labels of other images left out: " + labels.string() +
                                       " of " + place.string());
@@ -384,8 +389,11 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
   sources.front().unread = std::move(unread.lines);
   std::vector<std::string>& remarks_of_all = sources.front().remarks;
   if (!unread.others.empty()) {
-    remarks_of_all.push_back(
-        counted(unread.others, "file", " with names of these images not read"));
+    constexpr std::string_view kRest = " with names of these images not read";
+    remarks_of_all.push_back(unread.are_more
+                                 ? std::to_string(unread.others.size()) + " or more files" +
+                                       std::string(kRest) + ": " + some_of(unread.others, 20)
+                                 : counted(unread.others, "file", std::string(kRest)));
   }
   if (!unread.limit.empty()) remarks_of_all.push_back(std::move(unread.limit));
   if (sources.size() == 1) note_lists(given, whole, sources.front());

@@ -39,7 +39,8 @@ struct UnreadLabels {
   std::vector<std::string> lines;
   /// Those that name the images and have no numbers, such as captions; beside labels, all.
   std::vector<std::string> others;
-  std::string limit;  ///< what was not looked at, if anything
+  bool are_more = false;  ///< `others` are the first of many in a folder
+  std::string limit;      ///< what was not looked at, if anything
 };
 
 /// Looks into `given` and the folders below it, as deep as images may lie, and into folders of

@@ -70,10 +70,11 @@ extern const LabelReader kCocoReader;
 /// classes.txt, obj.names or _darknet.labels (a name a line); without one the classes' names are
 /// their numbers, which a note tells. An
 /// image's text is at the image's own path with the last folder "images" replaced by "labels" if
-/// that is below `path`, else at the image's path below ROOT, below `path`/labels or `path`. Of
-/// frame 12 of clip.mp4 it is clip_000012.txt or clip/000012.txt, with any number of zeros, counted
-/// from 0. The label_key is the text's path below `path`. An empty text is an image without
-/// objects; an image without text is no sample.
+/// that is below `path`, else at the image's path below ROOT, below `path`/labels,
+/// `path`/obj_train_data (CVAT's) or `path`. Of frame 12 of clip.mp4 it is clip_000012.txt or
+/// clip/000012.txt, of the only video frame_000012.txt or 000012.txt, too, with any number of
+/// zeros, counted from 0. The label_key is the text's path below `path`. An empty text is an image
+/// without objects; an image without text is no sample.
 ///
 /// A line is "class xc yc w h", shares of the image's width and height from its left and upper
 /// edge; with kpt_shape [J, 2 or 3] "class xc yc w h" and J times "px py [v]", v as COCO's; a joint

@@ -116,7 +116,9 @@ bool has_index_masks(const fs::path& masks, const FoundFrames& frames) {
     }
   };
   add(masks);
-  for (const std::string& folder : frames.folders) {
+  std::vector<std::string> sequences = frames.folders;
+  if (frames.is_video) sequences.assign(frames.stems.begin(), frames.stems.end());
+  for (const std::string& folder : sequences) {
     if (files.size() < kMost) add(masks / folder);
   }
   // What is above images and masks may have any name.

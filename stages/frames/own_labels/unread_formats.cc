@@ -223,6 +223,13 @@ constexpr std::array kUnreadFormats{
                           file.path.stem().string().find("_gt") != std::string::npos;
                  },
                  "it lies where none is looked for", "put it into SEQUENCE/gt/gt.txt: it is MOT's"},
+    UnreadFormat{
+        "MOT's", ".txt",
+        [](const LabelFile& file) {
+          const std::size_t columns = number_columns(file.text, ',');
+          return file.is_of_image && file.images.are_videos() && columns >= 7 && columns <= 10;
+        },
+        "it lies where none is looked for", "put it into CLIP/gt/gt.txt beside the videos"},
     UnreadFormat{"VisDrone's", ".txt",
                  [](const LabelFile& file) {
                    const std::size_t columns = number_columns(file.text, ',');
@@ -244,12 +251,21 @@ constexpr std::array kUnreadFormats{
     UnreadFormat{"DOTA's", ".txt",
                  [](const LabelFile& file) { return file.is_of_image && is_dota_text(file); },
                  kNoReader, "convert them to COCO or YOLO with upright boxes"},
-    UnreadFormat{
-        "a table of", ".csv",
-        [](const LabelFile& file) { return has_score_column(file.text) && is_table(file); },
-        "it has a column of scores, as a detector's results",
-        "if it is the ground truth, take that column out"},
-    UnreadFormat{"a table of", ".csv", is_table, "its columns or names of images are others",
+    UnreadFormat{"a table of", ".csv",
+                 [](const LabelFile& file) {
+                   return has_score_column(file.text) &&
+                          (is_table(file) || has_box_columns(file.text));
+                 },
+                 "it has a column of scores, as a detector's results",
+                 "if it is the ground truth, take that column out"},
+    UnreadFormat{"a table of", ".csv",
+                 [](const LabelFile& file) { return has_box_header(file.text); },
+                 "none of the images it names is here, or it lies where none is looked for",
+                 "name images by their paths, a video's frames CLIP/12 from 0, and put it beside "
+                 "their folder"},
+    UnreadFormat{"a table of", ".csv",
+                 [](const LabelFile& file) { return is_table(file) || has_box_columns(file.text); },
+                 "its columns or names of images are others",
                  "name them image,class,left,top,right,bottom in a first line"},
     UnreadFormat{"a table of", ".tsv", is_table, "tables are .csv", "rename it to .csv"},
     UnreadFormat{"a table of", ".txt", is_table, "tables are .csv",

@@ -127,6 +127,8 @@ class UnreadFinder {
 
   void look_at_files(const fs::path& folder, const std::vector<std::string>& names) {
     std::map<std::pair<std::string, bool>, std::size_t> looked;
+    const std::size_t told_before = found.others.size();
+    bool are_all = true;
     for (const std::string& name : names) {
       const fs::path file = folder / name;
       const std::string extension = lower_extension(file);
@@ -140,12 +142,16 @@ class UnreadFinder {
       }
       const bool is_of_image = images_.is_stem(stem.string());
       const std::size_t most = is_of_image ? kMostOfImages : kMostOthers;
-      if (++looked[{extension, is_of_image}] > most) continue;
+      if (++looked[{extension, is_of_image}] > most) {
+        are_all = false;
+        continue;
+      }
       if (++opened_ > kMostFiles) return cut();
       look_at({file, images_, files_, is_of_image, images_.is_sequence(stem.string()),
                beginning_of(file)},
               extension);
     }
+    found.are_more |= !are_all && found.others.size() > told_before;
   }
 
   /// Whether it has the labels that were found, or has been told of.

@@ -45,7 +45,7 @@ bool is_other_text(std::string_view file) {
   return name.starts_with("readme.") || std::ranges::find(kOthers, name) != kOthers.end();
 }
 
-const LabelFiles kYoloFiles{".txt", {"images"}, {"labels"}, is_other_text};
+const LabelFiles kYoloFiles{".txt", {"images"}, {"labels", "obj_train_data"}, is_other_text};
 
 class YoloLabels : public FilePerImage {
  public:

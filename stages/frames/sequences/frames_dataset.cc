@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "manifests/values/faults.h"
 #include "stages/frames/listing/image_folder.h"
@@ -49,7 +50,9 @@ bool is_mot_sequence(const std::filesystem::path& folder) {
 
 /// A folder of sequences, of which none is a dataset's folder of images.
 bool has_sequences(const std::filesystem::path& folder) {
-  return any_folder(folder, [&](const std::string& name) {
+  std::vector<std::string> names = look_into(folder).folders;
+  drop_label_folders(folder, names);
+  return std::ranges::any_of(names, [&](const std::string& name) {
     return name != "images" && name != "JPEGImages" && has_images(folder / name);
   });
 }

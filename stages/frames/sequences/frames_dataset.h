@@ -38,9 +38,9 @@ namespace eventgan {
 /// without label; there are no boxes and no persons.
 ///
 /// Where several of these lie in one folder, images count before videos, and videos before
-/// folders; what is left out, the notes name. A video is decoded once at opening, to count and time
-/// its frames. Relative paths start at `base`. Throws InputError if ROOT is none of these or
-/// labels as a whole are malformed.
+/// folders, of these none that is called as one of labels (drop_label_folders); what is left out,
+/// the notes name. A video is decoded once at opening, to count and time its frames. Relative paths
+/// start at `base`. Throws InputError if ROOT is none of these or labels as a whole are malformed.
 std::unique_ptr<Dataset> open_frames_dataset(const SourceSpec& spec,
                                              const std::filesystem::path& base);
 

@@ -59,12 +59,20 @@ class ImagesDataset final : public Dataset {
     listed[0].images = std::move(top);
     const bool is_flat = !listed[0].images.frames.empty();
     const std::vector<std::string> folders = listed[0].images.folders;
+    std::vector<std::string> may_have_images = folders, of_labels;
     std::int64_t without_images = 0;
     if (is_flat) {
       listed[0].images.folders.clear();
     } else {
+      drop_label_folders(root_.on_disk(""), may_have_images);
       for (const std::string& name : folders) {
-        without_images += !list_below(name, spec.labels, listed);
+        const std::ptrdiff_t count = std::ssize(listed);
+        if (!list_below(name, spec.labels, listed)) {
+          ++without_images;
+        } else if (!std::ranges::binary_search(may_have_images, name)) {
+          listed.erase(listed.begin() + count, listed.end());
+          of_labels.push_back(name);
+        }
       }
     }
     for (const ListedFolder& folder : listed) {
@@ -83,6 +91,10 @@ class ImagesDataset final : public Dataset {
     note(is_flat ? std::ssize(folders) : 0, "folder", " beside the images left out");
     for (const ListedFolder& folder : listed) note_unused(folder);
     note(without_images, "folder", " without images");
+    if (!of_labels.empty()) {
+      notes_.push_back(
+          counted(of_labels, "folder", " of labels not taken for images in " + root_.written("")));
+    }
     std::ranges::sort(labelled_, {}, &LabelledFrame::sample_id);
     std::ranges::sort(annotation_files_);
   }
@@ -157,7 +169,9 @@ class ImagesDataset final : public Dataset {
     ListedFolder folder = list_folder_of(name, labels);
     std::vector<ListedFolder> inner;
     if (folder.images.frames.empty()) {
-      for (const std::string& below : folder.images.folders) {
+      std::vector<std::string> may_have_images = folder.images.folders;
+      drop_label_folders(root_.on_disk(name), may_have_images);
+      for (const std::string& below : may_have_images) {
         ListedFolder found = list_folder_of(name + "/" + below, labels);
         if (!found.images.frames.empty()) inner.push_back(std::move(found));
       }

@@ -35,4 +35,10 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
 /// Whether the table's header has a column of scores.
 bool has_score_column(std::string_view text);
 
+/// Whether the table's header is one that parse_csv_labels reads.
+bool has_box_header(std::string_view text);
+
+/// Whether the table's header has a column of images and a box's four edges, or two and its sides.
+bool has_box_columns(std::string_view text);
+
 }  // namespace eventgan

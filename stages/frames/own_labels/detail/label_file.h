@@ -17,6 +17,7 @@ class ImageNames {
   explicit ImageNames(const std::vector<FoundFrames>& places) : places_(places) {}
 
   bool is_stem(const std::string& stem) const { return list().stems_.contains(stem); }
+  bool are_videos() const { return list().are_videos_; }
 
   /// Of a folder of images, or of it and more: "M0101_gt_whole".
   bool is_sequence(const std::string& stem) const;

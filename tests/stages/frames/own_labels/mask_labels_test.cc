@@ -160,6 +160,42 @@ TEST_F(VocMasks, WithANumberOfNoObjectAreAFault) {
             "VOC/SegmentationObject/1.png");
 }
 
+TEST_F(MaskLabels, AreFoundBesideVideos) {
+  const auto find = [&](const char* folder) { return find_sources(at(folder)).front(); };
+  write("j/videos/walk.mp4");
+  mask("j/masks/walk/000000.png", two_);
+  FoundSource found = find("j");
+  ASSERT_TRUE(found.labels);
+  EXPECT_EQ(found.labels->format, LabelFormat::kMasks);
+  EXPECT_EQ(found.labels->path, at("j/masks"));
+  EXPECT_EQ(found.root, at("j/videos"));
+
+  write("j/boxes.csv", "image,class,left,top,right,bottom\nwalk/0,a,0,0,2,3\n");
+  found = find("j");
+  ASSERT_TRUE(found.labels);
+  EXPECT_EQ(found.labels->format, LabelFormat::kCsv);
+  EXPECT_EQ(found.labels->outlines, at("j/masks"));
+  EXPECT_EQ(found.root, at("j/videos"));
+  EXPECT_THAT(found.remarks, IsEmpty());
+}
+
+TEST_F(MaskLabels, FoldersOfLabelsHoldNoImages) {
+  write("k/videos/walk.mp4");
+  write("k/masks/walk/000000.png", "no PNG");
+  EXPECT_EQ(find_sources(at("k")).front().root, at("k/videos"));
+
+  add("ade/images/1.png", "ade/annotations/1.png", two_);  // grey: of classes
+  SourceSpec spec;
+  spec.root = "ade";
+  const auto dataset = open_frames_dataset(spec, folder_.path());
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("images/1"));
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("1 folder of labels not taken for images in ade: annotations"));
+  fs::remove_all(at("ade/images"));
+  EXPECT_THAT(ids_of(*open_frames_dataset(spec, folder_.path())), ElementsAre("annotations/1"))
+      << "alone they may be anything";
+}
+
 TEST_F(MaskLabels, AreFoundBesideImages) {
   const auto find = [&](const char* folder) { return find_sources(at(folder)).front(); };
   add("fudan/images/1.png", "fudan/masks/1.png", two_);

@@ -401,6 +401,89 @@ TEST_F(NamedLabels, NumbersThatMayCountFrom1AreWarnedOf) {
   EXPECT_THAT(csv("000001.png" + box)->warnings(), IsEmpty());
 }
 
+TEST_F(NamedLabels, AnotherVideosFrameIsNotTakenForOne) {
+  for (const char* folder : {"a", "b", "clips", "videos"}) {
+    fs::create_directory(at(folder));
+    testing::write_counting_video(at(folder) / "walk.avi", 4);
+  }
+  const auto open_table = [&](const std::string& root, const Texts& names) {
+    std::string table = "image,class,left,top,right,bottom\n";
+    for (const std::string& name : names) table += name + ",cat,0,1,2,3\n";
+    write("t.csv", table);
+    return open(LabelFormat::kCsv, root, "t.csv");
+  };
+  const struct {
+    const char *root, *name;
+    bool is_taken;
+  } cases[] = {
+      {"a", "a/walk/2", true},
+      {"b", "a/walk/2", false},
+      {"b", "a/walk_000002.png", false},
+      {"b", "walk/walk_000002.png", true},
+      {"b", "walk/frame_000002.png", true},
+      {"clips", "videos/walk/2", false},  // another one that is there
+      {"clips", "media/walk/2", true},
+      {"clips", "images/frame_000002.png", true},
+      {"videos", "home/me/walk.avi/2", true},
+  };
+  for (const auto& [root, name, is_taken] : cases) {
+    const std::int64_t taken = open_table(root, {name})->labelled_frames().at(0).frame.index;
+    EXPECT_EQ(taken, is_taken ? 2 : -1) << root << ' ' << name;
+  }
+  EXPECT_THROWS(
+      open_table("videos", {"x/walk/1", "y/walk/2"}), InputError,
+      "expected images' paths below videos, got 2 folders that it has not: x, y, in t.csv");
+}
+
+TEST_F(NamedLabels, AVideosNumbersThatMayCountFrom1AreWarnedOf) {
+  fs::create_directory(at("v"));
+  testing::write_counting_video(at("v/walk.avi"), 3);
+  const auto warning = [](const std::string& path) {
+    return "frames of walk are named by the numbers 1 to 3 in " + path +
+           ", and walk/0 has no label: if these count from 1, all labels are one frame late; count "
+           "from 0 then";
+  };
+  const std::pair<Texts, bool> cases[] = {
+      {{"walk/1", "walk/2", "walk/3"}, true}, {{"1", "2", "3"}, true},
+      {{"walk_1.png", "walk_3.png"}, true},   {{"walk/0", "walk/3"}, false},
+      {{"walk/1", "walk/2"}, false},          {{"walk/1", "walk/4"}, false}};
+  for (const auto& [names, is_warned] : cases) {
+    std::string table = "image,class,left,top,right,bottom\n";
+    for (const std::string& name : names) table += name + ",cat,0,1,2,3\n";
+    write("t.csv", table);
+    EXPECT_EQ(open(LabelFormat::kCsv, "v", "t.csv")->warnings(),
+              is_warned ? Texts{warning("t.csv")} : Texts())
+        << names.back();
+  }
+  for (const char* name : {"walk_1", "walk_2", "walk_3"}) {  // as Ultralytics' save_txt
+    write("v/labels/"s + name + ".txt", "0 0.5 0.5 1 1");
+  }
+  EXPECT_THAT(open(LabelFormat::kYolo, "v", "v/labels")->warnings(),
+              ElementsAre(warning("v/labels")));
+}
+
+TEST_F(NamedLabels, TextsOfTheOnlyVideoMayBeCalledByTheirNumbers) {
+  fs::create_directory(at("v"));
+  testing::write_counting_video(at("v/clip.avi"), 6);
+  write("v/classes.txt", "cat");
+  for (const char* name : {"labels/frame_000003", "labels/000003", "labels/3", "labels/Frame-3",
+                           "labels/clip/frame_000003", "obj_train_data/frame_000003"}) {
+    write("v/"s + name + ".txt", "0 0.5 0.5 1 1");
+    const auto dataset = open(LabelFormat::kYolo, "v", "v");
+    EXPECT_THAT(ids_of(*dataset), ElementsAre("clip/000003")) << name;
+    EXPECT_EQ(dataset->labelled_frames().at(0).frame.index, 3) << name;
+    fs::remove_all(at("v") / fs::path(name).begin()->string());
+  }
+  write("v/labels/frame_000009.txt", "0 0.5 0.5 1 1");
+  EXPECT_THAT(paired(*open(LabelFormat::kYolo, "v", "v"), 0, {0}),
+              ElementsAre("missing v/clip/000009 -1"));
+  write("v/labels/frame_000003.txt", "0 0.5 0.5 1 1");
+  testing::write_counting_video(at("v/other.avi"), 6);
+  for (const LabelledFrame& frame : open(LabelFormat::kYolo, "v", "v")->labelled_frames()) {
+    EXPECT_EQ(frame.frame.index, -1) << frame.sample_id << ": it may be either's";
+  }
+}
+
 TEST_F(NamedLabels, OfVideosTheFrameNumberStandsForTheImage) {
   write("v/other.json", R"({"1": "beside the video"})");
   testing::write_counting_video(at("v/clip.avi"), 6);

@@ -292,6 +292,9 @@ TEST_F(FindSource, LabelsLieWhereToolsPutThem) {
         "train.txt=list"},
        {kYolo, "", "", "clip.mp4, labels/clip_000012.txt, data.yaml"},
        {kYolo, "", "", "clip.mp4, clip/12.txt, classes.txt"},
+       {kYolo, "", "labels", "clip.mp4, labels/frame_000003.txt=yolo"},
+       {kYolo, "", "labels", "clip.mp4, labels/000003.txt=yolo"},
+       {kYolo, "", "", "clip.mp4, obj_train_data/frame_000000.txt, obj.names=car"},
        {kVoc, "images", "annotations/xmls", "images/1.jpg, annotations/xmls/1.xml"},
        {kVoc, "images", "labels", "images/1.jpg, labels/1.xml"},
        {kVoc, "images", "xml", "images/1.jpg, xml/1.xml"},
@@ -364,6 +367,12 @@ TEST_F(FindSource, WhatLooksLikeLabelsAndIsNotReadIsNamed) {
        R"([{"image_id": "70b1", "human_annotations": {"human1": [1, 2, 3, 4]}}])"},
       {"SoccerNet's", "img1/000001.jpg", "Labels-GameState.json",
        R"({"images": [{"file_name": "000001.jpg"}], "annotations": [{"bbox_image": {"x": 1}}]})"},
+      {"a table of", "run.mp4, walk.mp4", "boxes.csv",
+       "frame,class,left,top,right,bottom\n0,car,1,2,3,4\n"},
+      {"a table of", "images/1.jpg", "boxes.csv",
+       "image,class,left,top,right,bottom\nphoto_1.jpg,car,1,2,3,4\n"},
+      {"a table of", "1.jpg", "boxes.csv", "image,x1,y1,x2,y2,text\nother.jpg,1,2,3,4,a\n"},
+      {"MOT's", "run.mp4, walk.mp4", "gt/run.txt", "1,1,10,20,30,40,1,1,1\n"},
       {"a table of", "1.jpg", "a.csv",
        "image,class,left,top,right,bottom,score\n1.jpg,a,0,0,1,1,1\n"}};
   int number = 0;
@@ -432,6 +441,17 @@ TEST_F(FindSource, WhatNamesTheImagesAndIsNotReadIsNamed) {
     EXPECT_THAT(labelled.remarks,
                 ElementsAre("1 file with names of these images not read: " + place));
   }
+  // Of single images not all are looked at.
+  write("many/b.csv", kTable + "im1.jpg,a,0,0,1,1\n"s);
+  Texts places;
+  for (const std::string name : {"im1", "im2", "im3", "im4", "im5"}) {
+    write("many/images/" + name + ".jpg");
+    write("many/more/" + name + ".txt", name + " 4 5 9 9\n");
+    places.push_back(at("many/more/" + name + ".txt").string());
+  }
+  EXPECT_THAT(find("many").remarks,
+              ElementsAre("3 or more files with names of these images not read: " + places[0] +
+                          ", " + places[1] + ", " + places[2]));
 }
 
 TEST_F(FindSource, WhatNamesTheImagesAndIsNoLabelStopsNothing) {
@@ -518,6 +538,20 @@ TEST_F(FindSource, LabelsThatAreLeftOutAreRemarks) {
   EXPECT_THAT(found.remarks,
               Contains(AllOf(HasSubstr("a table left out, expected columns image, class, "),
                              HasSubstr("got \"score\": " + at("d/near.csv").string()))));
+}
+
+TEST_F(FindSource, TextsBesideTheImagesAndInLabelsAreOfTheSame) {
+  const std::string text = "0 .5 .5 .2 .2\n";
+  lay("y", "images/1.jpg, images/1.txt=text, labels/1.txt=text", {{"text", text}});
+  EXPECT_EQ(find("y").labels->path, at("y/labels"));
+  EXPECT_THAT(find("y").remarks, IsEmpty());
+}
+
+TEST_F(FindSource, LabelsOfAnotherVideoAreNotTaken) {
+  lay("h", "a/walk.mp4, b/walk.mp4, boxes.csv=table", {{"table", kTable + "a/walk/0,,,,,\n"s}});
+  EXPECT_EQ(find("h/a").labels->path, at("h/boxes.csv"));
+  EXPECT_FALSE(find("h/b").labels);
+  EXPECT_THAT(find("h/b").unread, ElementsAre(HasSubstr("none of the images it names is here")));
 }
 
 TEST_F(FindSource, NamesOfClassesGoBeforeYolosNumbers) {
