@@ -119,6 +119,8 @@ bool ShardRewrite::commit() {
     throw;
   }
   backup.release();
+  // That of a `finalize` which looked at the shard before it was replaced.
+  outdate_dataset(folder_, record_.shard, record_.sha256);
   return true;
 }
 

@@ -381,7 +381,8 @@ void discard_output(const fs::path& folder, const Fingerprint& fingerprint,
   fs::remove(folder / kPlanName);
 }
 
-bool outdate_dataset(const fs::path& folder, const std::string& shard) {
+bool outdate_dataset(const fs::path& folder, const std::string& shard,
+                     const std::string& up_to_date) {
   const fs::path description = folder / kDescriptionName;
   if (!fs::exists(description) || !is_replaceable(description, OwnFile::kDescription)) return false;
   std::string text;
@@ -394,7 +395,9 @@ bool outdate_dataset(const fs::path& folder, const std::string& shard) {
   const auto shards = json.is_object() ? json.find("shards") : json.end();
   if (shards != json.end() && shards->is_array() &&
       std::ranges::none_of(*shards, [&](const nlohmann::json& entry) {
-        return !entry.is_object() || !entry.contains("name") || entry.at("name") == shard;
+        return !entry.is_object() || !entry.contains("name") ||
+               (entry.at("name") == shard && (up_to_date.empty() || !entry.contains("sha256") ||
+                                              entry.at("sha256") != up_to_date));
       })) {
     return false;
   }

@@ -63,8 +63,10 @@ void discard_output(const std::filesystem::path& folder,
 
 /// For a shard that is about to be put in place of another one: removes dataset.json and dataset.h5
 /// if they name it (or are damaged), since the view's places within the shard, of boxes and joints,
-/// are those of the former one. Whether they were there. Files that are not the program's stay.
-bool outdate_dataset(const std::filesystem::path& folder, const std::string& shard);
+/// are those of the former one. Whether they were there. Files that are not the program's stay, and
+/// those that name the shard with the SHA-256 `up_to_date`.
+bool outdate_dataset(const std::filesystem::path& folder, const std::string& shard,
+                     const std::string& up_to_date = "");
 
 /// FOLDER/run.json says where the manifest was, so that `preview` finds the frames. It is a
 /// convenience, not part of the plan. One that is damaged, or has another than an absolute path, is

@@ -334,7 +334,10 @@ TEST(OutdateDataset, RemovesWhatNamesTheShardOrIsDamagedAndNothingOfAPerson) {
   for (const char* foreign : {"{", "[]", "{}", R"({"shards": 3})", R"({"images": []})"}) {
     EXPECT_FALSE(removes(foreign)) << foreign;
   }
-  fs::remove(folder / "dataset.json");
+  const std::string with_hash = own + R"("shards": [{"name": ")" + shard + R"(", "sha256": "a"}]})";
+  write_file(folder / "dataset.json", with_hash);
+  EXPECT_FALSE(outdate_dataset(folder.path(), kShard, "a"));  // it tells of the shard as it is
+  EXPECT_TRUE(outdate_dataset(folder.path(), kShard, "b"));
   EXPECT_FALSE(outdate_dataset(folder.path(), kShard));  // there is none
 }
 
