@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <set>
@@ -65,11 +66,10 @@ std::vector<FoundSource> find_all(const std::vector<std::string>& where) {
       throw UsageError(fmt::format("DATASET or PATH: expected one of {}, or what exists, got {}",
                                    fmt::join(words, ", "), where[i]));
     }
-    for (FoundSource& source : find_sources(where[i], dataset)) {
-      const std::string_view split = split_by_names ? split_named(where[i]) : "";
-      if (source.split.empty() && split != "train") source.split = split;
-      found.push_back(std::move(source));
-    }
+    std::vector<FoundSource> here = find_sources(where[i], dataset);
+    const std::string_view split = split_by_names ? split_named(where[i]) : "";
+    if (here.size() == 1 && here[0].split.empty() && split != "train") here[0].split = split;
+    std::ranges::move(here, std::back_inserter(found));
   }
   return found;
 }

@@ -17,6 +17,7 @@
 
 #include "manifests/documents/json_text.h"
 #include "manifests/files/atomic_file.h"
+#include "manifests/values/faults.h"
 #include "manifests/values/half.h"
 #include "manifests/values/outlines.h"
 #include "manifests/values/text.h"
@@ -169,6 +170,10 @@ class WebdatasetExporter : public Exporter {
     if (options.representation) {
       representation_ = parse_representation(*options.representation);
       word_ = *options.representation;
+    } else if (options.counts || options.seed != 0) {
+      throw UsageError(
+          "--counts, --seed: expected --representation WORD beside them, since volumes as stored "
+          "need no events, got none");
     }
   }
 

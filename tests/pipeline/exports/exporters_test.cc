@@ -114,7 +114,7 @@ class Exporters : public ::testing::Test {
     options.to = &*std::ranges::find(export_formats(), word, &ExportFormat::word);
     options.out = folder_ / std::string(word);
     options.splits = {"val"};
-    options.counts = EventCounts::kRounded;
+    if (word != "webdataset" || options.representation) options.counts = EventCounts::kRounded;
     options.threads = 2;
     run_export(converted.path(), options);
     return options.out;
@@ -317,6 +317,13 @@ TEST_F(Exporters, WebdatasetHasWhatTheEventsOfTheVolumeBecome) {
   EXPECT_EQ(sum, static_cast<double>(event_count(4)));
   EXPECT_FALSE(arrays.contains("volume.npy"));
   EXPECT_TRUE(arrays.contains("flow.npy"));
+}
+
+TEST_F(Exporters, WebdatasetDrawsNoEventsOfVolumesAsStored) {
+  ExportOptions options;
+  options.seed = 5;
+  EXPECT_THAT([&] { exported("webdataset", options); },
+              ThrowsMessage<UsageError>(HasSubstr("expected --representation WORD beside them")));
 }
 
 TEST_F(Exporters, WebdatasetKnowsTheWordsOfRepresentations) {
