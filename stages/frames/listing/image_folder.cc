@@ -167,7 +167,8 @@ bool is_label_folder(const std::string& name) {
 bool has_images_or_videos(const fs::path& folder, int levels) {
   const FolderListing listing = look_into(folder);
   const auto is_one = [](const fs::path& name) {
-    return is_video_name(name) || extension_rank(name) < kImageExtensions.size();
+    return !name.string().starts_with('.') &&
+           (is_video_name(name) || extension_rank(name) < kImageExtensions.size());
   };
   const auto has_some = [&](const std::string& name) {
     return !name.starts_with('.') && !is_label_folder(name) &&

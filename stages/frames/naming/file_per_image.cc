@@ -205,10 +205,7 @@ void FilePerImage::find_of_videos() {
   }
   for (const std::string& clip : root_.folders_in(folder)) {
     for (const std::string& name : files_in(joined(folder, clip))) {
-      const std::string stem = fs::path(name).stem().string();
-      const NumberInName number = find_number(stem);
-      take(joined(joined(folder, clip), name),
-           clip + "/" + (is_of_any_video(number) ? number.digits : stem));
+      take(joined(joined(folder, clip), name), clip + "/" + fs::path(name).stem().string());
     }
   }
   warn_of_counts_from_1(absent(), names, root_.written(""));

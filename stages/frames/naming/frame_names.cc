@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "stages/frames/listing/image_folder.h"
 #include "stages/frames/listing/numbered_sequence.h"
@@ -108,8 +109,10 @@ std::string first_frame_name(const std::string& name) {
 }
 
 bool names_no_video(std::string before) {
+  constexpr std::array<std::string_view, 6> kWords = {"",         "frame",    "frames",
+                                                      "frame_no", "frame_id", "frame_number"};
   before.erase(before.find_last_not_of("_-. ") + 1);
-  return before.empty() || in_small_letters(before) == "frame";
+  return std::ranges::find(kWords, in_small_letters(before)) != kWords.end();
 }
 
 FrameNames::FrameNames(std::vector<std::string_view> names, const fs::path& root, bool is_video)
@@ -119,11 +122,19 @@ FrameNames::FrameNames(std::vector<std::string_view> names, const fs::path& root
   }
   by_path_.reserve(names_.size());
   by_bare_name_.reserve(names_.size());
+  bool are_several_videos = false;
   for (std::size_t i = 0; i < names_.size(); ++i) {
     const std::string_view name = names_[i];
     by_path_.emplace(name, i);
     const auto [bare, is_new] = by_bare_name_.emplace(name.substr(name.rfind('/') + 1), i);
+    // Of several videos a number alone is no frame, though only the longest may have so many.
+    const bool is_other_video =
+        is_video && name.substr(0, name.rfind('/')) != names_[0].substr(0, names_[0].rfind('/'));
+    are_several_videos |= is_other_video;
     if (!is_new) bare->second = kSeveral;
+  }
+  if (are_several_videos) {
+    for (auto& [name, place] : by_bare_name_) place = kSeveral;
   }
 }
 
@@ -228,8 +239,14 @@ FrameNames::Match FrameNames::find_near_in_video(const std::vector<std::string>&
     const std::string clip = fs::path(names_[frame]).parent_path().string();
     const bool has_clip = dropped > 0 && video_frame_name(parts[dropped - 1] + "/0") == clip + "/0";
     if (has_clip) --dropped;
+    const auto is_other_clip = [&](const std::string& folder) {
+      const std::size_t first = look_up(folder + "/0");
+      return first < kSeveral && fs::path(names_[first]).parent_path() != clip;
+    };
+    const std::span front(parts.data(), dropped);
     const bool is_other =
-        dropped > 0 && (is_other_sequence(parts, dropped) || is_other_image(parts, dropped, frame));
+        dropped > 0 && (std::ranges::any_of(front, is_other_clip) ||
+                        is_other_sequence(parts, dropped) || is_other_image(parts, dropped, frame));
     if (is_other) return {};
     return {.frame = frame, .is_near = true, .dropped = joined(parts, 0, dropped)};
   };
@@ -241,11 +258,11 @@ FrameNames::Match FrameNames::find_near_in_video(const std::vector<std::string>&
       find_number(fs::path(parts.back()).stem().string());
   if (stem.empty() || digits.empty() || !after.empty()) return {};
   const std::size_t folders = parts.size() - 1;
-  std::size_t frame = look_up(stem.substr(0, stem.size() - 1) + "/" + digits);
-  if (frame == kNone && names_no_video(stem)) {
-    if (folders > 0) frame = look_up(parts[folders - 1] + "/" + digits);
-    if (frame == kNone) frame = look_up(digits);  // of the only video
-  }
+  const bool names_none = names_no_video(stem);
+  std::size_t frame = kNone;
+  if (names_none && folders > 0) frame = look_up(parts[folders - 1] + "/" + digits);
+  if (frame == kNone) frame = look_up(stem.substr(0, stem.size() - 1) + "/" + digits);
+  if (frame == kNone && names_none) frame = look_up(digits);  // of the only video
   return match(frame, folders);
 }
 

@@ -378,7 +378,8 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
   for (const auto& other : others) {
     const auto& [place, labels] = other;
     const bool is_of_source = std::ranges::any_of(sources, [&](const FoundSource& source) {
-      return is_below(other.first, source.root) || is_below(source.root, other.first);
+      return is_below(other.first, source.root) ||
+             (is_below(source.root, other.first) && list_image_folder(other.first).frames.empty());
     });
     if (is_of_source) continue;
     sources.front().remarks.push_back("labels of other images left out: " + labels.string() +

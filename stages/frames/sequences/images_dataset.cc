@@ -64,7 +64,8 @@ class ImagesDataset final : public Dataset {
     if (is_flat) {
       listed[0].images.folders.clear();
     } else {
-      drop_label_folders(root_.on_disk(""), may_have_images);
+      // Of images that labels name, whatever their folder is called, these are the frames.
+      if (!spec.labels) drop_label_folders(root_.on_disk(""), may_have_images);
       for (const std::string& name : folders) {
         const std::ptrdiff_t count = std::ssize(listed);
         if (!list_below(name, spec.labels, listed)) {
@@ -170,7 +171,7 @@ class ImagesDataset final : public Dataset {
     std::vector<ListedFolder> inner;
     if (folder.images.frames.empty()) {
       std::vector<std::string> may_have_images = folder.images.folders;
-      drop_label_folders(root_.on_disk(name), may_have_images);
+      if (!labels) drop_label_folders(root_.on_disk(name), may_have_images);
       for (const std::string& below : may_have_images) {
         ListedFolder found = list_folder_of(name + "/" + below, labels);
         if (!found.images.frames.empty()) inner.push_back(std::move(found));

@@ -61,7 +61,8 @@ bool is_simulated(const Place& place) {
 
 std::optional<Place> look_around(const fs::path& path, std::optional<DatasetKind> dataset) {
   if (auto found = look_at(path, dataset, /*own_too=*/false)) return found;
-  const std::vector<std::string> folders = look_into(path).folders;
+  std::vector<std::string> folders = look_into(path).folders;
+  std::erase_if(folders, [](const std::string& name) { return name.starts_with('.'); });
   const auto look_below = [&](bool own_too) {
     std::vector<Place> below;
     for (const std::string& name : folders) {

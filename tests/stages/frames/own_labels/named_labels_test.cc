@@ -435,6 +435,30 @@ TEST_F(NamedLabels, AnotherVideosFrameIsNotTakenForOne) {
       "expected images' paths below videos, got 2 folders that it has not: x, y, in t.csv");
 }
 
+TEST_F(NamedLabels, OfSeveralVideosAFolderNamesOne) {
+  fs::create_directory(at("videos"));
+  testing::write_counting_video(at("videos/frame.avi"), 4);
+  testing::write_counting_video(at("videos/walk.avi"), 8);
+  for (const auto& [name, id] : {std::pair("walk/frame_000003.png", "walk/000003"),
+                                 std::pair("videos/walk/frame_000003.jpg", "walk/000003"),
+                                 std::pair("videos/frame/3", "frame/000003"),
+                                 std::pair("frame_000003.png", "frame/000003")}) {
+    write("t.csv", "image,class,left,top,right,bottom\n"s + name + ",cat,0,1,2,3\n");
+    EXPECT_THAT(ids_of(*open(LabelFormat::kCsv, "videos", "t.csv")), ElementsAre(id)) << name;
+  }
+}
+
+TEST_F(NamedLabels, ImagesThatLabelsNameMayLieInAFolderCalledAsOneOfLabels) {
+  write("faces/masks/1.png");
+  write("faces/no_masks/1.png");
+  write("t.csv",
+        "image,class,left,top,right,bottom\nmasks/1.png,cat,0,1,2,3\nno_masks/1.png,cat,0,1,2,3\n");
+  const auto dataset = open(LabelFormat::kCsv, "faces", "t.csv");
+  for (const LabelledFrame& frame : dataset->labelled_frames()) {
+    EXPECT_NE(frame.frame.index, -1) << frame.sample_id;
+  }
+}
+
 TEST_F(NamedLabels, AVideosNumbersThatMayCountFrom1AreWarnedOf) {
   fs::create_directory(at("v"));
   testing::write_counting_video(at("v/walk.avi"), 3);
@@ -466,8 +490,9 @@ TEST_F(NamedLabels, TextsOfTheOnlyVideoMayBeCalledByTheirNumbers) {
   fs::create_directory(at("v"));
   testing::write_counting_video(at("v/clip.avi"), 6);
   write("v/classes.txt", "cat");
-  for (const char* name : {"labels/frame_000003", "labels/000003", "labels/3", "labels/Frame-3",
-                           "labels/clip/frame_000003", "obj_train_data/frame_000003"}) {
+  for (const char* name :
+       {"labels/frame_000003", "labels/000003", "labels/3", "labels/Frame-3", "labels/frame_no_3",
+        "labels/clip/frame_000003", "labels/train/frame_000003", "obj_train_data/frame_000003"}) {
     write("v/"s + name + ".txt", "0 0.5 0.5 1 1");
     const auto dataset = open(LabelFormat::kYolo, "v", "v");
     EXPECT_THAT(ids_of(*dataset), ElementsAre("clip/000003")) << name;
@@ -478,8 +503,9 @@ TEST_F(NamedLabels, TextsOfTheOnlyVideoMayBeCalledByTheirNumbers) {
   EXPECT_THAT(paired(*open(LabelFormat::kYolo, "v", "v"), 0, {0}),
               ElementsAre("missing v/clip/000009 -1"));
   write("v/labels/frame_000003.txt", "0 0.5 0.5 1 1");
-  testing::write_counting_video(at("v/other.avi"), 6);
-  for (const LabelledFrame& frame : open(LabelFormat::kYolo, "v", "v")->labelled_frames()) {
+  testing::write_counting_video(at("v/other.avi"), 2);
+  const auto dataset = open(LabelFormat::kYolo, "v", "v");
+  for (const LabelledFrame& frame : dataset->labelled_frames()) {
     EXPECT_EQ(frame.frame.index, -1) << frame.sample_id << ": it may be either's";
   }
 }

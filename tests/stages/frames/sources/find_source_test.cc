@@ -547,6 +547,19 @@ TEST_F(FindSource, TextsBesideTheImagesAndInLabelsAreOfTheSame) {
   EXPECT_THAT(find("y").remarks, IsEmpty());
 }
 
+TEST_F(FindSource, TextsOfImagesAboveAreOfOthers) {
+  const std::string text = "0 .5 .5 .2 .2\n";
+  lay("above", "1.jpg, 1.txt=text, images/11.jpg, images/11.txt=text", {{"text", text}});
+  EXPECT_THAT(find("above").remarks, Contains(HasSubstr("labels of other images left out")));
+}
+
+TEST_F(FindSource, HiddenFilesAndFoldersAreNoSource) {
+  lay("hidden", ".cache/a.mp4", {});
+  EXPECT_THROWS(find("hidden"), InputError, "got none of these");
+  lay("thumbs", "annotations/1.jpg, .thumb.jpg", {});
+  EXPECT_EQ(find("thumbs").dataset, kFrames);
+}
+
 TEST_F(FindSource, LabelsOfAnotherVideoAreNotTaken) {
   lay("h", "a/walk.mp4, b/walk.mp4, boxes.csv=table", {{"table", kTable + "a/walk/0,,,,,\n"s}});
   EXPECT_EQ(find("h/a").labels->path, at("h/boxes.csv"));
