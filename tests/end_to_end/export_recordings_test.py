@@ -1,7 +1,7 @@
 """Exports of whole recordings, DSEC's, RVT's, Prophesee's and DV's, read as these read them: with numpy and h5py, or
 as their pages describe the bytes."""
 
-import importlib
+import importlib.util
 import io
 import json
 import pathlib
@@ -24,7 +24,7 @@ from camera_files import random_events, volume_of, whole_microseconds, write_mvs
 from dsec_sequence import DsecSequence, half_size
 from exported_demo import Export, of, read_samples
 from program import run
-from rvt_sequence import GEN1, GEN4, RvtSequence, frame_times, kept_boxes, stacked_histogram
+from rvt_sequence import GEN1, GEN4, RvtSequence, columns_of, frame_times, kept_boxes, own_code, stacked_histogram
 
 setUpModule, tearDownModule = demo.set_up, demo.tear_down
 READERS = program.SHARED.parent / "readers"
@@ -432,6 +432,29 @@ class Recordings(Export):
                     source = out / "shards"
                 self.export("rvt", *words, source=source, out=out / "export")
                 self.check_preprocessed(out / "export", 4 if words else 10)
+                if size[0] and READERS.is_dir() and importlib.util.find_spec("torch"):
+                    self.check_with_own_code(out / "export", 4 if words else 10, size)
+
+    def check_with_own_code(self, out, bins, size):
+        """RVT's own classes give what RvtSequence, written after them, gives."""
+        name, scale = f"stacked_histogram_dt=50_nbins={bins}", 0.5 if size == GEN4 else 1
+        compared = 0
+        with own_code(str(READERS / "rvt")) as samples:
+            for labels in sorted((out / "preprocessed").glob("*/*/labels_v2")):
+                sequence = RvtSequence(labels.parent, name, size)
+                for length in (1, 3):
+                    of_both = zip(samples(labels.parent, name, length, size),
+                                  (sequence.random_access(length), sequence.streams(length)))
+                    for found, expected in of_both:
+                        self.assertEqual(len(found), len(expected))
+                        for (data, boxes), (expected_data, expected_boxes) in zip(found, expected):
+                            np.testing.assert_array_equal(data, expected_data)
+                            for rows, of_them in zip(boxes, expected_boxes, strict=True):
+                                self.assertEqual(rows is None, of_them is None)
+                                if rows is not None:
+                                    np.testing.assert_allclose(rows, columns_of(of_them, size, scale), atol=1e-4)
+                                    compared += len(rows)
+        self.assertGreater(compared, 0)
 
     def check_preprocessed(self, out, bins):
         labels_without_frame, made = 0, 0

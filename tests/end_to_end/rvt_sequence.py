@@ -1,6 +1,12 @@
 """A preprocessed sequence as RVT's dataset classes read it (github.com/uzh-rpg/RVT, commit 515034c), and as its
 preprocessing makes it, with numpy and h5py; their assertions stay."""
 
+import contextlib
+import importlib
+import sys
+import types
+import unittest.mock
+
 import h5py
 import numpy as np
 
@@ -103,3 +109,47 @@ class RvtSequence:
                 samples.append(self.window(start, min(start + length, end)))
                 assert any(labels is not None for labels in samples[-1][1])
         return samples
+
+
+def columns_of(boxes, size, scale):
+    """t, x, y, w, h, class_id of ObjectLabels, as scale_ leaves them."""
+    x, y = scale * boxes["x"], scale * boxes["y"]
+    right, bottom = (np.minimum(scale * (boxes[begin] + boxes[extent]), scale * side - 1)
+                     for begin, extent, side in (("x", "w", size[1]), ("y", "h", size[0])))
+    return np.stack([boxes["t"], x, y, right - x, bottom - y, boxes["class_id"]], 1)
+
+
+@contextlib.contextmanager
+def own_code(checkout):
+    """A function that makes of a sequence's folder, as RVT's own classes in a checkout have them, the samples of
+    SequenceForRandomAccess and of SequenceForIter: each its representations and boxes. What they import and do not
+    need here are stubs."""
+    names = {"torchdata.datapipes.map": {"MapDataPipe": object}, "torchdata.datapipes.iter": {"IterDataPipe": object},
+             "omegaconf": {"DictConfig": dict}, "einops": {"rearrange": lambda columns, _: np.stack(columns, 1)},
+             "utils.timers": {"TimerDummy": lambda timer_name: contextlib.nullcontext()},
+             "utils.helpers": {"torch_uniform_sample_scalar": None},
+             "data.utils.augmentor": {"RandomSpatialAugmentorGenX": None}}
+    stubs = {name: types.ModuleType(name) for name in ("torchdata", "torchdata.datapipes", "utils", *names)}
+    for name, members in names.items():
+        vars(stubs[name]).update(members)
+    importlib.import_module("torch")  # which can be imported once only: it stays
+    with unittest.mock.patch.dict(sys.modules, stubs), unittest.mock.patch.object(sys, "path", [checkout, *sys.path]):
+        random, streaming = (importlib.import_module(f"data.genx_utils.sequence_{name}")
+                             for name in ("rnd", "for_streaming"))
+        of_types = importlib.import_module("data.utils.types")
+        kinds, keys = of_types.DatasetType, of_types.DataType
+
+        def samples(path, representation, length, size):
+            given = path, representation, length, kinds.GEN4 if size == GEN4 else kinds.GEN1, size == GEN4
+            iterated = streaming.SequenceForIter.get_sequences_with_guaranteed_labels(*given)
+            for sequences in ([random.SequenceForRandomAccess(*given, False)], iterated):
+                yield [parts(each[i]) for each in sequences for i in range(len(each))]
+
+        def parts(sample):
+            count = len(sample[keys.EV_REPR]) - sum(sample[keys.IS_PADDED_MASK])
+            labels = [sample[keys.OBJLABELS_SEQ][i] for i in range(count)]
+            return (np.stack([each.numpy() for each in sample[keys.EV_REPR][:count]]),
+                    [each and np.stack([each.get(name).numpy() for name in ("t", "x", "y", "w", "h", "class_id")], 1)
+                     for each in labels])
+
+        yield samples
