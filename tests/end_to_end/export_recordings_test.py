@@ -1,6 +1,7 @@
 """Exports of whole recordings, DSEC's, RVT's, Prophesee's and DV's, read as these read them: with numpy and h5py, or
 as their pages describe the bytes."""
 
+import contextlib
 import importlib.util
 import io
 import json
@@ -52,6 +53,17 @@ def slice_dsec(file, begin_us, end_us):
     t = file["events/t"][first:last].astype(np.int64)
     inside = slice(first + np.searchsorted(t, begin_us), first + np.searchsorted(t, end_us))
     return [file[f"events/{name}"][inside].astype(np.int64) + (offset if name == "t" else 0) for name in "txyp"]
+
+
+def arrays_of(path):
+    """The arrays of a .npy, .npz or HDF5 file, by their names: dtype, shape, bytes."""
+    if path.suffix == ".h5":
+        with h5py.File(path) as file:
+            arrays = {name: file[name][()] for name in file}
+    else:
+        with np.load(path) if path.suffix == ".npz" else contextlib.nullcontext({"": np.load(path)}) as file:
+            arrays = dict(file)
+    return {name: (array.dtype, array.shape, array.tobytes()) for name, array in arrays.items()}
 
 
 def read_columns(path):
@@ -436,10 +448,19 @@ class Recordings(Export):
                     self.check_with_own_code(out / "export", 4 if words else 10, size)
 
     def check_with_own_code(self, out, bins, size):
-        """RVT's own classes give what RvtSequence, written after them, gives."""
+        """RVT's own classes give what RvtSequence, written after them, gives, and its preprocessing the same files."""
         name, scale = f"stacked_histogram_dt=50_nbins={bins}", 0.5 if size == GEN4 else 1
-        compared = 0
-        with own_code(str(READERS / "rvt")) as samples:
+        compared = made = 0
+        with own_code(str(READERS / "rvt")) as (samples, preprocess):
+            # Of Gen4's size the script wants labels at 30 or 60 Hz.
+            for boxes in sorted((out / "raw").glob("*/*_bbox.npy")) if size == GEN1 else ():
+                recording = boxes.name.removesuffix("_bbox.npy")
+                of_rvt, ours = out / "rvts" / recording, out / "preprocessed" / boxes.parent.name / recording
+                preprocess(boxes, *boxes.parent.glob(f"{recording}_td*.h5"), of_rvt, bins)
+                self.assertEqual(of_rvt.exists(), ours.exists())
+                for path in sorted(of_rvt.rglob("*.*")):
+                    self.assertEqual(*map(arrays_of, (ours / path.relative_to(of_rvt), path)))
+                    made += 1
             for labels in sorted((out / "preprocessed").glob("*/*/labels_v2")):
                 sequence = RvtSequence(labels.parent, name, size)
                 for length in (1, 3):
@@ -455,6 +476,7 @@ class Recordings(Export):
                                     np.testing.assert_allclose(rows, columns_of(of_them, size, scale), atol=1e-4)
                                     compared += len(rows)
         self.assertGreater(compared, 0)
+        self.assertEqual(made > 0, size == GEN1)
 
     def check_preprocessed(self, out, bins):
         labels_without_frame, made = 0, 0

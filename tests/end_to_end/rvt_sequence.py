@@ -121,11 +121,14 @@ def columns_of(boxes, size, scale):
 
 @contextlib.contextmanager
 def own_code(checkout):
-    """A function that makes of a sequence's folder, as RVT's own classes in a checkout have them, the samples of
-    SequenceForRandomAccess and of SequenceForIter: each its representations and boxes. What they import and do not
-    need here are stubs."""
+    """Two functions that call RVT's own code in a checkout: one makes of a sequence's folder the samples of
+    SequenceForRandomAccess and of SequenceForIter, each its representations and boxes; the other of a recording and its
+    boxes a sequence's folder, as its preprocessing does of Gen1's. What it imports and does not need here are stubs."""
     names = {"torchdata.datapipes.map": {"MapDataPipe": object}, "torchdata.datapipes.iter": {"IterDataPipe": object},
-             "omegaconf": {"DictConfig": dict}, "einops": {"rearrange": lambda columns, _: np.stack(columns, 1)},
+             "omegaconf": {"DictConfig": dict, "OmegaConf": None, "MISSING": None},
+             "numba": {"jit": lambda **_: lambda function: function},
+             "einops": {"rearrange": lambda columns, _: np.stack(columns, 1)},
+             "utils.preprocessing": {"_blosc_opts": lambda **_: {}},
              "utils.timers": {"TimerDummy": lambda timer_name: contextlib.nullcontext()},
              "utils.helpers": {"torch_uniform_sample_scalar": None},
              "data.utils.augmentor": {"RandomSpatialAugmentorGenX": None}}
@@ -152,4 +155,15 @@ def own_code(checkout):
                     [each and np.stack([each.get(name).numpy() for name in ("t", "x", "y", "w", "h", "class_id")], 1)
                      for each in labels])
 
-        yield samples
+        def preprocess(boxes, events, folder, bins):
+            genx = importlib.import_module("scripts.genx.preprocess_dataset")
+            keys, name = genx.DataKeys, f"stacked_histogram_dt=50_nbins={bins}"
+            given = {keys.InNPY: boxes, keys.InH5: events, keys.OutLabelDir: folder / "labels_v2",
+                     keys.OutEvReprDir: folder / "event_representations_v2" / name,
+                     keys.SplitType: genx.split_name_2_type[boxes.parent.name]}
+            for key in (keys.OutLabelDir, keys.OutEvReprDir):
+                given[key].mkdir(parents=True)
+            filters = types.SimpleNamespace(apply_psee_bbox_filter=True, apply_faulty_bbox_filter=True)
+            genx.process_sequence("gen1", filters, genx.StackedHistogram(bins, *GEN1, 10), None, 50, 50, False, given)
+
+        yield samples, preprocess
