@@ -92,6 +92,9 @@ class Formats(Export):
             with PIL.Image.open(self.out / "images" / f"{stem}.png") as image:
                 self.assertEqual((image.height, image.width), codes.shape[:2])
             found = np.loadtxt(self.out / "labels" / f"{stem}.txt", ndmin=2).reshape(-1, 5)
+            # What Ultralytics' verify_image_label asks for; it drops a row that comes again.
+            self.assertTrue(((found[:, 1:] >= 0) & (found[:, 1:] <= 1)).all() and (found[:, 0] < data["nc"]).all())
+            self.assertEqual(len(np.unique(found, axis=0)), len(found))
             kept = np.flatnonzero(sample["boxes"]["ignore"] == 0)
             self.assertEqual([data["names"][int(row[0])] for row in found],
                              [sample["classes"][sample["boxes"]["class_id"][i]] for i in kept])
