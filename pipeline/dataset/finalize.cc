@@ -21,13 +21,13 @@ namespace fs = std::filesystem;
 namespace {
 
 /// Looks at the shards once more, now that FOLDER/dataset.json names them: a `retry` or a `convert`
-/// beside this, which removes that of shards it changes, may have changed some before it was there.
-/// Then it goes, and std::runtime_error is thrown.
+/// beside this, which outdates that of shards it changes, may have changed some before it was
+/// there. Then this does, and throws std::runtime_error.
 void require_unchanged(const fs::path& folder, const DatasetParts& parts) {
   for (const ShardState& shard : parts.done) {
     const ShardState now = shard_state(folder, shard.outline, parts.frozen.hash);
     if (now.done() && now.record->sha256 == shard.record->sha256) continue;
-    fs::remove(folder / kDescriptionName);
+    outdate_dataset(folder, shard.outline.name);
     throw std::runtime_error(
         fmt::format("expected shards that nobody changes meanwhile, got {}, in {} (run eventgan "
                     "finalize again)",

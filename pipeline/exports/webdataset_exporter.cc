@@ -127,6 +127,14 @@ const char* dtype_of(StoredType type) {
 
 using Arrays = std::vector<std::pair<std::string, std::string>>;  ///< names and .npy files
 
+/// [channels, H, W]; of 0 channels [H, W].
+std::vector<std::size_t> sides_of(int channels, ImageSize size) {
+  std::vector<std::size_t> sides{static_cast<std::size_t>(size.height),
+                                 static_cast<std::size_t>(size.width)};
+  if (channels > 0) sides.insert(sides.begin(), static_cast<std::size_t>(channels));
+  return sides;
+}
+
 /// `volume` as the shard stores it, and its `scale`.
 Arrays volume_arrays(const OutgoingSample& sample) {
   const ShardHeader& header = sample.reader.header();
@@ -138,9 +146,7 @@ Arrays volume_arrays(const OutgoingSample& sample) {
     throw std::runtime_error("expected an intact volume, got a damaged one, in " + header.name +
                              " (" + sample.labels.sample_id + ")");
   }
-  const std::vector<std::size_t> sides{static_cast<std::size_t>(shape.channels()),
-                                       static_cast<std::size_t>(shape.size.height),
-                                       static_cast<std::size_t>(shape.size.width)};
+  const auto sides = sides_of(shape.channels(), shape.size);
   return {{"volume", npy_file(dtype_of(header.dtype), sides, *stored)},
           {"scale", npy_file("<f4", {}, std::vector<float>{sample.labels.scale})}};
 }
@@ -149,13 +155,11 @@ Arrays volume_arrays(const OutgoingSample& sample) {
 Arrays flow_arrays(const OutgoingSample& sample) {
   if (sample.labels.flow.empty()) return {};
   const ImageSize size = sample.reader.header().volume.size;
-  const std::vector<std::size_t> sides{static_cast<std::size_t>(size.height),
-                                       static_cast<std::size_t>(size.width)};
   const std::size_t values = 2 * size.pixel_count();
   const std::span row = std::span(sample.reader.tables().flow)
                             .subspan(values * static_cast<std::size_t>(sample.slot), values);
-  return {{"flow", npy_file("<f2", {2, sides[0], sides[1]}, std::as_bytes(row))},
-          {"flow_valid", npy_file("|u1", sides, sample.labels.flow.valid)}};
+  return {{"flow", npy_file("<f2", sides_of(2, size), std::as_bytes(row))},
+          {"flow_valid", npy_file("|u1", sides_of(0, size), sample.labels.flow.valid)}};
 }
 
 std::string tar_name(const ExportShard& shard) {
@@ -225,15 +229,12 @@ class WebdatasetExporter : public Exporter {
     std::vector<Event> events = events_.of(sample, gap_s);
     // A recording's times are rounded where its clock starts long before.
     for (Event& event : events) event.t_s = std::clamp(event.t_s, 0.0, gap_s);
-    std::vector<std::size_t> sides{static_cast<std::size_t>(size.height),
-                                   static_cast<std::size_t>(size.width)};
     const int channels = channels_of(*representation_);
-    if (channels > 0) sides.insert(sides.begin(), static_cast<std::size_t>(channels));
     const std::size_t bytes = number_bytes(*representation_);
     std::vector<std::byte> values(static_cast<std::size_t>(std::max(1, channels)) *
                                   size.pixel_count() * bytes);
     represent(events, *representation_, size, std::array{0.0, gap_s}, values);
-    return npy_file(bytes == 1 ? "|u1" : "<f4", sides, values);
+    return npy_file(bytes == 1 ? "|u1" : "<f4", sides_of(channels, size), values);
   }
 
   std::uint64_t seed_;
