@@ -74,6 +74,15 @@ TASKS = {
         columns={"pck": "PCK@0.2 of the torso", "pckh": "PCKh@0.5", "mpjpe": "MPJPE px"},
         methods=IN_LAYERS, steps=3000),
 }
+# what photographs' motion teaches about cars before a camera that moves
+TASKS["cars_motion"] = dataclasses.replace(
+    TASKS["cars"], steps=900,
+    methods=tuple(f"{name}{motion}" for name in ("EventGAN 8", "ESIM", "difference", "gradient")
+                  for motion in ("", ", layers", ", layers, rests 0", ", layers, rests 0.25")))
+# what is lost where the network generates only what moves
+TASKS |= {f"{name}_scope": dataclasses.replace(TASKS[name], steps=900,
+                                               methods=("EventGAN 8, layers", "EventGAN 8, layers, motion"))
+          for name in ("persons", "cars", "joints")}
 # `train_detector.py --tune`: how many labelled windows of a camera bring what, tested on its other clips
 TASKS["tuning"] = dataclasses.replace(
     TASKS["persons"], learnt={"cdehp": 48 + 60},  # the first two of four clips, as of joints
@@ -482,7 +491,7 @@ def run(args: argparse.Namespace) -> None:
     if args.task.windows:
         draw(args, [row for row in drawn if row.windows == args.task.windows[-1]])
     else:
-        draw(args, [next(row for row in drawn if row.name.startswith(name))
-                    for name in ("EventGAN 16, ", "difference, ", "grey frames, ")])
+        first = {row.name.split(",")[0]: row for row in reversed(drawn)}
+        draw(args, [first[name] for name in ("EventGAN 16", "difference", "grey frames") if name in first])
     if not args.task.methods:
         draw_curves(args, results, len(items_of(args, "EventGAN 16")))
