@@ -14,7 +14,7 @@
 namespace eventgan {
 namespace {
 
-constexpr double kSurroundings = 0.25;  // around the box, of its sides
+constexpr double kSurroundings = 0.1;  // around the box, of its sides
 constexpr int kLeastSurroundings_px = 4;
 constexpr int kLeastSide_px = 16;  // below, an ellipse is as good
 constexpr int kLeastPixels = 5;    // of object and background: GrabCut tells apart so many colours

@@ -10,7 +10,7 @@ namespace eventgan {
 
 /// How objects are cut out; other values are for those who measure (cut_out_benchmark.cc).
 struct CutOutSpec {
-  int side_px = 64;    ///< of the box's longer side in the copy that is cut; smaller ones are kept
+  int side_px = 48;    ///< of the box's longer side in the copy that is cut; smaller ones are kept
   int iterations = 1;  ///< of GrabCut
   /// Share of a square box's width that is sure to be the object; of another's in proportion to
   /// width / height, from 0.3 to 0.9.
@@ -28,7 +28,7 @@ struct CutOut {
 };
 
 /// Cuts an object out of its image by GrabCut (Rother, Kolmogorov, Blake 2004) on a reduced copy of
-/// the box and a quarter more around it. What is outside of the box is background, and an upright
+/// the box and a tenth more around it. What is outside of the box is background, and an upright
 /// ellipse in the box's middle is the object: it has 0.9 of the box's height, and the wider the box
 /// the more of its width, since what stands is thin and what lies fills its box. Of what is cut the
 /// part in the box's middle is kept, and its holes are closed.
