@@ -42,7 +42,7 @@ class Source:
     or what is made of the pairs that were converted for another."""
 
     generator: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    # a signed channel, of a sample of EventGAN 16's with the same layers
+    # a signed channel, of a sample of EventGAN 16's, with layers of that one's
     of_pair: Callable[[argparse.Namespace, Mapping[str, Any]], np.ndarray] | None = None
     normalize: str = "none"
     motion_px: float = MOTION_PX
@@ -153,10 +153,9 @@ LAYERS = {
     "EventGAN 16, layers, rests 0": Source(SHIPPED[16], layers=True, rests=0),
     "ESIM, layers, rests 0": Source({"kind": "esim"}, layers=True, rests=0),
 }
-# As `--camera moves` and `--camera both` have it.
-RESTS = {f"{name}, layers, rests {rests:g}": dataclasses.replace(METHODS[name], layers=True, rests=rests)
-         for name in ("EventGAN 8", "EventGAN 16", "ESIM", "difference", "gradient") for rests in (0, 0.25)}
-SOURCES = METHODS | SENSORS | LAYERS | RESTS | {
+SOURCES = METHODS | SENSORS | LAYERS | {
+    "EventGAN 8, layers, rests 0": Source(SHIPPED[8], layers=True, rests=0),         # as `--camera moves`
+    "EventGAN 8, layers, rests 0.25": Source(SHIPPED[8], layers=True, rests=0.25),  # as `--camera both`
     "EventGAN 16, finer": Source(SHIPPED[16], finer=2),
     "EventGAN 16, eta98": Source(SHIPPED[16], normalize="eta98"),
     "difference, eta98": Source({"kind": "difference"}, normalize="eta98"),
@@ -317,7 +316,7 @@ def items_of(args: argparse.Namespace, name: str, signed: bool = True) -> list[I
     source = SOURCES[name]
 
     def make() -> list[Item]:
-        shards = shards_of(args, name if source.generator else "EventGAN 16" + name.removeprefix(name.split(",")[0]))
+        shards = shards_of(args, name if source.generator else f"EventGAN 16{', layers' if source.layers else ''}")
         if source.of_pair:
             shards = shards.changed(functools.partial(source.of_pair, args))
         elif signed and source.finer == 1:

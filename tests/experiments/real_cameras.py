@@ -77,8 +77,8 @@ TASKS = {
 # what photographs' motion teaches about cars before a camera that moves
 TASKS["cars_motion"] = dataclasses.replace(
     TASKS["cars"], steps=900,
-    methods=tuple(f"{name}{motion}" for name in ("EventGAN 8", "ESIM", "difference", "gradient")
-                  for motion in ("", ", layers", ", layers, rests 0", ", layers, rests 0.25")))
+    methods=(*(f"EventGAN 8{motion}" for motion in ("", ", layers", ", layers, rests 0.25", ", layers, rests 0")),
+             "ESIM, layers", "ESIM, layers, rests 0"))
 # what is lost where the network generates only what moves
 TASKS |= {f"{name}_scope": dataclasses.replace(TASKS[name], steps=900,
                                                methods=("EventGAN 8, layers", "EventGAN 8, layers, motion"))
