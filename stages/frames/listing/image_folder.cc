@@ -139,10 +139,13 @@ ImageFolder list_image_folder(const fs::path& folder) {
     const std::size_t before = images.size();
     const auto image = images.try_emplace(images.end(), name.stem().string(), name.string());
     if (images.size() > before) continue;
-    const std::size_t other_rank = extension_rank(image->second);
     std::string other = name.string();
-    // "a.png" and "a.PNG" are of one rank: the one whose name comes first counts.
-    if (std::pair(rank, other) < std::pair(other_rank, image->second)) {
+    // A PNG may be the other's mask. "a.png" and "a.PNG" are of one rank: the one whose name comes
+    // first counts.
+    const auto precedence = [](const fs::path& file) {
+      return std::tuple(is_png(file), extension_rank(file), file.string());
+    };
+    if (precedence(other) < precedence(image->second)) {
       image->second.swap(other);
     }
     listed.left_out.push_back(std::move(other));

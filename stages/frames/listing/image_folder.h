@@ -41,10 +41,10 @@ struct ImageFolder {
   std::vector<std::string> left_out;
 };
 
-/// Lists `folder`, passing over hidden entries. Of two images of one name the one of the
-/// extension that comes first in kImageExtensions counts. Where the first or last PNG is a picture
-/// of `preview` or `realism`, all of these are left out. An absent folder is empty. Throws
-/// InputError if it cannot be listed.
+/// Lists `folder`, passing over hidden entries. Of two images of one name a PNG gives way, since it
+/// may be the other's mask; else the one of the extension that comes first in kImageExtensions
+/// counts. Where the first or last PNG is a picture of `preview` or `realism`, all of these are
+/// left out. An absent folder is empty. Throws InputError if it cannot be listed.
 ImageFolder list_image_folder(const std::filesystem::path& folder);
 
 /// Takes the folders that are called as those of labels (masks, instances, annotations, labels, in

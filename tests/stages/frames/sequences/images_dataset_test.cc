@@ -59,8 +59,10 @@ TEST(ImageFolder, OnePrefixAndDigitsAreNumbersAndOtherNamesAreCountedInNaturalOr
   EXPECT_EQ(listed({}), "");
 }
 
-TEST(ImageFolder, OfTwoImagesOfOneNameTheFirstExtensionCounts) {
-  EXPECT_EQ(listed({"a.jpg", "a.png", "a.bmp"}), "0 a.png");
+TEST(ImageFolder, OfTwoImagesOfOneNameTheFirstExtensionCountsAndAPngWhichMayBeAMaskGivesWay) {
+  EXPECT_EQ(listed({"a.bmp", "a.webp", "a.jpg"}), "0 a.jpg");
+  EXPECT_EQ(listed({"a.jpg", "a.png", "a.bmp"}), "0 a.jpg");
+  EXPECT_EQ(listed({"a.PNG", "a.ppm"}), "0 a.ppm");
   EXPECT_EQ(listed({"a.png", "a.PNG"}), "0 a.PNG");
 }
 
@@ -76,8 +78,8 @@ TEST(ImageFolder, FindsSidecarsAndFoldersAndPassesOverHiddenEntries) {
 TEST(ImageFolder, TellsWhatItLeavesOut) {
   const auto folder = list({"1.jpg", "1.png", "1.json", "2.webp", "2.JSON", "2.json", "3.gif",
                             "notes.txt", ".hidden", "sub/1.png"});
-  EXPECT_EQ(text_of(folder.frames), "1 1.png, 2 2.webp");
-  EXPECT_THAT(folder.left_out, ElementsAre("1.jpg", "2.json", "3.gif", "notes.txt"));
+  EXPECT_EQ(text_of(folder.frames), "1 1.jpg, 2 2.webp");
+  EXPECT_THAT(folder.left_out, ElementsAre("1.png", "2.json", "3.gif", "notes.txt"));
 }
 
 /// "NAME: NUMBER FILE, ...", and " by STEP" if a step is no number, " at TIME, ..." in seconds if
@@ -337,7 +339,7 @@ TEST_F(ImagesDatasetTest, WhatIsLeftOutIsCountedAndNamed) {
   EXPECT_THAT(ids(), ElementsAre("a/001", "a/002", "b/1"));
   EXPECT_THAT(dataset->notes(), ElementsAre("1 file left out in clip: readme.md",
                                             "1 label without an image in clip/a: 009.json",
-                                            "1 file left out in clip/a: 002.jpg",
+                                            "1 file left out in clip/a: 002.png",
                                             "2 labels without an image in clip/b: 10.json, 11.json",
                                             "1 folder left out in clip/b: deeper",
                                             "1 file left out in clip/b: 1.txt"));
