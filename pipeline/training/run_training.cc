@@ -173,7 +173,11 @@ void TrainingRun::discard() {
 void TrainingRun::resume() {
   const std::optional<TrainingCheckpoint> checkpoint =
       load_checkpoint(folder_.checkpoints(), [&](const std::string& text) { warn(text); });
-  if (!checkpoint) return;
+  if (!checkpoint) {  // a stop before the first one could not be told from another's results
+    save_checkpoint(folder_.checkpoints(),
+                    {position_, 0, settings_, environment_, trainer_.state()});
+    return;
+  }
   check_resumable(checkpoint->settings, settings_, checkpoint->position, manifest_);
   for (const auto& difference : fingerprint_differences(checkpoint->environment, environment_)) {
     warn("the last bits may differ from those of an uninterrupted training: " + difference);

@@ -19,8 +19,8 @@ using nlohmann::json;
 
 constexpr std::size_t kAlignment = 8;
 
-/// Tensors' names and one text or two: far less is needed, and JSON grows when it is parsed.
-constexpr std::uint64_t kLargestHeader = 1 << 20;
+/// JSON grows when it is parsed. A training's checkpoint has a line for each recording.
+constexpr std::uint64_t kLargestHeader = 8 << 20;
 
 [[noreturn]] void fail(const std::string& what, const std::string& name) {
   throw std::runtime_error("expected " + what + ", in " + name);
@@ -76,6 +76,11 @@ std::string serialize_safetensors(const std::map<std::string, TensorView>& tenso
     data_size = end;
   }
   std::string text = header.dump();
+  if (text.size() > kLargestHeader) {
+    throw std::runtime_error("expected a header of at most " + std::to_string(kLargestHeader) +
+                             " bytes, got " + std::to_string(text.size()) +
+                             " (texts in it, such as a manifest's, are too long)");
+  }
   text.resize((text.size() + kAlignment - 1) / kAlignment * kAlignment, ' ');
 
   const std::uint64_t length = text.size();

@@ -191,7 +191,7 @@ TEST_F(SmallTraining, RunsAllPhasesAndLeavesWeightsThatRun) {
 
 TEST_F(SmallTraining, StoppedAnywhereItEndsWithTheSameWeights) {
   train("whole");
-  for (const int steps : {1, 2, 5, 7}) {  // within each phase, and between two
+  for (const int steps : {0, 1, 2, 5, 7}) {  // before the first, within each phase, between two
     const std::string output = "stopped" + std::to_string(steps);
     const TrainingReport first = train(output, steps);
     EXPECT_FALSE(first.complete);
