@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <future>
+#include <limits>
 #include <numeric>
 #include <set>
 #include <span>
@@ -48,10 +49,13 @@ std::string steps_text(const TrainingManifest& manifest, const TrainingPosition&
 
 std::optional<ThresholdRange> trained_thresholds(const TrainingManifest& manifest) {
   if (!manifest.network.sensor) return std::nullopt;
-  const auto [low, high] = std::ranges::minmax(
-      manifest.recordings, {}, [](const auto& spec) { return spec.threshold->mean; });
-  ThresholdRange range{low.threshold->mean * manifest.augmentation.gamma[0],
-                       high.threshold->mean * manifest.augmentation.gamma[1]};
+  ThresholdRange range{std::numeric_limits<double>::max(), 0};
+  for (const auto& recording : manifest.recordings) {
+    const ContrastThreshold& threshold = *recording.threshold;
+    const auto [low, high] = std::minmax({threshold.positive(), threshold.negative()});
+    range.lowest = std::min(range.lowest, low * manifest.augmentation.gamma[0]);
+    range.highest = std::max(range.highest, high * manifest.augmentation.gamma[1]);
+  }
   if (manifest.simulated) {
     range.lowest = std::min(range.lowest, kPlaneThresholds.lowest);
     range.highest = std::max(range.highest, kPlaneThresholds.highest);

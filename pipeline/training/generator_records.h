@@ -22,8 +22,8 @@
 namespace eventgan {
 
 /// The thresholds that a network which knows its sensor is told in this training: those of the
-/// recordings, and all that simulated scenes are drawn with; with gamma each is told as the
-/// threshold of more or less contrast. None for another network.
+/// recordings, of both polarities, and the means of those that simulated scenes are drawn with;
+/// with gamma each is told as the threshold of more or less contrast. None for another network.
 std::optional<ThresholdRange> trained_thresholds(const TrainingManifest& manifest);
 
 /// The trained generator, folded, ready to run. Its metadata say where it comes from: the

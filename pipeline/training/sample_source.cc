@@ -183,6 +183,16 @@ SampleSource::SampleSource(const TrainingManifest& manifest,
     textures_ = read_textures(texture_folders(manifest));
   }
   if (manifest.teacher) teacher_ = open_teacher(manifest);
+  for (std::size_t i = 0; i < this->recordings().size(); ++i) {
+    const TrainingRecording& part = this->recordings()[i];
+    std::int64_t frame = part.first_frame;
+    while (frame < part.last_frame && reader_.event_count(i, frame) == 0) ++frame;
+    if (frame < part.last_frame) continue;
+    throw InputError(
+        "expected events between the frames to train on, got none (are events and frames on one "
+        "clock?), in " +
+        part.file.string());
+  }
 }
 
 TrainingSample SampleSource::simulated_sample(const SamplePlace& place,

@@ -74,7 +74,8 @@ std::unique_ptr<Generator> open_teacher(const TrainingManifest& manifest);
 class SampleSource {
  public:
   /// `recordings` of the manifest, opened. Reads the textures of simulated scenes, and the teacher;
-  /// throws as read_textures and open_teacher.
+  /// throws as read_textures and open_teacher, and InputError where a recording has no event
+  /// between the frames in use.
   SampleSource(const TrainingManifest& manifest, std::vector<TrainingRecording> recordings);
 
   /// With probability simulated.fraction a simulated one (simulate_planes), without augmentation;

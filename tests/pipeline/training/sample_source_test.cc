@@ -252,12 +252,15 @@ TEST(SampleSource, CropsHoldAnEventInTheShareAskedFor) {
   EXPECT_GT(places.size(), 200u);
 }
 
-TEST(SampleSource, EndsWhereNothingEverMoves) {
+TEST(SampleSource, EndsWhereHardlyAnythingMovesAndRefusesARecordingWithoutEvents) {
   const GreyImage grey{{16, 16}, std::vector<std::uint8_t>(256, 100)};
-  const SampleSource source =
-      source_of(source_manifest(), testing::FakeRecording({grey, grey}, {0, 1}, {}));
-  const TrainingSample sample = source.sample({TrainingPhase::kFlow, 0, 0});
-  EXPECT_EQ(std::accumulate(sample.volume.begin(), sample.volume.end(), 0.0f), 0);
+  const auto source_with = [&](const std::vector<Event>& events) {
+    return source_of(source_manifest(), testing::FakeRecording({grey, grey}, {0, 1}, events));
+  };
+  const TrainingSample sample = source_with({{8, 8, 0.5, true}}).sample({});
+  EXPECT_LE(std::accumulate(sample.volume.begin(), sample.volume.end(), 0.0f), 1);
+  EXPECT_THROWS(source_with({}), InputError, "expected events between the frames to train on");
+  EXPECT_THROWS(source_with({{8, 8, 1.6e9, true}}), InputError, "on one clock?");
 }
 
 /// A chequered grey image whose first pixel has this value.
