@@ -8,9 +8,11 @@
 #include <numeric>
 #include <optional>
 #include <set>
+#include <string>
 #include <utility>
 
 #include "pipeline/conversion/conversion_run.h"
+#include "pipeline/conversion/pair_volume.h"
 #include "pipeline/generators/load_generator.h"
 #include "pipeline/planning/spread.h"
 #include "pipeline/runtime/memory.h"
@@ -18,7 +20,6 @@
 #include "pipeline/tradeoff/loss.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/frames/decoding/prepared_frame.h"
-#include "stages/generator/wanted_tiles.h"
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/codec/volume_codec.h"
 
@@ -28,6 +29,11 @@ namespace {
 /// In the form in which volumes are compared.
 std::vector<float> comparable(std::vector<float> volume, bool is_counts) {
   return is_counts ? normalized(std::move(volume)) : volume;
+}
+
+/// Whether it gives events or their rates, and not values that have learnt to be normalised.
+bool gives_counts(const GeneratorSpec& spec, const Generator& generator) {
+  return !has_weights(spec.kind) || generator.thresholds();
 }
 
 /// What a chunk that was just made is read as.
@@ -44,10 +50,14 @@ std::vector<float> decoded(std::span<const std::byte> chunk, StoredType type, in
 struct Runner {
   JobManifest manifest;
   SampleStages stages;
+  bool is_counts;
 
   Runner(JobManifest job, const std::vector<std::unique_ptr<Dataset>>& datasets,
          const Generator& generator)
-      : manifest(std::move(job)), stages(manifest, datasets, generator, /*in_flight=*/1) {}
+      : manifest(std::move(job)),
+        stages(manifest, datasets, generator, /*in_flight=*/1),
+        is_counts(gives_counts(manifest.generator, generator) &&
+                  manifest.volume.normalize == Normalization::kNone) {}
   Runner(const Runner&) = delete;
   Runner& operator=(const Runner&) = delete;
 
@@ -57,10 +67,9 @@ struct Runner {
     const VolumeShape shape{manifest.volume.bins, message.shard->volume_size};
     stages.finish(message);
     if (message.failed()) return {};
-    return comparable(
-        decoded(message.chunk, manifest.output.dtype, manifest.output.deflate_level,
-                message.sample.scale, shape),
-        !has_weights(manifest.generator.kind) && manifest.volume.normalize == Normalization::kNone);
+    return comparable(decoded(message.chunk, manifest.output.dtype, manifest.output.deflate_level,
+                              message.sample.scale, shape),
+                      is_counts);
   }
 };
 
@@ -252,18 +261,15 @@ std::vector<RealismScores> real_scores(const RealPart& part, const JobManifest& 
     frames.previous = resized(frames.previous, own_shape.size);
     frames.next = resized(frames.next, own_shape.size);
     std::vector<float> generated(own_shape.value_count());
-    const std::vector<float> input = network_input(frames);
-    const ScopeSpec& scope = job.generator.scope;
-    if (scope.scope == Scope::kWhole) {
-      loaded.generator->generate({input, own_shape.size}, generated);
-    } else {  // a recording has no labels
-      loaded.generator->generate_tiles(
-          {input, own_shape.size}, wanted_tiles(scope, input, own_shape.size, 0, 0, {}), generated);
-    }
+    const PreparedPair pair{network_input(frames), own_shape.size, 0, 0, place(own_shape.size, {})};
+    const PairKey key{job.seed, part.recording.name(), std::to_string(i)};
+    // a recording has no labels
+    generate_volume(*loaded.generator, job.generator, key, pair, {}, generated);
+    add_pair_noise(job.generator, key, frames.duration_s, own_shape, generated);
     for (std::size_t k = 0; k < dtypes.size(); ++k) {
       const EncodedVolume stored = VolumeCodec(dtypes[k], 0).encode(generated);
       std::vector<float> volume = decoded(stored.chunk, dtypes[k], 0, stored.scale, own_shape);
-      if (!has_weights(job.generator.kind)) volume = normalized(std::move(volume));
+      volume = comparable(std::move(volume), gives_counts(job.generator, *loaded.generator));
       volume = on_grid(std::move(volume), shape.channels(), from, to);
       scores[k][i] =
           realism_scores(volume, real.volume, shape, real.frames.previous, real.frames.next);

@@ -134,11 +134,16 @@ Computation Comparison::choose_reference() const {
   int channels = 0;
   for (const std::string& weights : options_.axes.weights) {
     const Computation candidate{GeneratorKind::kNetwork, weights, Precision::kFloat32, 1};
-    const int base_channels = look_at(candidate).base_channels;
-    if (base_channels > channels) widest = candidate;
-    channels = std::max(channels, base_channels);
+    const Able able = look_at(candidate);
+    if (!able.reason.empty() || able.base_channels <= channels) continue;
+    widest = candidate;
+    channels = able.base_channels;
   }
-  if (channels == 0) throw UsageError("--widths: expected weights to compare with, got none");
+  if (channels == 0) {
+    throw UsageError(
+        "--widths: expected weights to compare with that the manifest's settings fit, "
+        "got none");
+  }
   return widest;
 }
 
