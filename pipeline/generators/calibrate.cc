@@ -223,8 +223,8 @@ fs::path given(const std::string& out) {
 fs::path calibrated_file(const JobManifest& manifest, int base_channels,
                          const std::optional<std::string>& out) {
   if (out) return given(*out);
-  const std::string width = std::to_string(base_channels);
   const WeightsName name = parse_weights_name(manifest.generator.weights).value();
+  const std::string width = name.width == kSensorWeights ? "sensor" : std::to_string(base_channels);
   if (name.origin != WeightsOrigin::kFile) {
     const bool is_shipped = name.origin == WeightsOrigin::kShipped;
     return manifest.directory /

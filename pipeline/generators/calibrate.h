@@ -69,8 +69,8 @@ CalibrationOutcome calibrate(const JobManifest& manifest, const PlannedJob& job,
 
 /// Where calibrated weights go: `out` if it is given; else beside the manifest
 /// "FILE-calibrated.safetensors", for the program's own weights
-/// "eventgan-WIDTH-calibrated.safetensors", for random ones
-/// "untrained-WIDTH-calibrated.safetensors". `base_channels` is the weights' WIDTH.
+/// "eventgan-WIDTH-calibrated.safetensors" or "eventgan-sensor-calibrated.safetensors", for random
+/// ones "untrained-WIDTH-calibrated.safetensors". `base_channels` is the weights' WIDTH.
 ///
 /// Throws UsageError if `out` is not named *.safetensors or its folder is not there, or if the
 /// default is the very file that is calibrated: only who names it overwrites it.

@@ -119,6 +119,7 @@ class CalibratedFile : public ::testing::Test {
 TEST_F(CalibratedFile, StandsBesideTheManifestAndIsNamedInIt) {
   EXPECT_EQ(file("shipped"), folder_ / "eventgan-16-calibrated.safetensors");
   EXPECT_EQ(file("shipped:16"), folder_ / "eventgan-16-calibrated.safetensors");
+  EXPECT_EQ(file("shipped:sensor"), folder_ / "eventgan-sensor-calibrated.safetensors");
   EXPECT_EQ(file("untrained:16"), folder_ / "untrained-16-calibrated.safetensors");
   EXPECT_EQ(file("a.b.safetensors"), folder_ / "a.b-calibrated.safetensors");
   EXPECT_EQ(file("/elsewhere/w.safetensors"), folder_ / "w-calibrated.safetensors");
