@@ -235,6 +235,13 @@ std::string several_recordings(std::span<const RealismReport> reports) {
 
 /// The methods from the nearest to the camera on, and what follows from it.
 std::string verdict_text(std::span<const RealismReport> reports) {
+  const auto has_events = [](const RealismReport& report) {
+    return std::ranges::any_of(
+        report.intervals, [](const IntervalSummary& interval) { return interval.event_count > 0; });
+  };
+  if (std::ranges::none_of(reports, has_events)) {
+    return "No event between the frames to compare with: are events and frames on one clock?\n";
+  }
   const RealismReport mean = mean_report(reports);
   std::vector<const MethodSummary*> ranked;
   for (const MethodSummary& method : mean.methods) {
@@ -246,6 +253,7 @@ std::string verdict_text(std::span<const RealismReport> reports) {
   const bool has_esim = std::ranges::find(ranked, "esim", &MethodSummary::name) != ranked.end();
   const auto best = std::ranges::find_if(
       ranked, [](const MethodSummary* method) { return method->name != "esim"; });
+  if (!((*best)->mean.f1_time > 0)) return {};
   return fmt::format(
       "By F1 summed over time: {}. For your own videos and sequences take \"{}\" as "
       "generator.kind.{}\n",

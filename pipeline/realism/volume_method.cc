@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "manifests/files/sha256.h"
@@ -42,8 +43,14 @@ CounterRandom draw_random(const std::string& method, const FrameInterval& interv
 }
 
 std::string threshold_text(const ContrastThreshold& threshold, bool fitted, double log_epsilon) {
+  constexpr double kNear = 1.001;
+  const bool is_at_end = threshold.mean < kNear * kLeastFittedThreshold ||
+                         threshold.mean * kNear > kMostFittedThreshold;
+  const std::string_view how = !fitted     ? ""
+                               : is_at_end ? " (none of 0.01..5 makes as many events)"
+                                           : " (fitted)";
   const std::string text = fmt::format("contrast threshold {:.4g}{} of ln(u/255 + {:.4g})",
-                                       threshold.mean, fitted ? " (fitted)" : "", log_epsilon);
+                                       threshold.mean, how, log_epsilon);
   if (threshold.ratio == 1) return text;
   return text + fmt::format(", negative ÷ positive {:.3g}", threshold.ratio);
 }

@@ -217,6 +217,12 @@ TEST(RealismText, EndsWithWhatToTake) {
   EXPECT_THAT(text_of(report), HasSubstr("esim 0.750, network 0.500"));
   EXPECT_THAT(text_of(report),
               HasSubstr("take \"network\" as generator.kind. esim is for photographs"));
+  report.intervals[0].event_count = 0;
+  EXPECT_THAT(text_of(report), AllOf(HasSubstr("are events and frames on one clock?"),
+                                     Not(HasSubstr("generator.kind"))));
+  report = two_methods();
+  for (MethodSummary& method : report.methods) method.mean.f1_time = 0;
+  EXPECT_THAT(text_of(report), Not(HasSubstr("generator.kind")));
 }
 
 TEST(RealismText, SaysWhatWasComparedAndHowSureItIs) {
