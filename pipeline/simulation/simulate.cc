@@ -134,45 +134,59 @@ void require_raw_size(ImageSize frame, const std::string& path) {
 }
 
 /// Opens every source's clip and leaves out the recordings that are there, or with `overwrite`
-/// makes sure that they are of this clip. Stills with a fault are left out and added to `faults`.
+/// makes sure that they are of this clip. Labels that are missing beside a still's recording are
+/// written. Clips and stills with a fault are left out and added to `faults`.
 std::vector<SourceWork> plan_work(const SimulationManifest& manifest, const fs::path& folder,
                                   bool overwrite, std::vector<std::string>& kept,
                                   std::vector<std::string>& faults) {
   const bool any_size = manifest.file == SimulatedFile::kRaw && !manifest.size;
   std::vector<SourceWork> works;
-  for (const SimulationSource& source : manifest.sources) {
-    const auto is_to_do = [&](const PlannedRecording& recording) {
-      const auto found = settings_on_disk(recording.file);
-      if (found && overwrite) check_same_clip(recording.file, *found, recording.settings);
-      if (!found || overwrite) return true;
-      check_same_settings(recording.file, *found, recording.settings);
-      kept.push_back(recording.name);
-      return false;
-    };
-    if (source.method.motion == SimulationMethod::kStills) {
-      const auto stills = std::make_shared<const StillScenes>(source, manifest);
-      for (PlannedRecording& recording :
-           plan_recordings(manifest, source, *stills, folder, faults)) {
-        if (!is_to_do(recording)) continue;
-        const std::int64_t position = recording.image.value();
-        if (any_size) require_raw_size(stills->frame_size(position), stills->still(position));
-        try {
-          check_labels(recording, *stills, overwrite);
-        } catch (const InputError& error) {
-          faults.push_back(fmt::format("{} ({})", error.what(), stills->still(position)));
-          continue;
-        }
-        works.push_back({&source, nullptr, stills, {}, {}});
-        works.back().to_do.push_back(std::move(recording));
+  const auto is_to_do = [&](const PlannedRecording& recording) {
+    const auto found = settings_on_disk(recording.file);
+    if (found && overwrite) check_same_clip(recording.file, *found, recording.settings);
+    if (!found || overwrite) return true;
+    check_same_settings(recording.file, *found, recording.settings);
+    kept.push_back(recording.name);
+    return false;
+  };
+  const auto plan_stills = [&](const SimulationSource& source) {
+    const auto stills = std::make_shared<const StillScenes>(source, manifest);
+    for (PlannedRecording& recording : plan_recordings(manifest, source, *stills, folder, faults)) {
+      const std::int64_t position = recording.image.value();
+      const bool to_do = is_to_do(recording);
+      if (to_do && any_size) {
+        require_raw_size(stills->frame_size(position), stills->still(position));
       }
-      continue;
+      const fs::path labels = labels_beside(recording.file);
+      try {
+        if (to_do) {
+          check_labels(recording, *stills, overwrite);
+        } else if (!fs::exists(labels)) {  // somebody has removed them
+          write_file_atomically(labels, stills->labels(position));
+        }
+      } catch (const InputError& error) {
+        faults.push_back(fmt::format("{} ({})", error.what(), stills->still(position)));
+        continue;
+      }
+      if (!to_do) continue;
+      works.push_back({&source, nullptr, stills, {}, {}});
+      works.back().to_do.push_back(std::move(recording));
     }
+  };
+  const auto plan_clip = [&](const SimulationSource& source) {
     SourceWork work{&source, std::make_unique<ClipFrames>(source, manifest), nullptr, {}, {}};
     for (PlannedRecording& recording : plan_recordings(manifest, source, *work.clip, folder)) {
       if (is_to_do(recording)) work.to_do.push_back(std::move(recording));
     }
     if (any_size && !work.to_do.empty()) require_raw_size(work.clip->frame(0).size, source.path);
     works.push_back(std::move(work));
+  };
+  for (const SimulationSource& source : manifest.sources) {
+    try {
+      source.method.motion == SimulationMethod::kStills ? plan_stills(source) : plan_clip(source);
+    } catch (const InputError& error) {  // the others are made
+      faults.push_back(error.what());
+    }
   }
   return works;
 }

@@ -263,6 +263,12 @@ TEST_F(Simulate, ABrokenFrameLeavesNoHalfRecording) {
   EXPECT_TRUE(files("out").empty());
 }
 
+TEST_F(Simulate, AClipThatIsNotThereLeavesTheOthersToBeMade) {
+  EXPECT_THROWS(run("out", 1, false, R"({"path": "absent"}, {"path": "clip"})"), InputError,
+                "absent");
+  EXPECT_TRUE(files("out").contains("clip.hdf5"));
+}
+
 TEST_F(Simulate, CleansUpAfterAKilledRun) {
   const pid_t child = fork();
   if (child == 0) _exit(0);

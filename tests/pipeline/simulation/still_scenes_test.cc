@@ -286,6 +286,14 @@ TEST_F(StillScenesTest, OtherLabelsAreReplacedIfThatIsAskedForOnly) {
   EXPECT_NE(files("out").at("s-000.json"), first.at("s-000.json"));
 }
 
+TEST_F(StillScenesTest, LabelsThatAreGoneAreWrittenAgain) {
+  run("out");
+  const auto before = files("out");
+  std::filesystem::remove(folder_ / "out/s-000.json");
+  EXPECT_EQ(run("out").kept.size(), 2u);
+  EXPECT_EQ(files("out"), before);
+}
+
 TEST_F(StillScenesTest, WhatCannotBeMadeAgainIsKeptWithItsLabels) {
   run("out");
   const auto before = files("out");
