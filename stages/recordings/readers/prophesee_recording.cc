@@ -163,13 +163,22 @@ PropheseeHeader read_prophesee_header(std::string_view text, const std::string& 
 
 /// Takes a new value of a counter of so many bits. A fall of half its range or more is a wrap, as
 /// where words were lost around one; a smaller one is a step back, and so is a rise of three
-/// quarters or more, of a late word behind a wrap: less may be a time without events.
+/// quarters or more, of a late word behind a wrap: less may be a time without events. A value
+/// between two that follow each other is damaged, and no wrap.
 void count_on(WordState& state, std::uint32_t value, int bits) {
   const std::uint64_t half = std::uint64_t{1} << (bits - 1);
-  if (state.counter && *state.counter >= value + half) {
-    ++state.wraps;
-  } else if (state.wraps > 0 && value >= *state.counter + half + half / 2) {
-    --state.wraps;
+  const std::uint64_t before = state.counter.value_or(value);
+  const bool falls = before >= value + half, rises = value >= before + half;
+  const bool goes_on =
+      state.before_jump && value >= *state.before_jump && value - *state.before_jump < half / 32;
+  state.before_jump.reset();
+  if (goes_on) {
+    state.wraps = state.wraps_before_jump;
+  } else if (falls || rises) {
+    state.before_jump = state.counter;
+    state.wraps_before_jump = state.wraps;
+    if (falls) ++state.wraps;
+    if (state.wraps > 0 && value >= before + half + half / 2) --state.wraps;
   }
   state.counter = value;
 }
@@ -348,8 +357,8 @@ class PropheseeEvents final : public EventParts {
     EventIndexes* const indexes = EventIndexes::current();
     std::string key = std::move(index_key);
     if (!key.empty()) {
-      key += fmt::format(" {} {} {} {}", to_string(size), static_cast<int>(encoding), first_byte,
-                         shifts);
+      key += fmt::format(" {} {} {} {} {}", to_string(size), static_cast<int>(encoding), first_byte,
+                         shifts, sizeof(DecodingStart));
     }
     if (indexes != nullptr && !key.empty() && restore(indexes->find(key).value_or(""))) return;
     DecodingStart start{first_byte, {}};

@@ -19,12 +19,14 @@ struct WordCounts {
 
 /// What a word's meaning depends on: all that the words before it have said.
 struct WordState {
-  std::optional<std::uint32_t> counter;  ///< the upper part of the time as stored, or all of it
-  std::int64_t wraps = 0;                ///< of the counter
-  std::int64_t shift_us = 0;             ///< taken off all times
-  std::uint32_t low_us = 0;              ///< EVT 3.0: the lower part
-  std::optional<int> y;                  ///< EVT 3.0
-  std::optional<int> vector_x;           ///< EVT 3.0: of the next vector's first pixel
+  std::optional<std::uint32_t> counter;      ///< the upper part of the time as stored, or all of it
+  std::int64_t wraps = 0;                    ///< of the counter
+  std::optional<std::uint32_t> before_jump;  ///< the counter, if it then moved by half its range
+  std::int64_t wraps_before_jump = 0;
+  std::int64_t shift_us = 0;    ///< taken off all times
+  std::uint32_t low_us = 0;     ///< EVT 3.0: the lower part
+  std::optional<int> y;         ///< EVT 3.0
+  std::optional<int> vector_x;  ///< EVT 3.0: of the next vector's first pixel
   bool vector_on = false;
   bool is_second_camera = false;
   std::int64_t last_us = 0;  ///< of the last event that was not lifted

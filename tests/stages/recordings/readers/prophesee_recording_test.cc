@@ -277,6 +277,29 @@ TEST_F(PropheseeTest, GoesOnWhereEvt3Wraps) {
                  "expected times that never decrease");
 }
 
+// As a wrap it would move all that follows away from the labels: windows of nothing.
+TEST_F(PropheseeTest, OneDamagedTimeIsNoWrapAndIsSaid) {
+  const auto expect_last_at = [&](const std::string& bytes, double last_s) {
+    const auto recording = open(bytes);
+    EXPECT_THROWS(recording->events_in(last_s - 1e-6, last_s), InputError,
+                  "expected times that never decrease, got ");
+    EXPECT_THAT(recording->notes(), ElementsAre(HasSubstr("before an earlier one")));
+  };
+  for (const std::uint32_t damaged : {0xff000005u, 0x80000005u}) {
+    expect_last_at(kDatHeader + words<std::uint64_t>({dat(5, 1, 1, 1), dat(damaged, 1, 1, 1),
+                                                      dat(6, 1, 1, 1), dat(2000, 1, 1, 1)}),
+                   0.002);
+    expect_last_at(kDatHeader + words<std::uint64_t>({dat(damaged, 1, 1, 1), dat(5, 1, 1, 1),
+                                                      dat(damaged + 1, 1, 1, 1),
+                                                      dat(damaged + 2000, 1, 1, 1)}),
+                   (damaged + 2000.0) / 1e6);
+  }
+  expect_last_at(
+      kEvt2Header + words<std::uint32_t>({evt2_high(7), evt2(0, 1, 1, 1), evt2_high(0xf000007),
+                                          evt2(0, 1, 1, 1), evt2_high(8), evt2(0, 1, 1, 1)}),
+      512e-6);
+}
+
 // What comes after it has its own times, not those of the next range.
 TEST_F(PropheseeTest, StepsBackOverAWrap) {
   const auto expect_last_at = [&](const std::string& bytes, double wrap_s, double last_s) {
