@@ -174,16 +174,21 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   Outcome<Annotation> read = read_annotation(dataset, planned.label_key);
   const std::string of_source = source_key(manifest_.sources, source);
   const PairKey key{manifest_.seed, to_string(kind), planned.sample_id, of_source};
-  const auto planned_motion = pair.motion;
-  std::vector<Box> boxes;
-  if (!is_fault(read)) {
+  const FramePair unsettled = pair;
+  const auto settle = [&](FramePair settled, const std::vector<Box>& boxes) {
     const bool is_sized = stored.source_size.width > 0;
-    boxes = read->boxes;
     settle_motion(manifest_.sources[source].pairs, key, boxes,
-                  is_sized ? std::optional(stored.source_size) : std::nullopt, pair);
-  }
-  // Labels that could not be read when a sample was quarantined decided nothing.
-  if (stored.pair.motion != pair.motion && (stored.valid || stored.pair.motion != planned_motion)) {
+                  is_sized ? std::optional(stored.source_size) : std::nullopt, settled);
+    return settled;
+  };
+  std::vector<Box> boxes;
+  if (!is_fault(read)) pair = settle(unsettled, boxes = read->boxes);
+  // Labels that could not be read when a sample was quarantined decided nothing, or were none.
+  const auto is_of_quarantined = [&](const std::optional<ImageMotion>& motion) {
+    return motion == unsettled.motion || motion == settle(unsettled, {}).motion;
+  };
+  if (stored.pair.motion != pair.motion &&
+      (stored.valid || !is_of_quarantined(stored.pair.motion))) {
     return {"expected the motion of the plan, got another"};
   }
   if (!stored.valid) {

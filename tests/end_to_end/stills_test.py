@@ -232,6 +232,15 @@ class Stills(program.InFolder):
         run("retry", self.folder / "out", "--manifest", path, "--progress", "none")
         run("verify", "--deep", self.folder / "out")
 
+    def test_a_broken_image_that_was_to_rest_is_no_fault_of_the_folder(self):
+        names = [path.name for path in self.photos("voc100", 2).iterdir()]
+        (self.folder / "photos" / names[0]).write_bytes(b"")
+        (self.folder / "boxes.csv").write_text("image,class,left,top,right,bottom\n"
+                                               + "".join(f"{name},dog,9,9,99,99\n" for name in names))
+        self.convert(manifest([{"dataset": "frames", "root": "photos", "labels": {"path": "boxes.csv", "format": "csv"},
+                                "pairs": stills(rests=1, objects={"translation_px": [4, 8]})}], errors=LENIENT))
+        self.assertEqual(len(quarantined(self.folder / "out")), 1)
+
     def test_other_commands_know_them(self):
         self.photos("voc100", 3)
         job = manifest([{"dataset": "frames", "root": "photos", "pairs": stills()}],
