@@ -27,6 +27,15 @@ const std::map<std::string, ProgressStyle> kProgressStyles = {{"auto", ProgressS
 
 }  // namespace
 
+CLI::Validator finite_range(double least, double most) {
+  const auto check = [=](const std::string& text) -> std::string {
+    double number = 0;
+    const bool is_in = CLI::detail::lexical_cast(text, number) && number >= least && number <= most;
+    return is_in ? "" : fmt::format("Value {} not in range [{:g} - {:g}]", text, least, most);
+  };
+  return {check, fmt::format("FLOAT in [{:g} - {:g}]", least, most)};
+}
+
 void add_folder_argument(CLI::App& command, std::filesystem::path& folder) {
   command.add_option("DIR", folder, "Output folder of convert")->required();
 }
@@ -53,7 +62,7 @@ void add_grace_option(CLI::App& command, double& grace_s) {
   command
       .add_option("--grace", grace_s,
                   "Seconds to finish the current shard after a signal; default: 20")
-      ->check(CLI::Range(0.0, 1e9))
+      ->check(finite_range(0, 1e9))
       ->option_text("SECONDS");
 }
 

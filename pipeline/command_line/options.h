@@ -12,12 +12,16 @@
 
 namespace CLI {
 class App;
-}
+class Validator;
+}  // namespace CLI
 
 namespace eventgan {
 
 // Options that several commands have, each declared once. What takes a value must outlive the
 // parsing.
+
+/// Numbers from `least` to `most`: of NaN, CLI::Range says nothing.
+CLI::Validator finite_range(double least, double most);
 
 /// DIR, a folder that convert has written.
 void add_folder_argument(CLI::App& command, std::filesystem::path& folder);

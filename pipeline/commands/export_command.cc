@@ -122,7 +122,7 @@ void add_export_command(CLI::App& app, int& exit_code) {
                   "own (default: drop), COCO as crowds (default: keep)"),
               kIgnored);
   add("--full-scale", options.full_scale, "volume value that becomes 255; default: 1")
-      ->check(CLI::Range(1e-6, 1e6))
+      ->check(finite_range(1e-6, 1e6))
       ->option_text("VALUE");
   take_one_of(
       add("--images", options.as_images,
@@ -143,7 +143,7 @@ void add_export_command(CLI::App& app, int& exit_code) {
       ->option_text("WORD");
   add("--frames-per-second", options.frames_per_second,
       "frames a second of images whose times are not known; default: 1")
-      ->check(CLI::Range(1e-3, 1e6))
+      ->check(finite_range(1e-3, 1e6))
       ->option_text("NUMBER");
   add("--frames", options.frames,
       "the manifest's folder, which frame paths are relative to; default: as recorded by convert")

@@ -127,11 +127,11 @@ void add_methods(CLI::App& command, RealismArguments& arguments) {
       .add_option("--log-epsilon", options.log_epsilon,
                   "Epsilon in the log intensity of difference and esim, ln(u/255 + epsilon), "
                   "1e-6..1; default: 0.02")
-      ->check(CLI::Range(1e-6, 1.0));
+      ->check(finite_range(1e-6, 1));
   command
       .add_option("--esim-displacement", options.esim_displacement_px,
                   "Largest displacement of esim's random motions, in pixels per frame; default: 5")
-      ->check(CLI::Range(0.1, 100.0));
+      ->check(finite_range(0.1, 100));
   command
       .add_option("--esim-draws", options.esim_draws,
                   "Number of random motions per pair; default: 5")

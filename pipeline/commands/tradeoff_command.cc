@@ -128,6 +128,9 @@ int run(TradeoffArguments& arguments) {
   const std::filesystem::path out = arguments.out
                                         ? std::filesystem::path(*arguments.out)
                                         : manifest.directory / (manifest.name + "-tradeoff");
+  if (std::filesystem::exists(out / "plan.json")) {
+    throw UsageError("--out: expected a folder of its own, got that of shards, " + out.string());
+  }
   require_replaceable(out / "tradeoff.json", OwnFile::kTradeoffReport);
   require_replaceable(out / "tradeoff.md", OwnFile::kTradeoffTable);
   require_replaceable(out / "tradeoff.svg", OwnFile::kChart);
@@ -174,7 +177,7 @@ void add_axes(CLI::App& command, TradeoffArguments& arguments) {
       .add_option("--sizes", arguments.sizes,
                   "Scale factors of the volume's sides, 0.05..4, 1 as in the manifest; default: 1")
       ->delimiter(',')
-      ->check(CLI::Range(0.05, 4.0))
+      ->check(finite_range(0.05, 4))
       ->option_text("SIZE,...");
   command
       .add_option("--scopes", arguments.scopes,
@@ -229,13 +232,13 @@ void add_tradeoff_command(CLI::App& app, int& exit_code) {
       ->add_option("--at-most-error", arguments->demand.at_most_error,
                    "Also print the manifest lines of the fastest configuration with at most this "
                    "error (relative L2)")
-      ->check(CLI::NonNegativeNumber)
+      ->check(finite_range(0, 1e9))
       ->option_text("ERROR");
   command
       ->add_option("--at-least-speed", arguments->demand.at_least_speed,
                    "Also print the manifest lines of the most accurate configuration with at least "
                    "this many pairs per second")
-      ->check(CLI::NonNegativeNumber)
+      ->check(finite_range(0, 1e9))
       ->option_text("SPEED");
   command
       ->add_option(

@@ -234,6 +234,7 @@ class CommandLine(program.InFolder):
         run("convert", "a.json", "--threads", "0", expect=64)
         run("convert", "a.json", "--progress", "loud", expect=64)
         run("convert", "a.json", "--grace", "-1", expect=64)
+        run("convert", "a.json", "--grace", "nan", expect=64)
         for command in ["status", "retry", "finalize", "verify"]:
             run(command, expect=64)
         run("make-demo", self.folder / "demo")
