@@ -190,12 +190,13 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
   const fs::path folder = fs::absolute(file).parent_path();
   ManifestDraft draft = draft_manifest(sources, {folder, /*is_relative=*/false, "."}, wishes.draft);
   if (!draft.has_samples) {
+    const char* const wanted = draft.needs_sensor
+                                   ? "--sensor WIDTHxHEIGHT, which the files do not give"
+                               : has_events(found.dataset) ? "a recording with windows of events"
+                                                           : "labelled frames that make pairs";
     throw InputError(fmt::format(
-        "expected {}, got none, in {} ({}; {}eventgan init writes a manifest to complete)",
-        has_events(found.dataset) ? "a recording that makes samples as it is"
-                                  : "labelled frames that make pairs",
-        found.root.string(), fmt::join(draft.findings, "; "),
-        has_events(found.dataset) ? "--sensor WIDTHxHEIGHT gives its size, and " : ""));
+        "expected {}, got none, in {} ({}; eventgan init writes a manifest to complete)", wanted,
+        found.root.string(), fmt::join(draft.findings, "; ")));
   }
   job.manifest = parse_job_manifest(draft.text, folder, file.string());
   job.findings = std::move(draft.findings);

@@ -163,7 +163,7 @@ class Draft {
     }
     return fmt::format(
         R"(  // Detectors and pose networks learn as much from the narrow weights{} as from the wide ones in
-  // float32, "shipped:16", which take four times as long (manifests/guides/choose.md).
+  // float32, "shipped:16", which take several times as long (manifests/guides/choose.md).
   // Weights of your own: {{ "weights": "my.safetensors" }}.
 {}  "generator": {{ "weights": "shipped:8", "precision": "{}"{} }},
   // Weights that know their sensor make the events of a camera, of one that ships or of your own, which
@@ -429,6 +429,7 @@ ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const Draf
     }
     if (sources.size() > 1) source.findings.insert(source.findings.begin(), found.root.string());
     made.has_samples &= source.has_samples;
+    made.needs_sensor |= source.needs_sensor;
     std::ranges::copy(source.findings, std::back_inserter(made.findings));
     std::ranges::move(source.notes, std::back_inserter(made.notes));
     drafts.push_back(std::move(source));

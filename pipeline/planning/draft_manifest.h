@@ -17,6 +17,7 @@ struct ManifestDraft {
   std::vector<std::string> findings;
   std::vector<std::string> notes;  ///< Dataset::notes()
   bool has_samples = false;        ///< each source has labelled frames that make pairs, or windows
+  bool needs_sensor = false;       ///< a recording's files do not give the sensor's size
 };
 
 /// Whether the camera moves before which photographs of labelled objects are to be seen

@@ -40,9 +40,12 @@ std::string error_line(const std::exception& error) {
   std::istringstream lines(error_text(error));
   std::string text;
   for (std::string line; std::getline(lines, line);) {
+    constexpr std::string_view kBecause = "because: ";
     const std::size_t start = line.find_first_not_of(' ');
     if (start == std::string::npos) continue;
-    text += (text.empty() ? "" : ": ") + line.substr(start);
+    line.erase(0, start);
+    if (line.starts_with(kBecause)) line.erase(0, kBecause.size());
+    text += (text.empty() ? "" : text.ends_with(':') ? " " : ": ") + line;
   }
   return text;
 }

@@ -64,27 +64,27 @@ ProgressText TrainingProgress::describe(std::chrono::steady_clock::time_point no
 namespace {
 
 Report table_of(const TrainingReport& report) {
-  return {
-      {"event", "report"},
-      {"folder", report.folder,
-       (report.complete ? "complete: " : "stopped, run again to resume: ") + report.folder},
-      {"complete", report.complete},
-      {"phase", to_string(report.position.phase),
-       fmt::format("  next step   {} {}", to_string(report.position.phase), report.position.step)},
-      {"next_step", report.position.step},
-      fmt::format("  this run    {} steps in {:.0f} s, {:.0f} s with earlier runs",
-                  report.steps_made, report.run_seconds, report.total_seconds),
-      {"steps_made", report.steps_made},
-      {"run_seconds", report.run_seconds},
-      {"total_seconds", report.total_seconds},
-      {"losses", report.losses,
-       joined(report.losses, "",
-              [](const auto& loss) {
-                return fmt::format("  {} {:.6g} (mean of the last steps)\n", loss.first,
-                                   loss.second);
-              })},
-      {"weights", report.weights, "  weights     " + report.weights},
-      {"weights_sha256", report.weights_sha256, "  SHA-256     " + report.weights_sha256}};
+  return {{"event", "report"},
+          {"folder", report.folder,
+           (report.complete ? "complete: " : "stopped, run again to resume: ") + report.folder},
+          {"complete", report.complete},
+          {"phase", to_string(report.position.phase),
+           fmt::format("  {}  {} {}", report.complete ? "steps done" : "next step ",
+                       to_string(report.position.phase), report.position.step)},
+          {"next_step", report.position.step},
+          fmt::format("  this run    {} steps in {:.0f} s, {:.0f} s with earlier runs",
+                      report.steps_made, report.run_seconds, report.total_seconds),
+          {"steps_made", report.steps_made},
+          {"run_seconds", report.run_seconds},
+          {"total_seconds", report.total_seconds},
+          {"losses", report.losses,
+           joined(report.losses, "",
+                  [](const auto& loss) {
+                    return fmt::format("  {} {:.6g} (mean of the last steps)\n", loss.first,
+                                       loss.second);
+                  })},
+          {"weights", report.weights, "  weights     " + report.weights},
+          {"weights_sha256", report.weights_sha256, "  SHA-256     " + report.weights_sha256}};
 }
 
 }  // namespace

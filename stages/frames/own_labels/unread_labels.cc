@@ -43,6 +43,17 @@ bool may_have_images(const std::string& folder) {
   return starts_with_any(folder, {"image", "img", "jpegimages"});
 }
 
+/// A manifest of a job, a training or a simulation, which may name the images.
+bool is_manifest(std::string_view text) {
+  const std::size_t key = text.find("\"format\"");
+  return key != text.npos &&
+         std::ranges::any_of(
+             std::array{"manifest", "training", "simulation"}, [&](const char* kind) {
+               return text.substr(key, 64).find(std::string("\"eventgan-") + kind + '"') !=
+                      text.npos;
+             });
+}
+
 /// Columns that say nothing of what an image shows.
 bool is_of_files(std::string_view header) {
   static const std::set<std::string> kFileColumns{
@@ -164,7 +175,7 @@ class UnreadFinder {
   }
 
   void look_at(const LabelFile& file, const std::string& extension) {
-    if (has_own_mark(file.text)) return;
+    if (has_own_mark(file.text) || is_manifest(file.text)) return;
     const UnreadFormat* format = has_labels_ ? nullptr : unread_format_of(file, extension);
     if (format) {
       const std::string title(format->title);

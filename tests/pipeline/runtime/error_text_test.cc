@@ -29,7 +29,7 @@ TEST(ErrorText, TellsTheWholeChain) {
 TEST(ErrorLine, IsOneLineHoweverDeepTheCause) {
   EXPECT_EQ(error_line(std::runtime_error("cannot read x")), "cannot read x");
   EXPECT_EQ(error_line(std::runtime_error("two faults:\n  first\n  second\n")),
-            "two faults:: first: second");
+            "two faults: first: second");
   try {
     try {
       throw std::runtime_error("no such file");
@@ -37,7 +37,7 @@ TEST(ErrorLine, IsOneLineHoweverDeepTheCause) {
       std::throw_with_nested(std::runtime_error("cannot read x"));
     }
   } catch (const std::runtime_error& error) {
-    EXPECT_EQ(error_line(error), "cannot read x: because: no such file");
+    EXPECT_EQ(error_line(error), "cannot read x: no such file");
   }
 }
 

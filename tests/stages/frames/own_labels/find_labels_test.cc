@@ -247,6 +247,9 @@ TEST_F(FindLabels, WhatNamesTheImagesAndIsNoLabelStopsNothing) {
       {"IMG_0001.json", R"({"mine": [1, 2, 3, 4]})"},
       {"out/plan.json",
        R"({"format": "eventgan-plan", "samples": [{"id": "IMG_0001", "n": [1, 2, 3, 4]}]})"},
+      {"manifest.json",
+       "{\n  \"format\": \"eventgan-manifest\",  // by init\n \"root\": \"IMG_0001.jpg\", \"n\": "
+       "[1, 2, 3]}"},
       {"other.json", R"({"of": "IMG_0003.jpg", "at": [1, 2, 3, 4]})"}};
   for (const auto& [file, text] : files) write("quiet/" + file, text);
   write("quiet/IMG_0001.jpg");
