@@ -49,7 +49,10 @@ std::string labels_text(const ConversionReport& report) {
   std::vector<std::string> parts;
   if (!report.boxes.empty()) {
     parts.push_back("boxes: " + joined(report.boxes, ", ", [](const auto& of_class) {
-                      return grouped(of_class.second) + " " + escape_controls(of_class.first);
+                      const auto& [name, count] = of_class;
+                      const bool is_number = name.find_first_not_of("0123456789") == name.npos;
+                      return grouped(count) + (is_number ? " of class " : " ") +
+                             escape_controls(name);
                     }));
   }
   if (report.persons > 0) {

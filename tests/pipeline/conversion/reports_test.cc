@@ -41,6 +41,9 @@ TEST(ReportText, SaysWhatWasWrittenLostAndSpent) {
 TEST(ReportText, SaysBoxesByClass) {
   ConversionReport some = report();
   EXPECT_THAT(to_text(some), HasSubstr("\nNO LABELS: no boxes and no persons with joints\n"));
+  some.boxes = {{"0", 9}};
+  EXPECT_THAT(to_text(some), HasSubstr("\nboxes: 9 of class 0\n"));
+  some.boxes.clear();
   some.persons = 12;
   EXPECT_THAT(to_text(some), HasSubstr("\n12 persons with joints\n"));
   some.boxes = {{"car", 1204}, {"person", 33}, {"tree", 1'234'567}};
