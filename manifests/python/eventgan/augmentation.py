@@ -147,7 +147,8 @@ class EventAugmentation:
         strength = volume.abs().sum(0)
         there = strength[strength > 0]
         strongest = float(np.percentile(there.numpy(), 98)) if len(there) else 0.0
-        volume = volume * ((strength >= threshold * strongest) & (torch.rand(strength.shape) >= lost))
+        kept = (strength >= threshold * strongest) & (torch.rand(strength.shape) >= lost)
+        volume = (volume * kept).contiguous()
         count = round(isolated * strength.numel())
         at = torch.randint(max(volume.numel(), 1), (count,))
         signs = 2 * torch.randint(2, (count,)) - 1 if len(volume) == 1 else 1

@@ -150,6 +150,16 @@ def test_another_sensor_s_lost_and_isolated_events():
     assert everything.sensor(torch.zeros(2, 0, 8)).shape == (2, 0, 8)
 
 
+def test_another_sensor_of_a_volume_whatever_its_layout():
+    # whole numbers, whose sums are exact in any order
+    volume = torch.randint(4, (6, 8, 4)).float()
+    sensor = EventAugmentation(threshold=(0.3, 0.3), isolated=(0.2, 0.2)).sensor
+    torch.manual_seed(1)
+    expected = sensor(volume)
+    torch.manual_seed(1)
+    assert torch.equal(sensor(volume.permute(1, 2, 0).contiguous().permute(2, 0, 1)), expected)
+
+
 def test_a_sensor_that_is_left_alone_draws_nothing():
     """What is drawn without these settings is what was drawn before there were any."""
     volume, state = torch.rand(2, 4, 4), torch.get_rng_state()
