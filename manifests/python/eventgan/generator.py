@@ -356,7 +356,7 @@ def represent(events: Any, representation: str, *, size: tuple[int, int],
     Parameters
     ----------
     events : structured array, or dictionary of arrays, in time order
-        x and y in pixels; p (also pol, polarity), positive if above 0; t (also ts, timestamp), seconds if
+        x and y in whole pixels; p (also pol, polarity), positive if above 0; t (also ts, timestamp), seconds if
         floating-point, microseconds if whole.
     representation : str
         "histogram:10". Of these, where B, T, K are whole numbers and TAU is in seconds:
@@ -376,20 +376,20 @@ def represent(events: Any, representation: str, *, size: tuple[int, int],
     Raises
     ------
     ValueError
-        Not events in time order within the image, or another representation.
+        Not events in time order at whole pixels of the image, or another representation.
     """
     height, width = (_whole(side, "a side of size") for side in sides(size))
     columns = [_event_column(events, names) for names in
                (("t", "ts", "timestamp"), ("x",), ("y",), ("p", "pol", "polarity"))]
     times = columns[0]
+    if not (times[1:] >= times[:-1]).all():
+        raise ValueError("expected events in time order, got another order, or times that are NaN")
     unit = 1.0 if times.dtype.kind == "f" else 1e-6
     if window_s is not None:
         ends_s = _numbers(window_s, "window_s")
         if ends_s.shape != (2,):
             raise ValueError(f"expected a window of two times, got {window_s!r} for window_s")
         begin, end = ends_s.tolist()
-        if not (times[1:] >= times[:-1]).all():
-            raise ValueError("expected events in time order, got another order, or times that are NaN")
         # Whole microseconds are not exact in seconds: what rounding lost must not cost the events at t1 and at tN.
         lost = 0 if unit == 1 else 2 * np.spacing(np.abs(ends_s))
         first, last = (ends_s + np.array([-1, 1]) * lost) / unit
@@ -398,13 +398,18 @@ def represent(events: Any, representation: str, *, size: tuple[int, int],
     rows = np.zeros(len(columns[0]), _engine.EVENT)
     # A clock of the day in microseconds has more digits than seconds in float64, so times count from the first one.
     first = columns[0][0] if len(rows) else 0
-    rows["t"] = (columns[0] - first) * unit
+    times = columns[0] if unit == 1 else columns[0].astype(np.uint64)  # whole ones of any type differ exactly in this
+    rows["t"] = (times - times[:1]) * unit
     ends = None
     if window_s is not None:
         low, high = float(begin - first * unit), float(end - first * unit)
         ends, rows["t"] = (ctypes.c_double * 2)(low, high), rows["t"].clip(low, high)  # what rounding put outside
     for name, column in zip("xy", columns[1:]):
-        rows[name] = column
+        with np.errstate(invalid="ignore"):
+            rows[name] = column
+        wrong = column[rows[name] != column]
+        if len(wrong):
+            raise ValueError(f"expected whole pixels inside {width}x{height}, got {wrong[0]} for {name}")
     rows["p"] = columns[3] > 0
     channels, number = ctypes.c_int32(), ctypes.c_int32()
 

@@ -66,6 +66,10 @@ def real_events(count, seed=1, clock_us=1_600_000_000_000_000):
     return events
 
 
+def columns_of(events):
+    return {name: events[name] for name in "txyp"}
+
+
 def histogram_of(events, bins, shape):
     """RVT's, github.com/uzh-rpg/RVT, data/utils/representations.py."""
     histogram, t = np.zeros((2, bins, *shape), int), events["t"] - events["t"][0]
@@ -114,6 +118,16 @@ def test_columns_may_have_any_type(names):
 
 
 @needs_library
+@pytest.mark.parametrize("times", [np.array([2**63 - 3, 2**63 + 5, 2**64 - 1], "u8"), np.array([-100, -92, 100], "i1"),
+                                   np.array([-2**63, 0, 2**63 - 1])])
+def test_whole_times_may_lie_as_far_apart_as_their_type_allows(times):
+    events = {"t": times, "x": [0, 0, 0], "y": [0, 0, 0], "p": [1, 1, 1]}
+    share = float((int(times[1]) - int(times[0])) / (int(times[2]) - int(times[0])))
+    found = represent(events, "voxel:2", size=(1, 1))  # an event's share of a bin falls with its distance in time
+    np.testing.assert_allclose(found.ravel(), [1 + 1 - share, 1 + share], rtol=1e-6)
+
+
+@needs_library
 def test_no_events_are_zeros():
     empty = real_events(0)
     for word, shape in [("volume:9", (18, 30, 40)), ("time_surface:0.1", (2, 30, 40)), ("eros:8", (30, 40))]:
@@ -126,7 +140,13 @@ def test_no_events_are_zeros():
     (lambda events: events[::-1], "expected events in time order"),
     (lambda events: {name: events[name] for name in "xyp"}, "expected events with t or ts or timestamp, got x, y, p"),
     (lambda events: [1, 2], "expected events with t or ts or timestamp, got list"),
-    (lambda events: {name: events[name].astype("S9") for name in "txyp"}, "expected numbers"),
+    (lambda events: {name: column.astype("S9") for name, column in columns_of(events).items()}, "expected numbers"),
+    (lambda events: {**columns_of(events), "t": np.arange(9, 0, -1, "u4")}, "expected events in time order"),
+    (lambda events: {**columns_of(events), "t": np.array([*range(8), np.nan])}, "expected events in time order"),
+    (lambda events: {**columns_of(events), "x": events["x"] + 0.5}, r"expected whole pixels .* got \d+\.5 for x"),
+    (lambda events: {**columns_of(events), "y": np.full(9, np.nan)}, "expected whole pixels .* got nan for y"),
+    (lambda events: {**columns_of(events), "y": np.full(9, 2**32)},
+     "expected whole pixels inside 40x30, got 4294967296 for"),
 ])
 def test_what_is_none_is_refused(change, message):
     with pytest.raises(ValueError, match=message):
