@@ -352,7 +352,8 @@ def evaluate_flows(predictions: PathLike, samples: Samples) -> tuple[dict[str, A
     Raises
     ------
     ValueError
-        No sample has flow, a sample has no prediction, or one that is not [2, H, W] and finite where it is scored.
+        No sample has flow, two of those that have it share an id, or a sample has no prediction, or one that is not
+        [2, H, W] and finite where it is scored.
     """
     shards = samples.shards
     try:
@@ -360,8 +361,15 @@ def evaluate_flows(predictions: PathLike, samples: Samples) -> tuple[dict[str, A
         names = set(found.files)
     except (AttributeError, ValueError, zipfile.BadZipFile) as error:
         raise ValueError(f"expected an .npz of arrays, got another file, in {predictions}") from error
-    labelled = {name: i for i, name in enumerate(shards.column("sample_id").tolist())
-                if "flow" in shards.sample(i, {"flow"}) and shards.sample(i, {"flow"})["flow_valid"].any()}
+    labelled: dict[str, int] = {}
+    for i, name in enumerate(shards.column("sample_id").tolist()):
+        sample = shards.sample(i, {"flow"})
+        if "flow" not in sample or not sample["flow_valid"].any():
+            continue
+        if name in labelled:
+            raise ValueError(f"expected samples with ids of their own, got {_brief(name)}, which two samples have, in "
+                             f"{predictions}")
+        labelled[name] = i
     if not labelled:
         raise ValueError('expected samples with flow ("flow": true in their source), got none')
     missing = sorted(labelled.keys() - names)

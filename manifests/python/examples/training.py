@@ -504,7 +504,7 @@ def box_predictions(item: dict, found: tuple[torch.Tensor, torch.Tensor, torch.T
 
 def write_predictions(args: argparse.Namespace, shards: Shards, entries: Iterable, what: str = "detections") -> None:
     """predictions.json of the samples, ids.txt, which names these, and the line that scores them. `entries`: objects;
-    of "flows" the samples' ids with flow [2, H, W], for predictions.npz."""
+    of "flows" the samples' ids, which no two may share, with flow [2, H, W], for predictions.npz."""
     def write(path: pathlib.Path) -> None:
         with torch.no_grad(), open(path, "wb") as file:
             if what == "flows":
@@ -513,7 +513,12 @@ def write_predictions(args: argparse.Namespace, shards: Shards, entries: Iterabl
                 file.write((json.dumps(list(entries)) + "\n").encode())
 
     name = "predictions.npz" if what == "flows" else "predictions.json"
-    ids = "".join(f"{each}\n" for each in shards.column("sample_id"))
+    names = shards.column("sample_id").tolist()
+    if what == "flows" and len(set(names)) < len(names):
+        twice = next(each for each in names if names.count(each) > 1)
+        sys.exit(f"expected samples with ids of their own, got {twice!r}, which two samples have, in "
+                 f"{args.test or args.data}")
+    ids = "".join(f"{each}\n" for each in names)
     replace(pathlib.Path(args.out, name), write)
     replace(pathlib.Path(args.out, "ids.txt"), lambda path: path.write_text(ids, encoding="utf-8"))
     place = pathlib.Path(eventgan.__file__).parents[1]

@@ -747,6 +747,12 @@ def test_flows_of_a_folder(folder, tmp_path):
         evaluate_flows(tmp_path / "found.npz", Samples(folder, None, None, None))
 
 
+def test_flows_of_ids_that_two_have_are_refused(two_shards, tmp_path):
+    np.savez(tmp_path / "found.npz", **{"000004": np.zeros((2, 6, 8))})
+    with pytest.raises(ValueError, match='ids of their own, got "000004", which two samples have, in .*found.npz'):
+        evaluate_flows(tmp_path / "found.npz", Samples(two_shards, None, None, None))
+
+
 def test_the_command_prints_tables_json_and_images(folder, tmp_path):
     found = write(tmp_path / "found.json",
                   [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000000", "Car", [-1e30, 0, 2e30, 1], 0.1)])

@@ -409,6 +409,16 @@ def test_volumes_are_changed_as_they_are_read(folder, tmp_path, monkeypatch):
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
+def test_flows_of_ids_that_two_have_are_not_written(two_shards, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import training
+
+    args = argparse.Namespace(out=str(tmp_path), data=str(two_shards), test=None, dataset=None, overfit=False)
+    with pytest.raises(SystemExit, match=f"ids of their own, got '000000', which two samples have, in {two_shards}"):
+        training.write_predictions(args, Shards(two_shards), (), "flows")
+    assert not (tmp_path / "predictions.npz").exists()
+
+
 def test_minutes_are_those_of_the_steps(tmp_path, monkeypatch):
     """A step takes 10 seconds, a check 1000: 6 steps are a minute, however long the checks and wherever it is broken
     off."""
