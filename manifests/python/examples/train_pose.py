@@ -90,7 +90,7 @@ def main() -> None:
                                                                                        list(size), args.layers)
     config.MODEL.EXTRA.NUM_DECONV_FILTERS = [args.filters] * 3
     model = get_pose_net(config, is_train=False)
-    model = exchange_first_convolution(model, 18)
+    model = exchange_first_convolution(model, len(validation_set[0][0]))
     training.load_fitting(model, args.pretrained)
     model = model.to(args.device).to(memory_format=torch.channels_last)
     for layer in model.deconv_layers if args.device == "cpu" else ():

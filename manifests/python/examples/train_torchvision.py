@@ -52,14 +52,14 @@ def near_joints(found: torch.Tensor, item: dict) -> np.ndarray:
     return np.concatenate([*near, np.empty(0, bool)])
 
 
-def network(classes: int, joints: int, size: tuple[int, int], regions: int) -> torch.nn.Module:
-    """The detector, of persons' joints if there are any, for inputs of 18 channels that are of this size already and
-    are not normalised. A volume holds tens of objects, not hundreds as an image of COCO: fewer regions are looked
+def network(classes: int, joints: int, channels: int, size: tuple[int, int], regions: int) -> torch.nn.Module:
+    """The detector, of persons' joints if there are any, for inputs of so many channels that are of this size already
+    and are not normalised. A volume holds tens of objects, not hundreds as an image of COCO: fewer regions are looked
     at."""
     settings = {"weights": None, "weights_backbone": None, "min_size": min(size), "max_size": max(size),
-                "image_mean": [0.0] * 18,
-                "image_std": [1.0] * 18, "box_batch_size_per_image": regions, "rpn_post_nms_top_n_train": 4 * regions,
-                "rpn_post_nms_top_n_test": 2 * regions, "box_detections_per_img": regions // 2}
+                "image_mean": [0.0] * channels, "image_std": [1.0] * channels, "box_batch_size_per_image": regions,
+                "rpn_post_nms_top_n_train": 4 * regions, "rpn_post_nms_top_n_test": 2 * regions,
+                "box_detections_per_img": regions // 2}
     if joints:
         return torchvision.models.detection.keypointrcnn_resnet50_fpn(num_classes=2, num_keypoints=joints, **settings)
     return torchvision.models.detection.fasterrcnn_mobilenet_v3_large_fpn(num_classes=classes + 1, **settings)
@@ -98,8 +98,9 @@ def train(args: argparse.Namespace, train_set: Dataset, validation_set: Dataset,
     that the network finds in it."""
     joints, classes = len(getattr(train_set, "joint_names", ())), list(train_set.classes)
     print(f"input {size[1]}x{size[0]}, classes " + ", ".join(classes))
-    model = network(len(classes), joints, size, args.regions)
-    model = exchange_first_convolution(model, 18)
+    channels = len(validation_set[0]["volume"])
+    model = network(len(classes), joints, channels, size, args.regions)
+    model = exchange_first_convolution(model, channels)
     training.load_fitting(model, args.pretrained)
     model = model.to(args.device)
 

@@ -50,10 +50,12 @@ def anchors_of(shards: Shards, classes: list[str], view: np.ndarray, count: int)
     return np.exp(means[np.argsort(means.sum(1))])
 
 
-def adapted(cfg: str, classes: int, anchors: np.ndarray) -> str:
-    """The cfg's text with the numbers that go with a dataset: classes, filters of the layers before [yolo], anchors."""
+def adapted(cfg: str, channels: int, classes: int, anchors: np.ndarray) -> str:
+    """The cfg's text with the numbers that go with a dataset: channels, classes, filters of the layers before [yolo],
+    anchors."""
     pairs = ",  ".join(f"{width:.1f},{height:.1f}" for width, height in anchors)
-    for pattern, text in ((r"(?m)^channels *=.*", "channels=18"), (r"(?m)^classes *=.*", f"classes={classes}"),
+    for pattern, text in ((r"(?m)^channels *=.*", f"channels={channels}"),
+                          (r"(?m)^classes *=.*", f"classes={classes}"),
                           (r"(?m)^anchors *=.*", f"anchors = {pairs}"),
                           (r"filters *= *\d+(\s+activation *= *linear\s+\[yolo\])", rf"filters={3 * (classes + 5)}\1"),
                           # yolov3-tiny's own leaves its smallest anchor out
@@ -89,15 +91,16 @@ def main() -> None:
     cfg = path.read_text()
     anchors = anchors_of(train_shards, classes, view, int(re.search(r"(?m)^num *= *(\d+)", cfg)[1]))
     own = pathlib.Path(args.out, "model.cfg")
-    own.write_text(adapted(cfg, len(classes), anchors))
+    channels = len(validation_set[0]["volume"])
+    own.write_text(adapted(cfg, channels, len(classes), anchors))
     # its first biases are set in place, which fails where gradients are kept: then boxes are everywhere
     with torch.no_grad():
         model = Darknet(str(own), (height, width))
-    model = exchange_first_convolution(model, 18)
+    model = exchange_first_convolution(model, channels)
     training.load_fitting(model, args.pretrained)
     model = model.to(args.device).to(memory_format=torch.channels_last)
     # it makes its grids only if it does not begin with training
-    model.eval()(torch.zeros(1, 18, height, width, device=args.device))
+    model.eval()(torch.zeros(1, channels, height, width, device=args.device))
     model.nc, model.hyp = len(classes), {**hyp, "cls": hyp["cls"] * len(classes) / 80,
                                          "obj": hyp["obj"] * max(height, width) / 320}
 

@@ -50,6 +50,16 @@ def need_trainer(name, *modules):
     return TRAINERS / name
 
 
+@pytest.fixture(scope="module")
+def few_bins(data, tmp_path_factory):
+    """The demo's cars and poses as volumes of 5 bins, half as large."""
+    job = json.loads(re.sub("(?m)^ *//.*", "", (data.parent / "manifest.json").read_text()))
+    sources = [{**source, "root": str(data.parent / source["root"])} for source in job["sources"]
+               if source["dataset"] != "human36m"]
+    return convert(tmp_path_factory.mktemp("few"), **{**job, "name": "bins", "sources": sources, "volume": {"bins": 5},
+                                                      "generator": {"kind": "esim"}, "output": {"directory": "bins"}})
+
+
 def scores(said):
     """Those of the line that an example has printed to score what it found."""
     (line,) = re.findall("^to score what was found in .*: (.* -m eventgan.evaluate .*)$", said, re.MULTILINE)
@@ -80,8 +90,8 @@ def test_faster_rcnn_learns_and_goes_on(data, tmp_path):
     assert "expected --lr 0.0002, as when this run started, got 0.5, in" in said
 
 
-def test_keypoint_rcnn_learns(data, tmp_path):
-    train("train_torchvision", data, tmp_path / "out", "--task", "keypoints", "--dataset", "mpii", "--steps", "1",
+def test_keypoint_rcnn_learns(few_bins, tmp_path):
+    train("train_torchvision", few_bins, tmp_path / "out", "--task", "keypoints", "--dataset", "mpii", "--steps", "1",
           "--batch", "1", "--scale", "0.5", "--regions", "8", "--every", "9")
     assert_trained(tmp_path / "out", [0, 1], images=1)
     assert {"AP50 person", "PCK@0.2"} <= history(tmp_path / "out")[0].keys()
@@ -140,23 +150,23 @@ def test_pose_resnet_learns_persons_without_head_boxes(tmp_path, monkeypatch):
     assert f"got one, in {one} (--overfit validates on the training samples)" in said
 
 
-def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
+def test_pose_resnet_killed_and_begun_again_learns_the_same(few_bins, tmp_path):
     # nothing beside it
     trainer = shutil.copytree(need_trainer("pose_resnet", "easydict", "yaml"), tmp_path / "trainer")
     options = ["--trainer", trainer, "--dataset", "mpii", "--batch", "3", "--size", "64", "--filters", "16",
                "--epochs", "2"]
-    train("train_pose", data, tmp_path / "whole", *options)
+    train("train_pose", few_bins, tmp_path / "whole", *options)
     assert_trained(tmp_path / "whole", [0, 2, 4], images=1)
-    with subprocess.Popen([sys.executable, *line("train_pose", data, tmp_path / "killed", *options)],
+    with subprocess.Popen([sys.executable, *line("train_pose", few_bins, tmp_path / "killed", *options)],
                           stdout=subprocess.DEVNULL, env=ONE_THREAD) as process:
         while not (tmp_path / "killed" / "checkpoint.pt").exists() and process.poll() is None:
             time.sleep(0.01)
         process.kill()
-    said = train("train_pose", data, tmp_path / "killed", *options)
+    said = train("train_pose", few_bins, tmp_path / "killed", *options)
     assert "resuming after epoch" in said
     assert scores(said)["joints"]["all"]["pckh_mpii"] == history(tmp_path / "killed")[-1]["PCKh@0.5"]
     weights = torch.load(tmp_path / "whole" / "weights.pt")
-    train("train_pose", data, tmp_path / "tuned", *options, "--pretrained", tmp_path / "whole" / "weights.pt",
+    train("train_pose", few_bins, tmp_path / "tuned", *options, "--pretrained", tmp_path / "whole" / "weights.pt",
           "--last-layer")
     tuned = torch.load(tmp_path / "tuned" / "weights.pt")
     assert {name.split(".")[0] for name in weights if not torch.equal(weights[name], tuned[name])} == {"final_layer"}
@@ -293,17 +303,17 @@ def test_flow_is_true_of_its_crop_and_moves_the_frames(monkeypatch):
         assert after < 1e-5 and before > 0.1
 
 
-def test_yolov3_learns(data, tmp_path):
+def test_yolov3_learns(few_bins, tmp_path):
     trainer = shutil.copytree(need_trainer("yolov3", "matplotlib", "tqdm"), tmp_path / "trainer")  # nothing beside it
-    said = train("train_yolov3", data, tmp_path / "out", "--trainer", trainer, "--dataset", "kitti_object", "--steps",
-                 "2", "--batch", "2", "--scale", "1", "--every", "9", "--classes", "Car,Van", "--test", data)
+    options = ["--trainer", trainer, "--dataset", "kitti_object"]
+    said = train("train_yolov3", few_bins, tmp_path / "out", *options, "--steps", "2", "--batch", "2", "--scale", "1",
+                 "--every", "9", "--classes", "Car,Van", "--test", few_bins)
     counts = scores(said)["counts"]
     assert counts["samples"] == 12 and counts["not_of_these_samples"] == 0
     assert_trained(tmp_path / "out", [0, 2], images=2)
-    assert "channels=18" in (tmp_path / "out" / "model.cfg").read_text()
-    said = train("train_yolov3", data, tmp_path / "bus", "--trainer", trainer, "--dataset", "kitti_object", "--classes",
-                 "Bus", expect=1)
-    assert "got Bus" in said and str(data) in said
+    assert "channels=10" in (tmp_path / "out" / "model.cfg").read_text()
+    said = train("train_yolov3", few_bins, tmp_path / "bus", *options, "--classes", "Bus", expect=1)
+    assert "got Bus" in said and str(few_bins) in said
 
 
 def test_faster_rcnn_learns_on_the_fly(tmp_path):
