@@ -28,7 +28,12 @@ def read_args() -> argparse.Namespace:
     parser.add_argument("--scale", type=float, default=1.5, help="input pixels per volume pixel")
     parser.add_argument("--regions", type=int, default=64,
                         help="region proposals per volume that the heads are trained on; more cost more time")
-    return training.begin(parser)
+    args = training.begin(parser)
+    of_predictions = [name for name in ("test", "as_bright", "without_noise") if getattr(args, name)]
+    if args.task == "keypoints" and of_predictions:
+        raise SystemExit(f"expected --{of_predictions[0].replace('_', '-')} with --task detection only: keypoints have "
+                         "no predictions.json")
+    return args
 
 
 def usable(task: str):

@@ -467,7 +467,7 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
     replace(out / "weights.pt", lambda path: torch.save(model.state_dict(), path))
     replace(out / "metrics.json", lambda path: path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8"))
     print(f"{metric} {last} after {summary['minutes']} minutes, untrained {untrained}; {out}: weights.pt, "
-          "metrics.json, images/, predictions.json")
+          "metrics.json, images/")
 
 
 def replace(path: pathlib.Path, write: Callable[[pathlib.Path], Any]) -> None:

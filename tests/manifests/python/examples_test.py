@@ -336,7 +336,7 @@ def test_faster_rcnn_learns_on_the_fly(tmp_path):
     said = train("train_on_the_fly", tmp_path, tmp_path / "out", *options)
     assert "8 images for training, 2 for validation, of 1 folders" in said and "input 96x64, classes car" in said
     assert_trained(tmp_path / "out", [0, 2], images=1)
-    assert "AP50 car" in history(tmp_path / "out")[1]
+    assert "AP50 car" in history(tmp_path / "out")[1] and "predictions" not in said
     said = train("train_on_the_fly", tmp_path, tmp_path / "out", *options, "--classes", "bus", expect=1)
     assert "expected images with boxes of bus, got 8 for training and 2 for validation, with car, in" in said
 
@@ -476,6 +476,10 @@ def test_what_cannot_be_trained_with_is_named(data, tmp_path):
     said = train("train_torchvision", data, tmp_path / "out", "--task", "keypoints", "--dataset", "kitti_object",
                  expect=1)
     assert f"got 0 and 0, in {data} (--dataset kitti_object; it has samples of " in said
+    for option in ("--as-bright", "--without-noise", f"--test={data}"):
+        said = train("train_torchvision", data, tmp_path / "out", "--task", "keypoints", option, expect=1)
+        assert said == (f"expected {option.split('=')[0]} with --task detection only: keypoints have no "
+                        "predictions.json\n")
     for limit in ("--epochs", "--steps", "--minutes", "--every"):
         said = train("train_torchvision", data, tmp_path / "out", limit, "0", expect=1)
         assert f"expected {limit} " in said and "got 0" in said
