@@ -247,7 +247,7 @@ class Init(program.InFolder):
         self.assertIn("PATH: expected a value, got nothing", self.init("", expect=64))
         write_cars(self.folder / "k", 1, np.random.default_rng(7))
         self.assertIn("PATH: expected a value, got nothing", self.init(self.folder / "k", "", expect=64))
-        self.assertIn("DATASET or PATH: expected one of kitti_object, ", self.init("kitti", empty, expect=64))
+        self.assertIn("DATASET or PATH: expected a dataset (kitti_object, ", self.init("kitti", empty, expect=64))
         self.assertIn("manifests/examples has a manifest", self.init("dhp19", empty, expect=64))
         self.assertIn("expected mpii, got kitti_object, in ", self.init("mpii", self.folder / "k", expect=66))
         shutil.rmtree(self.folder / "k" / "image_2")
