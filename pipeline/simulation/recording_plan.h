@@ -17,7 +17,7 @@ namespace eventgan {
 /// came from, and tells whether an existing one is what a job would make. What the manifest says of
 /// other recordings is left out, so that they may change.
 ///
-/// `image`: kAffine, the number of the image within its clip; none for a whole clip. `still`:
+/// `image`: if the method moves_one_frame, the frame's number within its clip; else none. `still`:
 /// kStills, its name; else empty.
 std::string recording_settings(const SimulationManifest& manifest, const SimulationSource& source,
                                const std::string& recording, const std::string& files_hash,
@@ -37,13 +37,13 @@ struct PlannedRecording {
   std::string name;  ///< and random key; the file is NAME with the ending of its format
   std::filesystem::path file;
   std::string settings;  ///< recording_settings()
-  /// kAffine: position of its image among the clip's frames; kStills: of its clip.
+  /// If the method moves_one_frame: position of the frame among the clip's; kStills: of its clip.
   std::optional<std::int64_t> image;
   std::int64_t frame_count = 0;
 };
 
-/// One for a clip, NAME; with kAffine one for each image, NAME-000, NAME-001 and so on: nothing
-/// moves from one image to another, so no pair of frames may reach across.
+/// One for a clip, NAME; if the method moves_one_frame, one for each image, NAME-000 and so on:
+/// nothing moves from one image to another, so no pair of frames may reach across.
 std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest,
                                               const SimulationSource& source,
                                               const ClipFrames& clip,

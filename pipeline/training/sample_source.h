@@ -80,7 +80,7 @@ class SampleSource {
 
   /// With probability simulated.fraction a simulated one (simulate_planes), without augmentation;
   /// else the sample drawn by draw_sample. As in the published code a pair whose first interval has
-  /// fewer than 100 events in the whole image is drawn again (at most 10 times, from the same
+  /// fewer than 100 events in the whole image is drawn again (at most 9 times, from the same
   /// recording): η98 would blow its noise up to full scale. With the teacher's rates in the phase
   /// of the generator. Throws InputError naming the recording if it cannot be read.
   TrainingSample sample(const SamplePlace& place) const;
