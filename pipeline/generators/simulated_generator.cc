@@ -54,7 +54,7 @@ std::string content_key(const GreyImage& previous, const GreyImage& next) {
 constexpr int kMostImages = 64;
 
 /// The events of the frames between, from one to the next of which no point moves more than 1 px.
-std::vector<Event> between_events(const SimulatedPair& pair) {
+std::vector<Event> between_events(const SimulatorInput& pair) {
   const FramesBetween& between = *pair.between;
   constexpr double kRoundingPx = 1e-9;
   const int steps = std::max(1, static_cast<int>(std::ceil(between.displacement_px - kRoundingPx)));
@@ -81,13 +81,13 @@ std::vector<Event> between_events(const SimulatedPair& pair) {
   return events;
 }
 
-std::vector<Event> esim_events(const SimulatedPair& pair) {
+std::vector<Event> esim_events(const SimulatorInput& pair) {
   if (pair.between != nullptr) return between_events(pair);
   return simulate_affine(pair.previous, pair.max_displacement_px, pair.sensor, pair.duration_s,
                          pair.random, EventOrder::kPixel);
 }
 
-std::vector<Event> difference_events(const SimulatedPair& pair) {
+std::vector<Event> difference_events(const SimulatorInput& pair) {
   return simulate_difference(pair.previous, pair.next, pair.sensor, pair.duration_s, pair.random,
                              EventOrder::kPixel);
 }

@@ -14,7 +14,7 @@
 namespace eventgan {
 
 /// Two frames and what their events depend on beside them.
-struct SimulatedPair {
+struct SimulatorInput {
   const GreyImage& previous;
   const GreyImage& next;
   double duration_s;
@@ -29,7 +29,7 @@ struct SimulatedPair {
 struct Simulator {
   GeneratorKind kind;
   /// Pixel by pixel (EventOrder::kPixel). Thread safe.
-  std::vector<Event> (*events)(const SimulatedPair&);
+  std::vector<Event> (*events)(const SimulatorInput&);
   /// What a sensor sees from one frame of a clip to the next; null if it moves_one_frame.
   std::unique_ptr<Interval> (*between)(GreyImage previous, GreyImage next) = nullptr;
 };

@@ -159,12 +159,12 @@ bool is_nan(double number) { return std::isnan(number); }
 
 /// The first number that the column's rule does not allow.
 std::optional<double> wrong_number(const ColumnSpec& spec, Row row) {
-  if (spec.numbers == Numbers::kAny || row.empty()) return std::nullopt;
-  const bool is_each = spec.numbers == Numbers::kFiniteOrNoneEach;
+  if (spec.numbers == SoundNumbers::kAny || row.empty()) return std::nullopt;
+  const bool is_each = spec.numbers == SoundNumbers::kFiniteOrNoneEach;
   const std::size_t size = is_each ? spec.inner.back() : row.size();
   for (; !row.empty(); row = row.subspan(size)) {
     const Row part = row.first(size);
-    if (spec.numbers != Numbers::kFinite && std::ranges::all_of(part, is_nan)) continue;
+    if (spec.numbers != SoundNumbers::kFinite && std::ranges::all_of(part, is_nan)) continue;
     for (const double number : part) {
       if (!std::isfinite(number)) return number;
     }

@@ -98,7 +98,7 @@ double generated_fraction(const ShardSample& sample);
 enum class Rows { kSamples, kOffsets, kBoxes, kPersons };
 
 /// Which numbers a sound column of floats has.
-enum class Numbers {
+enum class SoundNumbers {
   kAny,  ///< a rule of its own (sample_check.cc), or none
   kFinite,
   kFiniteOrNone,     ///< or a row of NaN
@@ -115,7 +115,7 @@ struct ColumnSpec {
   const char* meaning;  ///< Markdown for the table of manifests/guides/shard_format.md
   Rows rows;
   std::vector<std::size_t> inner = {};
-  Numbers numbers = Numbers::kAny;
+  SoundNumbers numbers = SoundNumbers::kAny;
   struct {
     Mapped how = Mapped::kNot;
     const char* source = "";  ///< name of the column of the same group that it is made of
@@ -167,7 +167,7 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   const auto height = static_cast<std::size_t>(header.volume.size.height);
   const auto width = static_cast<std::size_t>(header.volume.size.width);
   using enum Rows;
-  using enum Numbers;
+  using enum SoundNumbers;
   using enum Mapped;
 
   auto& e = tables.events;
