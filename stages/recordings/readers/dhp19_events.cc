@@ -70,17 +70,6 @@ struct Dhp19Events::File {
   std::vector<Camera> cameras;
   double start_us = 0;
 
-  /// Runs `read` under the lock; "expected readable values, got damage" if HDF5 fails.
-  template <class Read>
-  auto read_locked(Read read) const {
-    const Hdf5Lock lock;
-    try {
-      return read();
-    } catch (const Hdf5Error&) {
-      std::throw_with_nested(InputError("expected readable values, got damage, in " + name));
-    }
-  }
-
   const Camera& camera(int number) const { return cameras.at(static_cast<std::size_t>(number)); }
 
   double time_us(int number, std::int64_t event) const {
@@ -93,7 +82,7 @@ struct Dhp19Events::File {
 
 Dhp19Events::Dhp19Events(const std::filesystem::path& path)
     : file_(std::make_unique<File>(File{path.string(), {}, {}, 0})) {
-  file_->read_locked([&] {
+  read_hdf5(file_->name, [&] {
     file_->hdf5 = open_hdf5_file(path);
     bool any = false;
     for (int i = 0; i < kDhp19Cameras; ++i) {
@@ -112,14 +101,14 @@ Dhp19Events::Dhp19Events(Dhp19Events&&) noexcept = default;
 std::int64_t Dhp19Events::count(int camera) const { return file_->camera(camera).time_us.count(); }
 
 double Dhp19Events::time_s(int camera, std::int64_t event) const {
-  return file_->read_locked(
-      [&] { return (file_->time_us(camera, event) - file_->start_us) * kSeconds; });
+  return read_hdf5(file_->name,
+                   [&] { return (file_->time_us(camera, event) - file_->start_us) * kSeconds; });
 }
 
 std::vector<Event> Dhp19Events::events(int camera, std::int64_t first, std::int64_t count) const {
   const File::Camera& columns = file_->camera(camera);
   std::vector<double> times_us, x, y, polarity;
-  file_->read_locked([&] {
+  read_hdf5(file_->name, [&] {
     times_us = columns.time_us.read(first, count);
     x = columns.x.read(first, count);
     y = columns.y.read(first, count);
