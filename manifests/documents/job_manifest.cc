@@ -285,8 +285,7 @@ Preset default_preset(const std::vector<SourceSpec>& sources, Fields& image) {
                                       first.preset, other.word, other.preset));
     break;
   }
-  const auto preset = std::ranges::find(kPresetWords, first.preset, &Word<Preset>::word);
-  return preset == kPresetWords.end() ? Preset() : preset->value;
+  return value_of_word(kPresetWords, first.preset).value_or(Preset());
 }
 
 /// "kitti for kitti_object, kitti_raw; mpii for ..."

@@ -31,6 +31,16 @@ std::string_view word_of(const std::array<Word<T>, N>& words, T value) {
   throw std::invalid_argument("expected a value of the enumeration, got another number");
 }
 
+/// The value that `word` stands for; none if it is no word of the table.
+template <class T, std::size_t N>
+constexpr std::optional<T> value_of_word(const std::array<Word<T>, N>& words,
+                                         std::string_view word) {
+  for (const Word<T>& entry : words) {
+    if (entry.word == word) return entry.value;
+  }
+  return std::nullopt;
+}
+
 /// The words of a table whose rows have `word` and `value`, in its order.
 template <class Row, std::size_t N>
 constexpr auto words_of(const std::array<Row, N>& rows) {
@@ -141,6 +151,7 @@ inline constexpr std::array kTrainingPrecisionWords{
     Word<TrainingPrecision>{"float32", TrainingPrecision::kFloat32},
     Word<TrainingPrecision>{"bfloat16", TrainingPrecision::kBfloat16}};
 
+/// The phases in their order.
 inline constexpr std::array kPhaseWords{
     Word<TrainingPhase>{"flow", TrainingPhase::kFlow},
     Word<TrainingPhase>{"reconstruction", TrainingPhase::kReconstruction},

@@ -48,9 +48,7 @@ std::string weights_name(const std::string& text) {
 
 template <class T, std::size_t N>
 T value_of(const std::array<Word<T>, N>& words, const std::string& text, const char* option) {
-  for (const Word<T>& entry : words) {
-    if (entry.word == text) return entry.value;
-  }
+  if (const auto value = value_of_word(words, text)) return *value;
   throw UsageError(fmt::format("{}: expected one of {}, got \"{}\"", option,
                                joined(words, ", ", &Word<T>::word), text));
 }

@@ -15,6 +15,7 @@
 
 #include "manifests/files/atomic_file.h"
 #include "manifests/files/sha256.h"
+#include "manifests/values/words.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/planning/spread.h"
 #include "pipeline/training/csv_table.h"
@@ -35,12 +36,11 @@ namespace fs = std::filesystem;
 
 std::string steps_text(const TrainingManifest& manifest, const TrainingPosition& position) {
   std::vector<std::string> parts;
-  for (const auto phase :
-       {TrainingPhase::kFlow, TrainingPhase::kReconstruction, TrainingPhase::kGenerator}) {
+  for (const auto& [word, phase] : kPhaseWords) {
     const std::int64_t steps = phase < position.phase    ? steps_of(manifest.steps, phase)
                                : phase == position.phase ? position.step
                                                          : 0;
-    parts.push_back(fmt::format("{} {}", to_string(phase), steps));
+    parts.push_back(fmt::format("{} {}", word, steps));
   }
   return fmt::format("{}", fmt::join(parts, ", "));
 }

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/values/words.h"
 #include "stages/base/charts/svg_chart.h"
 
 namespace eventgan {
@@ -23,16 +24,8 @@ CsvTable::Row columns() {
   return names;
 }
 
-std::optional<TrainingPhase> phase_of(const std::string& word) {
-  for (const auto phase :
-       {TrainingPhase::kFlow, TrainingPhase::kReconstruction, TrainingPhase::kGenerator}) {
-    if (word == to_string(phase)) return phase;
-  }
-  return std::nullopt;
-}
-
 std::optional<LossRow> parse(const CsvTable::Row& cells) {
-  const auto phase = phase_of(cells[0]);
+  const auto phase = value_of_word(kPhaseWords, cells[0]);
   const double step = csv_value(cells[1]);
   if (!phase || !(step >= 0)) return std::nullopt;
   LossRow row;

@@ -13,6 +13,7 @@
 #include "manifests/documents/plan.h"
 #include "manifests/files/atomic_file.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/words.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/training/generator_records.h"
@@ -95,8 +96,6 @@ namespace fs = std::filesystem;
 
 constexpr int kBatchesAhead = 2;
 constexpr std::size_t kStepsOfMeans = 100;
-constexpr TrainingPhase kPhases[] = {TrainingPhase::kFlow, TrainingPhase::kReconstruction,
-                                     TrainingPhase::kGenerator};
 
 std::vector<TrainingRecording> open_all(const TrainingManifest& manifest) {
   const int smallest_gap = *std::min_element(manifest.gaps.begin(), manifest.gaps.end());
@@ -195,7 +194,7 @@ void TrainingRun::resume() {
 
 TrainingReport TrainingRun::run() {
   bool complete = true;
-  for (const TrainingPhase phase : kPhases) {
+  for (const auto& [word, phase] : kPhaseWords) {
     if (phase < position_.phase) continue;
     if (phase > position_.phase) position_ = {phase, 0};
     complete = train_phase();

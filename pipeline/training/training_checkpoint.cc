@@ -18,6 +18,7 @@
 #include "manifests/files/atomic_file.h"
 #include "manifests/files/sha256.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/words.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/training/sample_source.h"
 #include "stages/base/processor/processor.h"
@@ -117,8 +118,7 @@ void check_same_training(const std::map<std::string, std::string>& before,
 void check_resumable(std::map<std::string, std::string> before,
                      std::map<std::string, std::string> now, const TrainingPosition& position,
                      const TrainingManifest& manifest) {
-  for (const auto phase :
-       {TrainingPhase::kFlow, TrainingPhase::kReconstruction, TrainingPhase::kGenerator}) {
+  for (const auto& [word, phase] : kPhaseWords) {
     const std::int64_t steps = steps_of(manifest.steps, phase);
     const LossWeights& losses = manifest.losses;
     const bool fades = manifest.network.sensor && has_loss(losses, LossKind::kDirect);
@@ -127,7 +127,7 @@ void check_resumable(std::map<std::string, std::string> before,
         (phase == TrainingPhase::kGenerator && (manifest.network.output_slope != 0 || fades));
     const bool in_progress = phase == position.phase && steps >= position.step && !falls;
     if (phase > position.phase || in_progress) {
-      const std::string field = "manifest $.steps." + std::string(to_string(phase));
+      const std::string field = "manifest $.steps." + std::string(word);
       before.erase(field);
       now.erase(field);
     }
@@ -196,10 +196,7 @@ Number number_at(const SafetensorsFile& file, const std::string& key) {
 }
 
 TrainingPhase phase_at(const SafetensorsFile& file, const std::string& key) {
-  for (const auto phase :
-       {TrainingPhase::kFlow, TrainingPhase::kReconstruction, TrainingPhase::kGenerator}) {
-    if (text_at(file, key) == to_string(phase)) return phase;
-  }
+  if (const auto phase = value_of_word(kPhaseWords, text_at(file, key))) return *phase;
   throw std::runtime_error("expected a training phase, got \"" + text_at(file, key) + "\"");
 }
 

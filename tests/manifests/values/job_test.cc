@@ -18,6 +18,7 @@ void expect_one_to_one(const std::array<Word<T>, N>& words) {
   std::set<T> values;
   for (const Word<T>& entry : words) {
     EXPECT_EQ(to_string(entry.value), entry.word);
+    EXPECT_EQ(value_of_word(words, entry.word), entry.value);
     names.insert(entry.word);
     values.insert(entry.value);
   }
@@ -39,6 +40,8 @@ TEST(JobWords, GoThereAndBack) {
   expect_one_to_one(kNormalizationWords);
   expect_one_to_one(kStoredTypeWords);
   expect_one_to_one(kPolicyWords);
+  expect_one_to_one(kPhaseWords);
+  EXPECT_EQ(value_of_word(kPhaseWords, "Flow"), std::nullopt);
 }
 
 TEST(JobWords, AreThoseThatFilesHoldAndThePeopleWrite) {
