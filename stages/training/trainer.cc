@@ -1,7 +1,6 @@
 #include "stages/training/trainer.h"
 
 #include <ATen/Functions.h>
-#include <ATen/core/grad_mode.h>
 #include <fmt/format.h>
 #include <torch/nn/module.h>
 
@@ -272,23 +271,5 @@ void Trainer::load(const StateDict& state) {
 }
 
 StateDict Trainer::generator_state() const { return learners_->networks.generator_of_frames(); }
-
-std::vector<float> Trainer::generate(const TrainingSample& sample) const {
-  try {
-    const at::NoGradGuard only_looking;
-    UNet& generator = learners_->networks.generator;
-    // Spectral norm moves its vectors even in evaluation; they are put back.
-    const BufferSnapshot before({generator.get()});
-    generator->eval();
-    const at::Tensor volume =
-        generator->forward(generator_input_tensor(sample, learners_->networks.device))[0]
-            .cpu()
-            .contiguous();
-    const float* begin = volume.data_ptr<float>();
-    return {begin, begin + volume.numel()};
-  } catch (const c10::Error&) {
-    std::throw_with_nested(std::runtime_error("the generator failed in LibTorch"));
-  }
-}
 
 }  // namespace eventgan

@@ -6,7 +6,6 @@
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "manifests/values/training.h"
 #include "manifests/values/weights.h"
@@ -69,10 +68,6 @@ class Trainer {
 
   /// The generator's state dict with the published names, as fold_generator takes it.
   StateDict generator_state() const;
-
-  /// The generator in evaluation mode and float32 on one sample's network frames, of any size:
-  /// [2 bins, y, x]. Changes nothing that training goes on from.
-  std::vector<float> generate(const TrainingSample& sample) const;
 
  private:
   struct Learners;

@@ -68,8 +68,4 @@ TrainingBatch make_training_batch(std::span<const TrainingSample> samples, int b
           stack_inputs(samples, shape.size, device)};
 }
 
-at::Tensor generator_input_tensor(const TrainingSample& sample, c10::Device device) {
-  return stack_inputs({&sample, 1}, sample.shape.size, device);
-}
-
 }  // namespace eventgan

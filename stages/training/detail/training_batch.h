@@ -27,7 +27,4 @@ struct TrainingBatch {
 TrainingBatch make_training_batch(std::span<const TrainingSample> samples, int bins,
                                   c10::Device device);
 
-/// One sample's generator_input as a batch of one, likewise.
-at::Tensor generator_input_tensor(const TrainingSample& sample, c10::Device device);
-
 }  // namespace eventgan
