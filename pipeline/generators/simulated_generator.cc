@@ -67,7 +67,7 @@ std::vector<Event> between_events(const SimulatorInput& pair) {
   if (steps < kMostImages) {
     std::vector<GreyImage> images;
     for (int step = 0; step <= steps; ++step) images.push_back(image(step));
-    return simulate_images(images, pair.sensor, duration_s, random, EventOrder::kPixel);
+    return simulate_images(images, pair.sensor, duration_s, random);
   }
   Sensor sensor(pair.sensor, pair.previous.size, random);
   std::vector<Event> events;
@@ -84,12 +84,11 @@ std::vector<Event> between_events(const SimulatorInput& pair) {
 std::vector<Event> esim_events(const SimulatorInput& pair) {
   if (pair.between != nullptr) return between_events(pair);
   return simulate_affine(pair.previous, pair.max_displacement_px, pair.sensor, pair.duration_s,
-                         pair.random, EventOrder::kPixel);
+                         pair.random);
 }
 
 std::vector<Event> difference_events(const SimulatorInput& pair) {
-  return simulate_difference(pair.previous, pair.next, pair.sensor, pair.duration_s, pair.random,
-                             EventOrder::kPixel);
+  return simulate_difference(pair.previous, pair.next, pair.sensor, pair.duration_s, pair.random);
 }
 
 constexpr Simulator kSimulators[] = {{GeneratorKind::kEsim, esim_events},

@@ -28,7 +28,7 @@ struct SimulatorInput {
 /// it do.
 struct Simulator {
   GeneratorKind kind;
-  /// Pixel by pixel (EventOrder::kPixel). Thread safe.
+  /// Pixel by pixel, as pixel_events. Thread safe.
   std::vector<Event> (*events)(const SimulatorInput&);
   /// What a sensor sees from one frame of a clip to the next; null if it moves_one_frame.
   std::unique_ptr<Interval> (*between)(GreyImage previous, GreyImage next) = nullptr;

@@ -52,7 +52,7 @@ NamedNetwork open_network(const std::string& weights);
 /// A model of a moving scene that a simulated sensor looks at.
 struct SimulatedScene {
   std::string name;
-  /// Pixel by pixel (EventOrder::kPixel).
+  /// Pixel by pixel, as pixel_events.
   std::function<std::vector<Event>(const IntervalFrames&, const SensorSpec&, CounterRandom)> events;
   int draws = 1;
 };

@@ -32,7 +32,7 @@ void check_events(std::span<const Event> events, ImageSize size,
                   const std::array<double, 2>& times_s);
 
 /// The same volume of events that come pixel by pixel in C order, each pixel's in time order, as
-/// EventOrder::kPixel has them: t_1 and t_N are the earliest and the latest time. Written to
+/// pixel_events gives them: t_1 and t_N are the earliest and the latest time. Written to
 /// `volume`, shape.value_count() values. Throws std::invalid_argument as above. Thread safe.
 void pixel_event_volume(std::span<const Event> events, const VolumeShape& shape,
                         std::span<float> volume);

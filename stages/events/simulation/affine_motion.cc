@@ -190,18 +190,14 @@ std::vector<float> render_affine(const GreyImage& image, const AffineMotion& mot
 }
 
 AffineInterval::AffineInterval(const GreyImage& image, const AffineMotion& motion)
-    : size_(image.size), still_(linear_intensity(image)), motion_(motion) {
+    : still_(linear_intensity(image)) {
   // A drawn displacement of 6 px that rounds to just above 6 is 6 steps, not 7.
   constexpr double kRoundingPx = 1e-9;
-  const int steps =
-      std::max(1, static_cast<int>(std::ceil(largest_displacement(motion, size_) - kRoundingPx)));
+  const int steps = std::max(
+      1, static_cast<int>(std::ceil(largest_displacement(motion, image.size) - kRoundingPx)));
   for (int step = 0; step <= steps; ++step) {
-    places_.emplace_back(size_, motion, static_cast<double>(step) / steps);
+    places_.emplace_back(image.size, motion, static_cast<double>(step) / steps);
   }
-}
-
-std::vector<float> AffineInterval::render(int step) const {
-  return places_[static_cast<std::size_t>(step)].image(still_);
 }
 
 void AffineInterval::render_row(int step, int y, std::span<float> intensity) const {
@@ -211,20 +207,6 @@ void AffineInterval::render_row(int step, int y, std::span<float> intensity) con
     return;
   }
   places_[static_cast<std::size_t>(step)].row(still_, y, intensity);
-}
-
-FlowDisplacement AffineInterval::flow() const {
-  FlowDisplacement flow{.size = size_, .x_px = {}, .y_px = {}};
-  flow.x_px.reserve(size_.pixel_count());
-  flow.y_px.reserve(size_.pixel_count());
-  for (int y = 0; y < size_.height; ++y) {
-    for (int x = 0; x < size_.width; ++x) {
-      const cv::Vec2d displacement = displacement_at(motion_, x, y);
-      flow.x_px.push_back(static_cast<float>(displacement[0]));
-      flow.y_px.push_back(static_cast<float>(displacement[1]));
-    }
-  }
-  return flow;
 }
 
 }  // namespace eventgan

@@ -6,7 +6,6 @@
 
 #include "manifests/values/counter_random.h"
 #include "manifests/values/frames.h"
-#include "stages/events/simulation/interval.h"
 
 namespace eventgan {
 
@@ -52,23 +51,18 @@ class AffinePlaces {
   std::vector<int> column_y_;
 };
 
-/// Motion of one image as an interval of images in which no point moves more than 1 px from one
-/// to the next: steps = max(1, ceil(largest displacement)).
-class AffineInterval : public Interval {
+/// Motion of one image as images of which no point moves more than 1 px from one to the next.
+class AffineInterval {
  public:
   /// Throws std::invalid_argument if the image is empty.
   AffineInterval(const GreyImage& image, const AffineMotion& motion);
-  ImageSize size() const override { return size_; }
-  int steps() const override { return static_cast<int>(places_.size()) - 1; }
-  std::vector<float> render(int step) const override;
-  /// Row y of render(step): [x].
+  /// Images after the first: max(1, ceil(largest displacement)).
+  int steps() const { return static_cast<int>(places_.size()) - 1; }
+  /// Row y, [x], of the image at u = step / steps(). Thread safe.
   void render_row(int step, int y, std::span<float> intensity) const;
-  FlowDisplacement flow() const override;  ///< exactly A₁ x - x, rounded to float
 
  private:
-  ImageSize size_;
-  std::vector<float> still_;  ///< intensity at u = 0
-  AffineMotion motion_;
+  std::vector<float> still_;          ///< intensity at u = 0
   std::vector<AffinePlaces> places_;  ///< of images 0..steps()
 };
 

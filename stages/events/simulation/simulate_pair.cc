@@ -19,11 +19,6 @@ double step_time_s(int step, int steps, double from_s, double to_s) {
   return step == steps ? to_s : from_s + (to_s - from_s) * part;
 }
 
-std::vector<Event> ordered(std::vector<Event> events, EventOrder order) {
-  if (order == EventOrder::kTime) std::ranges::sort(events, comes_before);
-  return events;
-}
-
 }  // namespace
 
 void feed_interval(Sensor& sensor, const Interval& interval, double from_s, double to_s,
@@ -34,15 +29,6 @@ void feed_interval(Sensor& sensor, const Interval& interval, double from_s, doub
         sensor.step(interval.render(step), step_time_s(step, steps, from_s, to_s));
     events.insert(events.end(), seen.begin(), seen.end());
   }
-}
-
-std::vector<Event> simulate_interval(const Interval& interval, const SensorSpec& spec,
-                                     double duration_s, CounterRandom random) {
-  Sensor sensor(spec, interval.size(), random);
-  sensor.step(interval.render(0), 0);
-  std::vector<Event> events;
-  feed_interval(sensor, interval, 0, duration_s, events);
-  return events;
 }
 
 namespace {
@@ -71,7 +57,7 @@ std::unique_ptr<Interval> fade_between(GreyImage previous, GreyImage next) {
 
 std::vector<Event> simulate_affine(const GreyImage& image, double max_displacement_px,
                                    const SensorSpec& sensor, double duration_s,
-                                   CounterRandom random, EventOrder order) {
+                                   CounterRandom random) {
   const double displacement_px = max_displacement_px * random.keyed("displacement").uniform(0);
   const AffineInterval interval(
       image, random_affine_motion(image.size, displacement_px, random.keyed("motion")));
@@ -82,11 +68,11 @@ std::vector<Event> simulate_affine(const GreyImage& image, double max_displaceme
   const auto row = [&](std::size_t step, int y, std::span<float> intensity) {
     interval.render_row(static_cast<int>(step), y, intensity);
   };
-  return ordered(pixel_events(sensor, image.size, row, times_s, random.keyed("sensor")), order);
+  return pixel_events(sensor, image.size, row, times_s, random.keyed("sensor"));
 }
 
 std::vector<Event> simulate_images(const std::vector<GreyImage>& images, const SensorSpec& sensor,
-                                   double duration_s, CounterRandom random, EventOrder order) {
+                                   double duration_s, CounterRandom random) {
   const ImageSize size = images.at(0).size;
   const int steps = static_cast<int>(images.size()) - 1;
   std::vector<double> times_s;
@@ -100,13 +86,13 @@ std::vector<Event> simulate_images(const std::vector<GreyImage>& images, const S
                            intensity.begin(),
                            [](std::uint8_t u) { return static_cast<float>(u) / 255.0f; });
   };
-  return ordered(pixel_events(sensor, size, row, times_s, random), order);
+  return pixel_events(sensor, size, row, times_s, random);
 }
 
 std::vector<Event> simulate_difference(const GreyImage& previous, const GreyImage& next,
                                        const SensorSpec& sensor, double duration_s,
-                                       CounterRandom random, EventOrder order) {
-  return simulate_images({previous, next}, sensor, duration_s, random, order);
+                                       CounterRandom random) {
+  return simulate_images({previous, next}, sensor, duration_s, random);
 }
 
 }  // namespace eventgan
