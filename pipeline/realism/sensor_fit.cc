@@ -386,6 +386,7 @@ void describe_light(const std::vector<IntervalFrames>& frames, SensorFit& fit) {
   for (const IntervalFrames& pair : frames) levels.push_back(mean_level(pair.previous));
   fit.grey_level =
       std::accumulate(levels.begin(), levels.end(), 0.0) / static_cast<double>(levels.size());
+  std::ranges::sort(levels);
   fit.grey_levels = {quantile(levels, 0.1), quantile(levels, 0.9)};
 }
 

@@ -4,7 +4,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <iterator>
-#include <limits>
+
+#include "stages/events/realism/realism_scores.h"
 
 namespace eventgan {
 namespace {
@@ -75,15 +76,6 @@ StillPixels find_still_pixels(const GreyImage& previous, const GreyImage& next,
   return found;
 }
 
-double quantile(std::vector<double> numbers, double share) {
-  if (numbers.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::ranges::sort(numbers);
-  const double place = share * static_cast<double>(numbers.size() - 1);
-  const auto below = static_cast<std::size_t>(place);
-  const std::size_t above = std::min(below + 1, numbers.size() - 1);
-  return std::lerp(numbers[below], numbers[above], place - static_cast<double>(below));
-}
-
 namespace {
 
 /// Of each pixel of a recording what it saw while it was still.
@@ -134,7 +126,8 @@ std::vector<std::uint8_t> hot_pixels_of(const PixelTotals& totals) {
     if (!hot[i]) others_hz.push_back(rates_hz[i]);
   }
   double usual_hz = mean_hz(totals, rates_hz);
-  if (!others_hz.empty()) usual_hz = std::max(usual_hz, quantile(std::move(others_hz), 0.5));
+  std::ranges::sort(others_hz);
+  if (!others_hz.empty()) usual_hz = std::max(usual_hz, quantile(others_hz, 0.5));
   for (std::size_t i = 0; i < hot.size(); ++i) {
     hot[i] = hot[i] && rates_hz[i] > kHotTimes * usual_hz;
   }
@@ -177,6 +170,7 @@ std::array<double, 2> range_of(std::span<const NoiseCount> telling, const NoiseC
   if (telling.size() < kPairsOfRange) return {(all.*rate_hz)(), (all.*rate_hz)()};
   std::vector<double> rates_hz;
   for (const NoiseCount& pair : telling) rates_hz.push_back((pair.*rate_hz)());
+  std::ranges::sort(rates_hz);
   return {quantile(rates_hz, 0.1), quantile(rates_hz, 0.9)};
 }
 

@@ -52,8 +52,4 @@ struct NoiseFit {
 /// None if no pair has 100 still pixels. Thread safe.
 std::optional<NoiseFit> fit_noise(std::span<const std::vector<StillPixels>> recordings);
 
-/// At a share 0..1 between the least and the most of some numbers, on a line between neighbours;
-/// NaN of none.
-double quantile(std::vector<double> numbers, double share);
-
 }  // namespace eventgan

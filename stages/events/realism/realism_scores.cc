@@ -325,15 +325,15 @@ namespace {
 constexpr int kDraws = 1000;
 constexpr std::size_t kFewestPairs = 3;
 
-/// Between the neighbours of rank `share` of 1.
-double quantile(const std::vector<double>& sorted, double share) {
+}  // namespace
+
+double quantile(std::span<const double> sorted, double share) {
+  if (sorted.empty()) return std::numeric_limits<double>::quiet_NaN();
   const double rank = share * static_cast<double>(sorted.size() - 1);
   const auto below = static_cast<std::size_t>(rank);
   const std::size_t above = std::min(below + 1, sorted.size() - 1);
   return sorted[below] + (rank - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
-
-}  // namespace
 
 Bounds bootstrap_bounds(std::size_t pairs,
                         const std::function<double(std::span<const std::size_t>)>& statistic) {
@@ -347,7 +347,6 @@ Bounds bootstrap_bounds(std::size_t pairs,
     }
     if (const double value = statistic(drawn); !std::isnan(value)) values.push_back(value);
   }
-  if (values.empty()) return {};
   std::ranges::sort(values);
   return {quantile(values, 0.025), quantile(values, 0.975)};
 }

@@ -66,6 +66,10 @@ RealismScores match_scores(std::span<const float> volume, std::span<const float>
 /// Throws std::invalid_argument if the numbers of bins differ. Thread safe.
 RealismScores mean_scores(std::span<const RealismScores> scores);
 
+/// At a share 0..1 between the least and the most of sorted numbers, by rank and on a line between
+/// neighbours; NaN of none. Thread safe.
+double quantile(std::span<const double> sorted, double share);
+
 /// Where a number lies with a probability of 95 %. NaN: it cannot be told.
 struct Bounds {
   double low = std::numeric_limits<double>::quiet_NaN();

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 
 namespace eventgan {
 namespace {
@@ -168,13 +167,6 @@ TEST(FitNoise, OfAStillImageWithoutEventsIsNoneAndPoolsRecordings) {
   const std::vector<std::vector<StillPixels>> recordings{{pair_of(70, 0)}, {large}};
   EXPECT_NEAR(fit_noise(recordings)->positive_hz, 70 / 700.0, 1e-9);
   EXPECT_EQ(fit_noise(recordings)->pixels, 3000u);
-}
-
-TEST(Quantile, LiesBetweenNeighbours) {
-  EXPECT_EQ(quantile({3, 1, 2}, 0.5), 2);
-  EXPECT_DOUBLE_EQ(quantile({0, 10}, 0.1), 1);
-  EXPECT_EQ(quantile({7}, 0.9), 7);
-  EXPECT_TRUE(std::isnan(quantile({}, 0.5)));
 }
 
 }  // namespace

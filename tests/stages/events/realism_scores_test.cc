@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -395,6 +396,17 @@ TEST(ShareDistance, IsOfTheSharesAlone) {
   EXPECT_THAT(share_distance({}, {}), IsNan());
   EXPECT_THROWS(share_distance(scores, {}), std::invalid_argument,
                 "expected scores with one number of channels, got 0 and 2");
+}
+
+TEST(Quantile, LiesBetweenNeighbours) {
+  const std::array numbers{1.0, 2.0, 4.0};
+  EXPECT_EQ(quantile(numbers, 0), 1);
+  EXPECT_EQ(quantile(numbers, 0.5), 2);
+  EXPECT_EQ(quantile(numbers, 0.75), 3);
+  EXPECT_EQ(quantile(numbers, 1), 4);
+  EXPECT_DOUBLE_EQ(quantile(std::array{0.0, 10.0}, 0.1), 1);
+  EXPECT_EQ(quantile(std::array{7.0}, 0.9), 7);
+  EXPECT_TRUE(std::isnan(quantile({}, 0.5)));
 }
 
 TEST(MeanBounds, AreTwoStandardErrorsFromTheMean) {
