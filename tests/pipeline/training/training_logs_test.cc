@@ -44,8 +44,9 @@ TEST(CsvTable, CutsOffWhatIsNotToBeKeptAndATornEnd) {
   EXPECT_EQ(testing::read_file(folder / "t.csv"), "step,loss\n0,1\n1,2\n2,9\n");
   for (const char* torn : {"step,loss\n0,1\n1,2", "step,loss\n0,1\n1\n2,3\n"}) {
     testing::write_file(folder / "t.csv", torn);
-    const CsvTable table(folder / "t.csv", kColumns, keep_all);
-    EXPECT_EQ(table.kept(), (std::vector<CsvTable::Row>{{"0", "1"}})) << torn;
+    EXPECT_EQ(CsvTable(folder / "t.csv", kColumns, keep_all).kept(),
+              (std::vector<CsvTable::Row>{{"0", "1"}}))
+        << torn;
   }
 }
 
