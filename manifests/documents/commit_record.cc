@@ -164,6 +164,9 @@ CommitRecord read_document(const nlohmann::json& document, FaultList& faults) {
   if (const auto pairs = object.find("same_images")) {
     record.inputs.same_images = pairs->integer(0, record.samples);
   }
+  if (const auto volumes = object.find("empty_volumes")) {
+    record.inputs.empty_volumes = volumes->integer(0, record.samples);
+  }
   if (const auto peak = object.find("peak_bytes")) {
     record.peak_bytes = peak->integer<std::int64_t>(0, INT64_MAX);
   }
@@ -210,7 +213,7 @@ std::string to_json(const CommitRecord& record) {
                          {"stage_seconds", record.stage_seconds},
                          {"wall_seconds", record.wall_seconds},
                          {"peak_bytes", record.peak_bytes}};
-  const auto& [losses, same_images, outlines] = record.inputs;
+  const auto& [losses, same_images, empty_volumes, outlines] = record.inputs;
   if (outlines != OutlineCounts()) {
     json["outlines"] = {
         {"given", outlines.given}, {"cut", outlines.cut}, {"ellipses", outlines.ellipses}};
@@ -222,6 +225,7 @@ std::string to_json(const CommitRecord& record) {
                             {"of_other_classes", losses.of_other_classes}};
   }
   if (same_images > 0) json["same_images"] = same_images;
+  if (empty_volumes > 0) json["empty_volumes"] = empty_volumes;
   return indented(json);
 }
 

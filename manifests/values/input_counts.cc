@@ -21,8 +21,8 @@ void add_reasons(std::int64_t count, const std::vector<std::string>& first,
 
 }  // namespace
 
-void InputCounts::add(const Annotation& annotation, bool is_same_image,
-                      const OutlineCounts& of_objects) {
+LabelLosses losses_of(const Annotation& annotation) {
+  LabelLosses losses;
   const auto add = [](const std::vector<std::string>& lost, LabelLosses::Reasons& reasons) {
     add_reasons(std::ssize(lost), lost, reasons);
   };
@@ -30,8 +30,7 @@ void InputCounts::add(const Annotation& annotation, bool is_same_image,
   add(annotation.outlines_mended, losses.outlines);
   add(annotation.tracks_left_out, losses.tracks);
   losses.of_other_classes += static_cast<std::int64_t>(annotation.of_other_classes);
-  same_images += is_same_image ? 1 : 0;
-  outlines += of_objects;
+  return losses;
 }
 
 InputCounts& InputCounts::operator+=(const InputCounts& other) {
@@ -41,6 +40,7 @@ InputCounts& InputCounts::operator+=(const InputCounts& other) {
   add_reasons(more.tracks.count, more.tracks.first, losses.tracks);
   losses.of_other_classes += more.of_other_classes;
   same_images += other.same_images;
+  empty_volumes += other.empty_volumes;
   outlines += other.outlines;
   return *this;
 }
@@ -65,6 +65,9 @@ std::vector<std::string> InputCounts::notes() const {
   if (same_images > 0) {
     notes.push_back(
         count_text(same_images, "pair", " of the same image twice: nothing moves there"));
+  }
+  if (empty_volumes > 0) {
+    notes.push_back(count_text(empty_volumes, "volume", " without any event"));
   }
   if (outlines != OutlineCounts()) {
     notes.push_back("outlines of objects that move on their own: " + to_text(outlines));

@@ -26,14 +26,15 @@ struct LabelLosses {
   bool operator==(const LabelLosses&) const = default;
 };
 
-/// What a person should know of the inputs of samples.
+LabelLosses losses_of(const Annotation& annotation);
+
+/// What a person should know of the inputs of samples that are valid, of one or of many.
 struct InputCounts {
   LabelLosses losses;
-  std::int64_t same_images = 0;  ///< pairs of the same image twice
-  OutlineCounts outlines;        ///< of objects that move on their own
+  std::int64_t same_images = 0;    ///< pairs of the same image twice
+  std::int64_t empty_volumes = 0;  ///< without any event
+  OutlineCounts outlines;          ///< of objects that move on their own
 
-  /// Those of one sample that is valid.
-  void add(const Annotation& annotation, bool is_same_image, const OutlineCounts& of_objects);
   /// Those of samples behind these: the first reasons are those of the sum.
   InputCounts& operator+=(const InputCounts& other);
   /// A line for each kind of which there are any.

@@ -53,6 +53,11 @@ void free_memory(std::vector<T>& values) {
 
 }  // namespace
 
+InputCounts SampleMessage::input_counts() const {
+  const bool is_empty = (sample.statistics.flags & kFlagEmpty) != 0;
+  return {losses_of(sample.annotation), same_image, is_empty, outlines};
+}
+
 void SampleMessage::fail(std::string reason) {
   sample.valid = false;
   const std::string id = " (" + sample.sample_id + ")";

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "manifests/documents/plan.h"
+#include "manifests/values/input_counts.h"
 #include "manifests/values/job.h"
 #include "manifests/values/pair_key.h"
 #include "manifests/values/shard.h"
@@ -51,6 +52,7 @@ struct SampleMessage {
 
   const PlannedSample& planned() const { return shard->samples[static_cast<std::size_t>(slot)]; }
   bool failed() const { return !sample.valid; }
+  InputCounts input_counts() const;  ///< of a finished one
   void fail(std::string reason);
 };
 

@@ -66,9 +66,7 @@ void ShardRewrite::redo(int slot, const SampleMessage& message) {
   if (!writer_) writer_ = std::make_unique<ShardWriter>(folder_, header_);
   copy_before(slot);
   append(message.sample, message.chunk);
-  if (message.sample.valid) {
-    mended_.add(message.sample.annotation, message.same_image, message.outlines);
-  }
+  if (message.sample.valid) mended_ += message.input_counts();
 }
 
 bool ShardRewrite::is_news(int slot, const ShardSample& sample) const {

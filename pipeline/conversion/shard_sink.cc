@@ -122,7 +122,7 @@ void ShardSink::add(const SampleMessage& message) {
     record_.quarantined.push_back({message.slot, message.sample.sample_id, message.sample.fault});
   } else {
     ++record_.valid;
-    record_.inputs.add(message.sample.annotation, message.same_image, message.outlines);
+    record_.inputs += message.input_counts();
   }
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     record_.stage_seconds[kStageNames[stage]] += message.seconds[stage];

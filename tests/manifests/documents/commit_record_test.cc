@@ -93,6 +93,7 @@ TEST(CommitRecord, GoesThereAndBack) {
                               .tracks = {},
                               .of_other_classes = 5},
                    .same_images = 2,
+                   .empty_volumes = 1,
                    .outlines = {120, 300, 12}};
   EXPECT_EQ(parse_commit_record(to_json(record), "m"), record);
   record.inputs = {};
@@ -209,8 +210,8 @@ TEST(CommitRecord, EveryRuleIsChecked) {
       {"/host", R"("x")",
        "$.host: expected one of the keys format, version, shard, plan_hash, sha256, size_bytes, "
        "samples, valid, quarantined, boxes, persons, classes, gaps, optional_columns, "
-       "stage_seconds, wall_seconds, outlines, label_losses, same_images, peak_bytes, got an "
-       "unknown key"},
+       "stage_seconds, wall_seconds, outlines, label_losses, same_images, empty_volumes, "
+       "peak_bytes, got an unknown key"},
   };
   for (const BadCommitRecord& bad : table) {
     auto document = nlohmann::json::parse(to_json(sample_commit_record()));

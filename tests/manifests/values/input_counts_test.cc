@@ -11,11 +11,11 @@ using ::testing::IsEmpty;
 
 TEST(InputCounts, AreToldByKindAndTheFirstReasonsNamed) {
   InputCounts counts;
-  counts.add({}, false, {});
+  counts += {losses_of({})};
   EXPECT_THAT(counts.notes(), IsEmpty());
   Annotation annotation;
   annotation.outlines_mended = {"no area, in a.json (annotation 4)"};
-  counts.add(annotation, false, {});
+  counts += {losses_of(annotation)};
   EXPECT_THAT(counts.notes(),
               ElementsAre("1 outline of labels taken without some of its parts: no area, in a.json "
                           "(annotation 4)"));
@@ -23,7 +23,7 @@ TEST(InputCounts, AreToldByKindAndTheFirstReasonsNamed) {
   annotation.of_other_classes = 3;
   annotation.outlines_mended = {"d", "e", "f"};
   annotation.tracks_left_out = {"g"};
-  counts.add(annotation, true, {1, 2, 0});
+  counts += {losses_of(annotation), 1, 2, {1, 2, 0}};
   EXPECT_THAT(counts.notes(),
               ElementsAre("2 boxes of labels left out: b; c",
                           "3 boxes of other classes left out (\"classes\")",
@@ -31,6 +31,7 @@ TEST(InputCounts, AreToldByKindAndTheFirstReasonsNamed) {
                           "a.json (annotation 4); d; e; ...",
                           "1 track of labels left out: g",
                           "1 pair of the same image twice: nothing moves there",
+                          "2 volumes without any event",
                           "outlines of objects that move on their own: 1 of labels, 2 cut out of "
                           "their boxes, 0 ellipses"));
 }
@@ -44,8 +45,9 @@ TEST(InputCounts, OfShardsAddUpToThoseOfAllTheirSamples) {
       annotation.left_out = annotation.outlines_mended =
           annotation.tracks_left_out = {std::string(shard) + sample};
       annotation.of_other_classes = 1;
-      all.add(annotation, true, {1, 1, 1});
-      of_shard.add(annotation, true, {1, 1, 1});
+      const InputCounts of_sample{losses_of(annotation), 1, 1, {1, 1, 1}};
+      all += of_sample;
+      of_shard += of_sample;
     }
     sum += of_shard;
   }
