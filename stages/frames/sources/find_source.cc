@@ -68,6 +68,12 @@ std::optional<Place> look_around(const fs::path& path, std::optional<DatasetKind
     for (const std::string& name : folders) {
       if (const auto found = look_at(path / name, dataset, own_too)) below.push_back(*found);
     }
+    // Beside KITTI object it is where that finds more paired frames.
+    const bool has_object =
+        std::ranges::find(below, DatasetKind::kKittiObject, &Place::dataset) != below.end();
+    std::erase_if(below, [&](const Place& place) {
+      return has_object && place.dataset == DatasetKind::kKittiRaw;
+    });
     return below;
   };
   std::vector<Place> below = look_below(/*own_too=*/false);

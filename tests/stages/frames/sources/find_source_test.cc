@@ -66,6 +66,9 @@ TEST_F(FindSource, KittiRawAndTheDevkitLieBesideKittiObject) {
   EXPECT_THAT(found.remarks, IsEmpty());
   write("data/2011_09_28/2011_09_28_drive_0001_sync/image_02/data/0000000000.png");
   EXPECT_EQ(find("data/kitti").raw_root, at("data")) << "the days themselves";
+  touch({"all/training/label_2/000000.txt",
+         "all/raw/2011_09_26/2011_09_26_drive_0001_sync/image_02/data/0000000000.png"});
+  EXPECT_EQ(find("all").root, at("all/training")) << "raw is a part of it";
 }
 
 TEST_F(FindSource, AListOfPeopleIsKnownByItsContent) {
