@@ -87,7 +87,11 @@ def main():
     for path in (model, args.recording):
         if not path.is_file():
             sys.exit(f"expected a file, got none, in {path}")
-    detector = Detector(model)
+    try:
+        detector = Detector(model)
+    except Exception as error:  # PyTorch's have many lines
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        sys.exit(f"expected train_detector.py's detector, got one that cannot be read ({reason}), in {model}")
     try:
         events, size = read(args.recording)
     except Exception as error:  # each reader has its own

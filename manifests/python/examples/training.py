@@ -10,7 +10,6 @@ import json
 import math
 import os
 import pathlib
-import pickle
 import shlex
 import sys
 import time
@@ -280,7 +279,7 @@ def tuning(args: argparse.Namespace, samples: int) -> argparse.Namespace:
     (out / "tuned").mkdir(exist_ok=True)
     base_steps = json.loads((out / "metrics.json").read_text(encoding="utf-8"))["history"][-1]["step"]
     checkpoint = out / "tuned" / "checkpoint.pt"
-    if checkpoint.exists() and torch.load(checkpoint, "cpu")["settings"].get("base_steps") != base_steps:
+    if checkpoint.exists() and _checkpoint(checkpoint)["settings"].get("base_steps") != base_steps:
         print(f"{out / 'tuned'}: anew, since the training before has gone on")
         checkpoint.unlink()
     plan = read_description(args.tune)["plan_hash"]
@@ -363,14 +362,27 @@ def batches(args: argparse.Namespace, dataset: Dataset, collate: Callable | None
                       collate_fn=collate, persistent_workers=args.workers > 0)
 
 
+def _loaded(path: str | pathlib.Path, expected: str, advice: str = "", **options: Any) -> Any:
+    """What torch.save has written, on the CPU. A file that cannot be read ends the program in a line."""
+    try:
+        return torch.load(path, map_location="cpu", **options)
+    except Exception as error:  # each kind of damage has its own
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        sys.exit(f"expected {expected}, got one that cannot be read ({reason}), in {path}{advice}")
+
+
+def _checkpoint(path: pathlib.Path) -> dict[str, Any]:
+    """A training's own: a pickle, not to be had from others."""
+    return _loaded(path, "a whole checkpoint", " (remove it to start again)")
+
+
 def load_fitting(model: nn.Module, path: str | None) -> None:
     """Takes over those weights of the file that have the name and shape of one of the model's."""
     if not path:
         return
-    try:
-        weights = torch.load(path, map_location="cpu", weights_only=True)  # runs nothing that the file holds
-    except (OSError, pickle.UnpicklingError) as error:
-        sys.exit(f"expected a .pt file that contains only tensors, got {str(error).splitlines()[0]}, in {path}")
+    # runs nothing that the file holds
+    weights = _loaded(path, "a .pt file that contains only tensors", weights_only=True)
+    weights = weights if isinstance(weights, dict) else {}
     weights = next((weights[key] for key in ("model", "state_dict") if key in weights), weights)
     own = model.state_dict()
     fitting = {name: value for name, value in weights.items() if name in own and own[name].shape == value.shape}
@@ -390,8 +402,7 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
     settings = {name: value for name, value in vars(args).items() if name not in may_change}
     state: dict[str, Any] = {"settings": settings, "epoch": 0, "step": 0, "seconds": 0.0, "history": []}
     if (out / "checkpoint.pt").exists():
-        # its own: a pickle, not to be had from others
-        state = torch.load(out / "checkpoint.pt", map_location=args.device)
+        state = _checkpoint(out / "checkpoint.pt")
         for name, value in settings.items():
             if state["settings"].get(name) != value:
                 sys.exit(f"expected --{name} {state['settings'].get(name)}, as when this run started, got {value}, in "

@@ -217,11 +217,15 @@ def test_what_detect_cannot_use_is_told_in_a_line(tmp_path):
     (tmp_path / "camera.raw").write_bytes(b"% evt 3.0\n")
     with h5py.File(tmp_path / "eventgan.hdf5", "w") as file:
         file["davis/events/data"] = np.zeros((5, 4))
-    (tmp_path / "alone").mkdir()
-    shutil.copy(tmp_path / "detect.py", tmp_path / "alone")
+    for name in ("alone", "damaged"):
+        (tmp_path / name).mkdir()
+        shutil.copy(tmp_path / "detect.py", tmp_path / name)
+    whole, damaged = (tmp_path / "detector.pt").read_bytes(), tmp_path / "damaged" / "detector.pt"
+    damaged.write_bytes(whole[:len(whole) // 2])
     for script, name, options, error in (
             ("detect.py", "none.npz", [], f"expected a file, got none, in {tmp_path / 'none.npz'}"),
             ("alone/detect.py", "good.npy", [], f"expected a file, got none, in {tmp_path / 'alone' / 'detector.pt'}"),
+            ("damaged/detect.py", "good.npy", [], f"), in {damaged}"),
             ("detect.py", "camera.raw", [], "(Unable to "),
             ("detect.py", "eventgan.hdf5", [], "object 'events' doesn't exist"),
             ("detect.py", "bare.npy", [], "(expected columns t, x, y and p, got none with a name), in "),

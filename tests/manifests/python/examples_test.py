@@ -458,6 +458,37 @@ def test_minutes_are_those_of_the_steps(tmp_path, monkeypatch):
     assert fit(2.0)[3:] == [(10, 1.67), (12, 2)]
 
 
+@pytest.mark.parametrize("damaged", [lambda whole: whole[:len(whole) // 2], lambda _: b"", lambda _: b"hello\n",
+                                     lambda _: b"train\n"])
+def test_files_of_weights_that_cannot_be_read_are_named_in_a_line(tmp_path, monkeypatch, damaged):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import training
+
+    model, args = torch.nn.Linear(1, 1), argparse.Namespace(out=str(tmp_path), device="cpu")
+    paths = [tmp_path / "checkpoint.pt", tmp_path / "tuned" / "checkpoint.pt"]
+    paths[1].parent.mkdir()
+    (tmp_path / "metrics.json").write_text('{"history": [{"step": 1}]}')
+    for path in paths:
+        torch.save({"settings": {}, "model": model.state_dict()}, path)
+        path.write_bytes(damaged(path.read_bytes()))
+    for path, load in zip(paths, (lambda: training.fit(args, model, None, (), None, None, "score"),
+                                  lambda: training.tuning(args, 1))):
+        with pytest.raises(SystemExit, match=rf"^expected a whole checkpoint, got .+, in {path} \(remove it to start "):
+            load()
+    with pytest.raises(SystemExit, match=f"^expected a .pt file that contains only tensors, got .+, in {paths[0]}$"):
+        training.load_fitting(model, paths[0])
+
+
+def test_a_file_of_something_else_has_no_weights_that_fit(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import training
+
+    for other in ([torch.ones(1)], torch.ones(1), {"weight": torch.ones(2)}):
+        torch.save(other, tmp_path / "other.pt")
+        with pytest.raises(SystemExit, match=f"such as weight, got none, in {tmp_path / 'other.pt'}"):
+            training.load_fitting(torch.nn.Linear(1, 1), tmp_path / "other.pt")
+
+
 def test_what_is_to_be_run_can_be_run():
     for path in (*EXAMPLES.glob("*.py"), *(SOURCE / "tests" / "experiments").glob("*.py")):
         text = path.read_text()
