@@ -35,6 +35,9 @@ GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps togeth
 MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "images", "every",
               "test", "as_bright", "without_noise"}  # when a run goes on
 
+LEAST = {"epochs": 1, "steps": 1, "every": 1, "batch": 1, "threads": 0, "workers": 0, "images": 0, "rotation": 0}
+# Above 0, finite; an input with 16 times a camera's sides has 256 times its pixels, and the memory holds few.
+MOST = {"minutes": sys.float_info.max, "lr": sys.float_info.max, "sigma": sys.float_info.max, "scale": 16.0}
 TUNING_STEPS, TUNING_RATE = 200, 0.25  # the latter a share of the learning rate
 
 
@@ -89,10 +92,14 @@ def options_of_any(description: str, data: str, steps: int | None = None, **defa
 
 def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
     args = parser.parse_args()
-    for name, least in (("epochs", 1), ("steps", 1), ("every", 1), ("batch", 1), ("minutes", 0)):
-        value = getattr(args, name)
-        if value is not None and (value < least or not value):
-            sys.exit(f"expected --{name} {'above 0' if name == 'minutes' else 'of at least 1'}, got {value}")
+    given = {name: value for name, value in vars(args).items() if value is not None}
+    for name, least in LEAST.items():
+        if name in given and not least <= given[name] < math.inf:
+            sys.exit(f"expected --{name} of at least {least}, got {given[name]}")
+    for name, most in MOST.items():
+        if name in given and not 0 < given[name] <= most:
+            also = f"at most {most:g}" if name == "scale" else "finite"
+            sys.exit(f"expected --{name} above 0 and {also}, got {given[name]:g}")
     name, value = vars(args).pop("unlimited")
     if args.epochs is None and args.steps is None and args.minutes is None:
         setattr(args, name, value)

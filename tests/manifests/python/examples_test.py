@@ -514,5 +514,15 @@ def test_what_cannot_be_trained_with_is_named(data, tmp_path):
     for limit in ("--epochs", "--steps", "--minutes", "--every"):
         said = train("train_torchvision", data, tmp_path / "out", limit, "0", expect=1)
         assert f"expected {limit} " in said and "got 0" in said
+    for option, value, error in (
+            ("--lr", "nan", "above 0 and finite"), ("--minutes", "nan", "above 0 and finite"),
+            ("--minutes", "inf", "above 0 and finite"), ("--scale", "0", "above 0 and at most 16"),
+            ("--scale", "-1", "above 0 and at most 16"), ("--scale", "nan", "above 0 and at most 16"),
+            ("--scale", "1e+09", "above 0 and at most 16"), ("--images", "-1", "of at least 0"),
+            ("--workers", "-1", "of at least 0")):
+        said = train("train_detector", data, tmp_path / "out", "--steps", "1", option, value, expect=1)
+        assert said == f"expected {option} {error}, got {value}\n"
+    said = train("train_pose", data, tmp_path / "out", "--trainer", tmp_path, "--rotation", "nan", expect=1)
+    assert said == "expected --rotation of at least 0, got nan\n"
     said = train("train_pose", data, tmp_path / "out", "--trainer", tmp_path, expect=1)
     assert f"expected the trainer's lib/models, got none, in {tmp_path}" in said
