@@ -100,6 +100,10 @@ def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
         if name in given and not 0 < given[name] <= most:
             also = f"at most {most:g}" if name == "scale" else "finite"
             sys.exit(f"expected --{name} above 0 and {also}, got {given[name]:g}")
+    classes = (given.get("classes") or "").split(",")
+    twice = [name for name in classes if classes.count(name) > 1]
+    if twice:
+        sys.exit(f"expected different names in --classes, got {twice[0]} twice")
     name, value = vars(args).pop("unlimited")
     if args.epochs is None and args.steps is None and args.minutes is None:
         setattr(args, name, value)

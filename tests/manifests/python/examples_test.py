@@ -522,6 +522,8 @@ def test_what_cannot_be_trained_with_is_named(data, tmp_path):
             ("--workers", "-1", "of at least 0")):
         said = train("train_detector", data, tmp_path / "out", "--steps", "1", option, value, expect=1)
         assert said == f"expected {option} {error}, got {value}\n"
+    said = train("train_detector", data, tmp_path / "out", "--steps", "1", "--classes", "Car,Van,Car", expect=1)
+    assert said == "expected different names in --classes, got Car twice\n"
     said = train("train_pose", data, tmp_path / "out", "--trainer", tmp_path, "--rotation", "nan", expect=1)
     assert said == "expected --rotation of at least 0, got nan\n"
     said = train("train_pose", data, tmp_path / "out", "--trainer", tmp_path, expect=1)
