@@ -28,6 +28,7 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package
 import eventgan
 from eventgan import Sample, Shards, drawing, read_description
 from eventgan.detection_scores import Detections, GroundTruth, detection_scores
+from eventgan.shard_folder import DESCRIPTION, PLAN
 from eventgan.torch import DetectionDataset, fitted, inverse, mixture, move_boxes
 
 VALIDATION_SPLITS = ("validation", "valid", "val", "test")
@@ -104,6 +105,9 @@ def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
     twice = [name for name in classes if classes.count(name) > 1]
     if twice:
         sys.exit(f"expected different names in --classes, got {twice[0]} twice")
+    shards = [name for name in (PLAN, DESCRIPTION) if pathlib.Path(args.out, name).exists()]
+    if shards:
+        sys.exit(f"expected a folder of its own for --out, got one of shards, with {shards[0]}, in {args.out}")
     name, value = vars(args).pop("unlimited")
     if args.epochs is None and args.steps is None and args.minutes is None:
         setattr(args, name, value)

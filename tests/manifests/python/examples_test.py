@@ -220,7 +220,7 @@ def test_flow_network_learns_and_goes_on(tmp_path):
     assert "error of the moved frame: scene " in said
     after = convert(tmp_path, sources=[source, {**source, "pairs": {**source["pairs"], "side": "after"}}],
                     **{**options, "name": "both"})
-    said = train("train_flow", after, tmp_path / "both", "--steps", "1", expect=1)
+    said = train("train_flow", after, tmp_path / "of both", "--steps", "1", expect=1)
     assert f"expected flow at the pixels of the next image, or of the previous one (side), got both, in {after}" in said
 
 
@@ -524,6 +524,13 @@ def test_what_cannot_be_trained_with_is_named(data, tmp_path):
         assert said == f"expected {option} {error}, got {value}\n"
     said = train("train_detector", data, tmp_path / "out", "--steps", "1", "--classes", "Car,Van,Car", expect=1)
     assert said == "expected different names in --classes, got Car twice\n"
+    for name in ("plan.json", "dataset.json"):
+        shards = tmp_path / f"shards with {name}"
+        shards.mkdir()
+        (shards / name).write_text("{}")
+        said = train("train_detector", data, shards, "--steps", "1", expect=1)
+        assert said == f"expected a folder of its own for --out, got one of shards, with {name}, in {shards}\n"
+        assert [path.name for path in shards.iterdir()] == [name]
     said = train("train_pose", data, tmp_path / "out", "--trainer", tmp_path, "--rotation", "nan", expect=1)
     assert said == "expected --rotation of at least 0, got nan\n"
     said = train("train_pose", data, tmp_path / "out", "--trainer", tmp_path, expect=1)
