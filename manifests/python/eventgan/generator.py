@@ -356,8 +356,9 @@ def represent(events: Any, representation: str, *, size: tuple[int, int],
     Parameters
     ----------
     events : structured array, or dictionary of arrays, in time order
-        x and y in whole pixels; p (also pol, polarity), positive if above 0; t (also ts, timestamp), seconds if
-        floating-point, microseconds if whole.
+        x and y in whole pixels; p (also pol, polarity), 1 or True: positive, and of the others either all 0 or all -1
+        (also 255, 65535, 4294967295: -1 of an unsigned type); t (also ts, timestamp), seconds if floating-point,
+        microseconds if whole.
     representation : str
         "histogram:10". Of these, where B, T, K are whole numbers and TAU is in seconds:
 
@@ -376,7 +377,7 @@ def represent(events: Any, representation: str, *, size: tuple[int, int],
     Raises
     ------
     ValueError
-        Not events in time order at whole pixels of the image, or another representation.
+        Not events in time order at whole pixels of the image, other polarities, or another representation.
     """
     height, width = (_whole(side, "a side of size") for side in sides(size))
     columns = [_event_column(events, names) for names in
@@ -410,7 +411,14 @@ def represent(events: Any, representation: str, *, size: tuple[int, int],
         wrong = column[rows[name] != column]
         if len(wrong):
             raise ValueError(f"expected whole pixels inside {width}x{height}, got {wrong[0]} for {name}")
-    rows["p"] = columns[3] > 0
+    rows["p"] = columns[3] == 1
+    off = columns[3][columns[3] != 1].astype(float)
+    off[np.isin(off, [2**8 - 1, 2**16 - 1, 2**32 - 1])] = -1  # as convert reads it
+    wrong = ~np.isin(off, [-1, 0]) | (off != off[:1])
+    if wrong.any():
+        at = wrong.argmax()
+        raise ValueError(f"expected polarities -1 and 1 or 0 and 1, got {off[at]:.12g}"
+                         + (f" after {off[0]:.12g}" if at else ""))
     channels, number = ctypes.c_int32(), ctypes.c_int32()
 
     def call(values: int | None, nbytes: int) -> None:

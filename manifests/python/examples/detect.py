@@ -41,14 +41,18 @@ class Detector:
 
 
 def columns(events):
-    """t in microseconds, x, y and p (positive: 1) of a structured array, or of arrays by their names."""
+    """t in microseconds, x, y and p (positive: 1, else 0 or -1) of a structured array, or of arrays by their names."""
     known = events.dtype.names or () if hasattr(events, "dtype") else [*events]
     found = [next((name for name in names if name in known), None) for names in
              (("t", "t_us", "ts", "timestamp"), ("x",), ("y",), ("p", "pol", "polarity"))]
     if None in found:
         raise ValueError(f"expected columns t, x, y and p, got {', '.join(map(str, known)) or 'none with a name'}")
     t, x, y, p = (np.asarray(events[name]) for name in found)
-    return np.rint(t * 1e6 if t.dtype.kind == "f" else t).astype(int), x.astype(int), y.astype(int), (p > 0).astype(int)
+    wrong = p[~np.isin(p, (1, 0, -1, 2**8 - 1, 2**16 - 1, 2**32 - 1))]  # the last three: -1 of an unsigned type
+    if len(wrong):
+        raise ValueError(f"expected polarities -1 and 1 or 0 and 1, got {wrong[0]}")
+    t = np.rint(t * 1e6 if t.dtype.kind == "f" else t)
+    return (*(each.astype(int) for each in (t, x, y, p == 1)),)
 
 
 def read(path):

@@ -199,7 +199,9 @@ def test_recordings_are_read_by_their_names(tmp_path):
     with h5py.File(tmp_path / "mvsec.hdf5", "w") as file:
         file["davis/left/events"] = np.stack([events["x"], events["y"], events["t"] * 1e-6, 2.0 * events["p"] - 1], 1)
         file["davis/left/image_raw"] = np.zeros((1, 132, 176), np.uint8)
-    for name, size in (("a.npy", None), ("a.npz", None), ("dsec.h5", None), ("mvsec.hdf5", (132, 176))):
+    np.savez(tmp_path / "b.npz", t=events["t"], x=events["x"], y=events["y"], p=(2 * events["p"] - 1).astype("u1"))
+    for name, size in (("a.npy", None), ("a.npz", None), ("b.npz", None),
+                       ("dsec.h5", None), ("mvsec.hdf5", (132, 176))):
         found, seen = detect.read(tmp_path / name)
         assert seen == size
         np.testing.assert_array_equal(found[0], expected[0], name)
@@ -212,7 +214,10 @@ def test_what_detect_cannot_use_is_told_in_a_line(tmp_path):
         "classes": ["Car"], "bins": 9, "normalize": "none", "channels": "signed", "score": 0.3, "window_ms": 50})
     np.save(tmp_path / "good.npy", events)
     np.save(tmp_path / "bare.npy", np.zeros((5, 4)))
+    events["p"] += 1
+    np.save(tmp_path / "polarities.npy", events)
     events["x"][7] = -1
+    events["p"] -= 1
     np.save(tmp_path / "negative.npy", events)
     (tmp_path / "camera.raw").write_bytes(b"% evt 3.0\n")
     with h5py.File(tmp_path / "eventgan.hdf5", "w") as file:
@@ -229,6 +234,7 @@ def test_what_detect_cannot_use_is_told_in_a_line(tmp_path):
             ("detect.py", "camera.raw", [], "(Unable to "),
             ("detect.py", "eventgan.hdf5", [], "object 'events' doesn't exist"),
             ("detect.py", "bare.npy", [], "(expected columns t, x, y and p, got none with a name), in "),
+            ("detect.py", "polarities.npy", [], "(expected polarities -1 and 1 or 0 and 1, got 2), in "),
             ("detect.py", "negative.npy", [], f"got one at -1, {events['y'][7]}, in {tmp_path / 'negative.npy'}"),
             ("detect.py", "good.npy", ["--sensor", "32x30"], "expected events within 32x30, got one at "),
             ("detect.py", "good.npy", ["--sensor", "64"], "expected --sensor as 346x260, got 64"),

@@ -108,7 +108,7 @@ class Calls:
         events = np.zeros(count, [("t", self.pick(["f8", "i8", "f4", "u4"])), ("x", "i4"), ("y", "u2"), ("p", "i1")])
         events["t"] = np.sort(self.random.integers(0, 10**6, count))
         events["x"], events["y"] = self.random.integers(0, 20, count), self.random.integers(0, 16, count)
-        events["p"] = self.random.integers(-1, 2, count)
+        events["p"] = self.pick([1, -1]) * self.random.integers(0, 2, count)
         if count and self.random.random() < 0.2:
             row = self.random.integers(count)
             name, value = self.pick([("t", -1 if events["t"].dtype.kind == "i" else 0), ("x", -1), ("x", 2**31 - 1),

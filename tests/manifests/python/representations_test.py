@@ -118,6 +118,14 @@ def test_columns_may_have_any_type(names):
 
 
 @needs_library
+@pytest.mark.parametrize("p", [[1, 0], [True, False], [1, -1], [1.0, -1.0],
+                               *(np.array([1, -1]).astype(dtype) for dtype in ("u1", "u2", "u4"))])
+def test_polarities_are_as_convert_reads_them(p):
+    events = {"t": [0, 1], "x": [0, 1], "y": [0, 0], "p": p}
+    np.testing.assert_array_equal(represent(events, "count", size=(1, 2)), [[[1, 0]], [[0, 1]]])
+
+
+@needs_library
 @pytest.mark.parametrize("times", [np.array([2**63 - 3, 2**63 + 5, 2**64 - 1], "u8"), np.array([-100, -92, 100], "i1"),
                                    np.array([-2**63, 0, 2**63 - 1])])
 def test_whole_times_may_lie_as_far_apart_as_their_type_allows(times):
@@ -147,6 +155,10 @@ def test_no_events_are_zeros():
     (lambda events: {**columns_of(events), "y": np.full(9, np.nan)}, "expected whole pixels .* got nan for y"),
     (lambda events: {**columns_of(events), "y": np.full(9, 2**32)},
      "expected whole pixels inside 40x30, got 4294967296 for"),
+    (lambda events: {**columns_of(events), "p": events["p"] + 1}, "expected polarities -1 and 1 or 0 and 1, got 2"),
+    (lambda events: {**columns_of(events), "p": np.arange(9) % 3 - 1}, "got 0 after -1"),
+    (lambda events: {**columns_of(events), "p": np.full(9, np.nan)}, "polarities .* got nan"),
+    (lambda events: {**columns_of(events), "p": np.full(9, 254, "u1")}, "polarities .* got 254"),
 ])
 def test_what_is_none_is_refused(change, message):
     with pytest.raises(ValueError, match=message):
