@@ -114,7 +114,7 @@ def pair_of(sample: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     image, pair = training.labelled_image(sample), sample["pair"]
     x, y, angle, scale = pair.get("motion", [math.nan] * 4)
     if math.isnan(scale):  # two frames of a clip
-        previous = cv2.imread(pair["prev_path"], cv2.IMREAD_GRAYSCALE)
+        previous = cv2.imread(training.frame_path(sample, "prev"), cv2.IMREAD_GRAYSCALE)
     else:
         cos, sin, middle = (scale * np.cos(np.deg2rad(angle)), scale * np.sin(np.deg2rad(angle)),
                             (np.array(image.shape[::-1]) - 1) / 2)

@@ -152,8 +152,8 @@ class Shards(Sequence):
         Parameters
         ----------
         volume_of : callable
-            Makes a volume, float32 [2B, H, W], of a sample, which has the decoded `volume` and `pair`. For spawned
-            workers it must be a function of a module.
+            Makes a volume, float32 [2B, H, W], of a sample, which has the decoded `volume`, `pair` and what is always
+            there. For spawned workers it must be a function of a module.
 
         Returns
         -------
@@ -227,6 +227,7 @@ class Shards(Sequence):
         if changes:
             fields |= {"pair"}
         sample: Sample = {}
+        origin = {"valid": valid, "shard": str(path), "slot": slot}
         if "volume" in fields:
             sample.update(file.volume(slot, self._decode or bool(self._changes)))
         if "pair" in fields:
@@ -247,8 +248,8 @@ class Shards(Sequence):
         if "original" in fields:
             sample["original"] = file.column("labels/original")[slot].tobytes()
         for change in changes:
-            sample["volume"] = np.asarray(change(sample), np.float32)
-        return {**sample, "valid": valid, "shard": str(path), "slot": slot}
+            sample["volume"] = np.asarray(change({**sample, **origin}), np.float32)
+        return {**sample, **origin}
 
     def masks(self, index: int) -> np.ndarray:
         """What the outlines of a sample's boxes cover of what the volume shows of the image.

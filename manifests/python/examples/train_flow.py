@@ -329,7 +329,8 @@ def frames_of(sample: Sample) -> list[torch.Tensor]:
 
     if sample["pair"]["dataset"] != "recording":
         return []
-    images = [read(sample["pair"][f"{side}_path"], sample["pair"][f"{side}_video_frame"]) for side in ("prev", "next")]
+    images = [read(training.frame_path(sample, side), sample["pair"][f"{side}_video_frame"])
+              for side in ("prev", "next")]
     if any(image is None for image in images):
         return []
     return [torch.from_numpy(training.placed(sample, image))[None, None] for image in images]

@@ -338,12 +338,24 @@ def placed(sample: Sample, image: np.ndarray) -> np.ndarray:
     return result
 
 
+def frame_path(sample: Sample, side: str = "next") -> str:
+    """The file of a frame, "prev" or "next". A relative path begins at the manifest's folder, which run.json beside the
+    shard names, or else at the shard's."""
+    folder = pathlib.Path(sample["shard"]).parent
+    try:
+        run = json.loads((folder / "run.json").read_bytes())
+        folder /= run.get("manifest_folder") or os.fsdecode(bytes(run["manifest_folder_bytes"]))
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        pass
+    return str(folder / sample["pair"][f"{side}_path"])
+
+
 def labelled_image(sample: Sample) -> np.ndarray:
     """The labelled frame as it was read, uint8 grey [H, W]. It must be an image at the pair's end."""
-    pair = sample["pair"]
-    image = cv2.imread(pair["next_path"], cv2.IMREAD_GRAYSCALE) if pair["label_position"] == 1 else None
+    pair, path = sample["pair"], frame_path(sample)
+    image = cv2.imread(path, cv2.IMREAD_GRAYSCALE) if pair["label_position"] == 1 else None
     if image is None:
-        raise ValueError(f"expected an image, of a pair with the label at its end, got none, in {pair['next_path']} "
+        raise ValueError(f"expected an image, of a pair with the label at its end, got none, in {path} "
                          f"(sample {pair['sample_id']})")
     return image
 

@@ -203,7 +203,7 @@ def test_flow_network_learns_and_goes_on(tmp_path):
         camera["events"], camera["image_raw"], camera["image_raw_ts"] = events, frames, [0, 0.04, 0.08]
         camera["image_raw_event_inds"] = [0, 2 * len(rows), 4 * len(rows) - 1]
     test = convert(tmp_path, name="scene", image={}, generator={"kind": "events"},
-                   sources=[{"dataset": "recording", "root": str(tmp_path / "scene.hdf5"), "split": "test"}])
+                   sources=[{"dataset": "recording", "root": "scene.hdf5", "split": "test"}])
 
     said = train("train_flow", data, tmp_path / "parts", "--steps", "1", "--images", "1", "--every", "9")
     assert "4 samples for training, 1 for validation, of other images" in said and "(untrained)" in said
@@ -383,7 +383,6 @@ def test_volumes_are_changed_as_they_are_read(folder, tmp_path, monkeypatch):
     """As bright, without noise, frames: what predictions.json is of, from the stored volumes,
     which stay as they are."""
     monkeypatch.syspath_prepend(str(EXAMPLES))
-    monkeypatch.chdir(tmp_path)
     import cv2
     import training
 
@@ -407,16 +406,32 @@ def test_volumes_are_changed_as_they_are_read(folder, tmp_path, monkeypatch):
     quiet = np.where(events == 0.25, events, 0)
     np.testing.assert_array_equal(tested(shards.changed(lambda sample: events), without_noise=True)[0]["volume"], quiet)
 
-    path = pathlib.Path(shards[0]["pair"]["next_path"])
+    path = tmp_path / "inputs" / shards[0]["pair"]["next_path"]
     path.parent.mkdir(parents=True)
+    (folder / "run.json").write_text(json.dumps({"manifest_folder": str(tmp_path / "inputs")}))
     canvas = np.arange(12 * 16, dtype=np.uint8).reshape(12, 16)
     assert cv2.imwrite(str(path), canvas)
     volume = shards.changed(training.labelled_frame)[0]["volume"]  # of half its size
     np.testing.assert_allclose(volume[0], canvas.reshape(6, 2, 8, 2).mean((1, 3)) / 255, atol=0.6 / 255)
     assert not volume[1:].any()
-    with pytest.raises(ValueError, match=f"expected an image, .* got none, in {shards[1]['pair']['next_path']} "):
-        shards.changed(training.labelled_frame)[1]
+    (folder / "run.json").unlink()
+    nowhere = folder / shards[0]["pair"]["next_path"]
+    with pytest.raises(ValueError, match=f"expected an image, .* got none, in {nowhere} "):
+        shards.changed(training.labelled_frame)[0]
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize("run, base", [({"manifest_folder": "/inputs"}, "/inputs"), (None, "/out"), ([], "/out"),
+                                       ({"manifest_folder_bytes": [*b"/in\xff"]}, "/in\udcff")])
+def test_paths_of_frames_begin_where_the_manifest_was(tmp_path, monkeypatch, run, base):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import training
+
+    if run is not None:
+        (tmp_path / "run.json").write_text(json.dumps(run))
+    sample = {"shard": str(tmp_path / "a.h5"), "pair": {"prev_path": "a/0.png", "next_path": "/b/1.png"}}
+    assert training.frame_path(sample, "prev") == f"{tmp_path if base == '/out' else base}/a/0.png"
+    assert training.frame_path(sample) == "/b/1.png"
 
 
 def test_flows_of_ids_that_two_have_are_not_written(two_shards, tmp_path, monkeypatch):
