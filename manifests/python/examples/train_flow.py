@@ -344,6 +344,12 @@ def errors_of_frames(flow: torch.Tensor, position: float, previous: torch.Tensor
     return error_at_events(moved(other, where[None]), here, volume), error_at_events(other, here, volume)
 
 
+def has_truth(sample: Sample) -> bool:
+    """Whether `scores_of` scores it."""
+    has_flow = "flow" in sample and sample["flow_valid"].any()
+    return bool(has_flow or sample["volume"].any() and frames_of(sample))
+
+
 def scores_of(network: nn.Module, position: float, shards: Shards) -> dict[str, Any]:
     """Scores of the samples with flow, as flow_scores, and of the samples of a recording the share of the frames' error
     that is left once the flow has moved them: of each recording, and the mean."""
@@ -375,6 +381,9 @@ def main() -> None:
     args = training.begin(parser)
     train_shards, validation_shards = (part.changed(in_units) for part in training.divided(args, with_flow))
     test_shards = training.tested(args, train_shards, validation_shards, with_events).changed(in_units)
+    if not any(map(has_truth, (test_shards.sample(i, {"volume", "pair", "flow"}) for i in range(len(test_shards))))):
+        raise SystemExit(f"expected samples with flow, or of recordings whose frames are still there, got none, in "
+                         f"{args.test}")
     dataset = FlowDataset(train_shards)
     items = [{**item, "volume": item["volume"].half()} for item in map(dataset.__getitem__, range(len(dataset)))]
     positions = {item["label_position"] for item in items}
@@ -401,9 +410,6 @@ def main() -> None:
                  training.batches(args, Crops(items), shuffle=True), loss_of, check, "AEE")
 
     test = scores_of(network, position, test_shards)
-    if not test:
-        raise SystemExit(f"expected samples with flow, or of recordings whose frames are still there, got none, in "
-                         f"{args.test}")
     for title, numbers in test.items():
         print(f"{title}: " + ", ".join(f"{name} {value:.3g}" for name, value in numbers.items()))
     training.replace(pathlib.Path(args.out, "scores.json"),

@@ -218,6 +218,10 @@ def test_flow_network_learns_and_goes_on(tmp_path):
     left = json.loads((tmp_path / "parts" / "scores.json").read_text())
     assert set(left) == {"error of the moved frame"} and set(left["error of the moved frame"]) == {"scene", "mean"}
     assert "error of the moved frame: scene " in said
+    (tmp_path / "scene.hdf5").unlink()
+    said = train("train_flow", data, tmp_path / "none", "--test", test, expect=1)
+    assert f"expected samples with flow, or of recordings whose frames are still there, got none, in {test}" in said
+    assert "untrained" not in said
     after = convert(tmp_path, sources=[source, {**source, "pairs": {**source["pairs"], "side": "after"}}],
                     **{**options, "name": "both"})
     said = train("train_flow", after, tmp_path / "of both", "--steps", "1", expect=1)
