@@ -504,8 +504,9 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
                **state["settings"], "history": state["history"]}
     replace(out / "weights.pt", lambda path: torch.save(model.state_dict(), path))
     replace(out / "metrics.json", lambda path: path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8"))
-    print(f"{metric} {last} after {summary['minutes']} minutes, untrained {untrained}; {out}: weights.pt, "
-          "metrics.json, images/")
+    first, final = ("none" if value is None else f"{value:.4g}" for value in (untrained, last))
+    print(f"{metric} {final} after {summary['minutes']} minutes, untrained {first}; {out}: weights.pt, metrics.json, "
+          "images/")
 
 
 def replace(path: pathlib.Path, write: Callable[[pathlib.Path], Any]) -> None:

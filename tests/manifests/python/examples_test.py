@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 import os
 import pathlib
 import re
@@ -448,7 +449,7 @@ def test_flows_of_ids_that_two_have_are_not_written(two_shards, tmp_path, monkey
     assert not (tmp_path / "predictions.npz").exists()
 
 
-def test_minutes_are_those_of_the_steps(tmp_path, monkeypatch):
+def test_minutes_are_those_of_the_steps(tmp_path, monkeypatch, capsys):
     """A step takes 10 seconds, a check 1000: 6 steps are a minute, however long the checks and wherever it is broken
     off."""
     monkeypatch.syspath_prepend(str(EXAMPLES))
@@ -464,7 +465,7 @@ def test_minutes_are_those_of_the_steps(tmp_path, monkeypatch):
 
     def check():
         clock[0] += 1000
-        return {"score": 0.5}
+        return {"score": 2 / 3 if clock[0] < 4000 else math.nan}
 
     def fit(minutes):
         args = argparse.Namespace(out=str(tmp_path), device="cpu", seed=0, every=1, epochs=None, steps=None,
@@ -474,7 +475,9 @@ def test_minutes_are_those_of_the_steps(tmp_path, monkeypatch):
         return [(row["step"], row["minutes"]) for row in history(tmp_path)]
 
     assert fit(1.0) == [(0, 0), (4, 0.67), (6, 1)]
+    assert "\nscore 0.6667 after 1.0 minutes, untrained 0.6667; " in capsys.readouterr().out
     assert fit(2.0)[3:] == [(10, 1.67), (12, 2)]
+    assert "\nscore none after 2.0 minutes, untrained 0.6667; " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("damaged", [lambda whole: whole[:len(whole) // 2], lambda _: b"", lambda _: b"hello\n",
