@@ -41,7 +41,7 @@ from .flow_scores import flow_scores
 from .pose_scores import Persons, pose_scores, read_persons
 from .open_shards import PathLike, open_shard
 from .shards import Shards
-from .words import did_you_mean, listed
+from .words import counted, did_you_mean, listed
 
 IMAGES = 12  # samples to draw
 PAPER_COLUMNS = {"precision": "precision", "recall_easy": "easy recall", "recall_hard": "hard recall",
@@ -431,9 +431,10 @@ def pose_tables(result: Mapping[str, Any]) -> str:
     counts = result["counts"]
     hidden = (f"{counts['hidden']} hidden ones also scored" if result["settings"]["hidden"]
               else f"{counts['hidden']} hidden")
-    first = (f"{counts['persons']} persons, {counts['not_found']} of them not found; joints left out: "
-             f"{counts['not_annotated']} not annotated, {hidden}; PCKh leaves out {counts['without_head']} persons "
-             f"without annotated head or shoulders, MPII's {counts['without_head_box']} without a head box")
+    first = (f"{counted(counts['persons'], 'person')}, {counts['not_found']} of them not found; joints left out: "
+             f"{counts['not_annotated']} not annotated, {hidden}; PCKh leaves out "
+             f"{counted(counts['without_head'], 'person')} without annotated head or shoulders, MPII's "
+             f"{counts['without_head_box']} without a head box")
     return first + "\n\n" + table("", result["joints"],
                                   {"scored": "scored", "left_out": "left out", "mpjpe_volume": "MPJPE, volume px",
                                    "mpjpe_source": "MPJPE, source px", "pckh": "PCKh@0.5",

@@ -38,6 +38,11 @@ def path_of(path: Any, what: str) -> str:
     return os.fsdecode(path)
 
 
+def counted(number: int, one: str) -> str:
+    """ "1 person", "2 persons"."""
+    return f"{number} {one}{'s' * (number != 1)}"
+
+
 def first_of(texts: Iterable[str], most: int = 5) -> str:
     """ "a, b, ...": so many of them, and whether there are more."""
     texts = list(texts)

@@ -23,6 +23,7 @@ import numpy as np
 import training
 import eventgan
 from eventgan.torch import EventAugmentation, FrameAugmentation, FramePairs
+from eventgan.words import counted
 from train_torchvision import train
 
 GAPS = (1, 3)  # frames
@@ -118,7 +119,8 @@ def main() -> None:
         raise SystemExit(f"expected images with boxes of {args.classes or 'some class'}, got {len(parts[0])} for "
                          f"training and {len(parts[1])} for "
                          f"validation, with {', '.join(counts) or 'no boxes'}, in {args.data}")
-    print(f"{len(parts[0])} images for training, {len(parts[1])} for validation, of {len(folders)} folders")
+    print(f"{counted(len(parts[0]), 'image')} for training, {len(parts[1])} for validation, of "
+          f"{counted(len(folders), 'folder')}")
     try:
         generator = eventgan.Generator(args.weights, precision=args.precision, size=tuple(args.size), fit="letterbox")
     except (ImportError, ValueError, FileNotFoundError) as error:

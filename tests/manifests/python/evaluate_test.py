@@ -768,6 +768,8 @@ def test_the_command_prints_tables_json_and_images(folder, tmp_path):
     poses = write(tmp_path / "poses.json", [])
     # of the others all joints are hidden
     assert "3 persons, 1 of them not found" in evaluate("poses", poses, "--truth", folder)
+    (tmp_path / "alone.txt").write_text("000004\n")
+    assert "1 person, " in evaluate("poses", poses, "--truth", folder, "--ids", tmp_path / "alone.txt")
     assert "nowhere" in evaluate("detections", poses, "--truth", tmp_path / "nowhere", expect=1)
     for more, error in ((("--split", "val"), "expected a split of train, got 'val'"),
                         (("--dataset", "mpii"), "('kitti_object'), got 1 that it does not"),

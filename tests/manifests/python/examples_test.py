@@ -339,7 +339,7 @@ def test_faster_rcnn_learns_on_the_fly(tmp_path):
     options = ["--weights", "untrained:4", "--size", "64", "96", "--batch", "4", "--regions", "8", "--images", "1",
                "--workers", "1", "--epochs", "1"]
     said = train("train_on_the_fly", tmp_path, tmp_path / "out", *options)
-    assert "8 images for training, 2 for validation, of 1 folders" in said and "input 96x64, classes car" in said
+    assert "8 images for training, 2 for validation, of 1 folder\n" in said and "input 96x64, classes car" in said
     assert_trained(tmp_path / "out", [0, 2], images=1)
     assert "AP50 car" in history(tmp_path / "out")[1] and "predictions" not in said
     said = train("train_on_the_fly", tmp_path, tmp_path / "out", *options, "--classes", "bus", expect=1)
