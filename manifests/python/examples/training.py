@@ -277,8 +277,8 @@ def tuned_on(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]]
         sys.exit(f"expected labelled samples to tune on, got none, in {args.tune}")
     both = sorted({*shards.column("next_path")} & {*tested_shards.column("next_path")})
     if both:
-        print(f"warning: what is found in {both[0]}{' and others' * (len(both) > 1)} says nothing of other recordings: "
-              f"it is in {args.tune}, too", file=sys.stderr)
+        print(f"warning: --tune and {'--test' if args.test else '--data'} share {both[0]}"
+              f"{' and others' * (len(both) > 1)}: the score says nothing of other recordings", file=sys.stderr)
     return shards.changed(labelled_frame) if args.frames else shards
 
 
