@@ -209,8 +209,8 @@ class Formats(Export):
     def test_yolo_full_scale(self):
         self.export("yolo", "--split", "val", "--full-scale", "4")
         beyond = sum(sample["volume"].max() > 4 for sample in of("val").values())
-        counted = self.described()["left_out"].get("samples with values above the full scale, cut to it (--full-scale)", 0)
-        self.assertEqual(counted, beyond)
+        why = "samples with values above the full scale, cut to it (--full-scale)"
+        self.assertEqual(self.described()["left_out"].get(why, 0), beyond)
         for key, sample in of("val").items():
             codes = np.load(self.out / "images" / "val" / f"{name_of(key)}.npy")
             values = np.minimum(sample["volume"].astype(float), 4)

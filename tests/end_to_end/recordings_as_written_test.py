@@ -200,7 +200,7 @@ class AsWritten(program.InFolder):
             (folder / f"{name}.txt").write_text("0 0.5 0.5 0.25 0.5\n")
         size = f"{WIDTH}x{HEIGHT}"
         told, warned = run("convert", folder, "--output", self.out, "--sensor", size)
-        self.assertIn("boxes: 2 0\n", told)
+        self.assertIn("boxes: 2 of class 0\n", told)
         for text in (told, warned):
             self.assertIn("1 recording without events (1 empty event volume): ", text)
         volumes = [volume for _, valid, _, volume in self.samples() if valid]

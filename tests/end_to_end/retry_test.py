@@ -272,7 +272,7 @@ class UnknownSizes(program.InFolder):
         for path in bad:
             path.write_bytes(b"version https://git-lfs.github.com/spec/v1\n")
         text, _ = run("plan", manifest)
-        self.assertIn("without knowing the size of 3 samples", text)
+        self.assertIn("no known size, of 3 samples", text)
         text, _ = run("convert", manifest, "--output", out)
         self.assertIn("1 note on the inputs", text)
         self.assertIn("without knowing the size of 3 samples", text)
