@@ -262,7 +262,8 @@ std::vector<RealismScores> real_scores(const RealPart& part, const JobManifest& 
     frames.next = resized(frames.next, own_shape.size);
     std::vector<float> generated(own_shape.value_count());
     const PreparedPair pair{network_input(frames), own_shape.size, 0, 0, place(own_shape.size, {})};
-    const PairKey key{job.seed, part.recording.name(), std::to_string(i)};
+    const std::string id = std::to_string(i), name = part.recording.name();
+    const PairKey key{job.seed, name, id};
     // a recording has no labels
     generate_volume(*loaded.generator, job.generator, key, pair, {}, generated);
     add_pair_noise(job.generator, key, frames.duration_s, own_shape, generated);

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <utility>
 
+#include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/small_job.h"
@@ -126,6 +127,41 @@ TEST(MeasureTradeoff, ScoresAgainstACamera) {
   const auto& scores = report.trials.front().real;
   EXPECT_THAT(scores, ElementsAre(::testing::Key("fast.hdf5"), ::testing::Key("slow.hdf5")));
   EXPECT_NE(scores.at("fast.hdf5").f1_raw, scores.at("slow.hdf5").f1_raw);
+}
+
+/// A job by weights that know their sensor, of this threshold.
+JobManifest sensor_job(const testing::TemporaryFolder& folder, double threshold) {
+  std::string text = testing::make_small_job(folder, 5).text;
+  const std::string before = R"("weights": "untrained:1")";
+  text.replace(text.find(before), before.size(),
+               R"("weights": "shipped:sensor", "sensor": { "threshold": [)" +
+                   std::to_string(threshold) + ", " + std::to_string(threshold) + "] }");
+  return parse_job_manifest(text, folder.path(), "manifest.json");
+}
+
+TEST(MeasureTradeoff, VolumesOfACameraAreMadeByTheSensorThatTheJobTells) {
+  const testing::TemporaryFolder folder;
+  std::vector<double> events;
+  for (const double threshold : {0.15, 0.15, 0.6}) {
+    const JobManifest manifest = sensor_job(folder, threshold);
+    TradeoffOptions options = small_options();
+    options.axes = {{GeneratorKind::kNetwork},
+                    {"shipped:16", "shipped:sensor"},
+                    {Precision::kFloat32},
+                    {1},
+                    {StoredType::kFloat16}};
+    options.rounds = 1;
+    options.real.push_back(
+        std::make_unique<testing::FakeRecording>(testing::moving_bar_recording({16, 20}, 9, 2)));
+    const TradeoffReport report = measure_tradeoff(manifest, options);
+    EXPECT_EQ(report.reference.weights, "shipped:sensor") << "the only one that the sensor fits";
+    ASSERT_EQ(report.trials.size(), 1u);
+    EXPECT_THAT(report.refused, ::testing::SizeIs(1));
+    EXPECT_LT(report.trials[0].losses.front().relative_l2, 0.01) << "rates against rates";
+    events.push_back(report.trials[0].real.begin()->second.events_per_pixel);
+  }
+  EXPECT_EQ(events[0], events[1]);
+  EXPECT_GT(events[0], events[2]);
 }
 
 TEST(DefaultAxes, AreAtMostTenConfigurations) {
