@@ -18,6 +18,7 @@
 #include "stages/base/hdf5/hdf5.h"
 #include "stages/base/processor/processor.h"
 #include "stages/base/videos/video_file.h"
+#include "stages/frames/decoding/cut_out.h"
 
 namespace eventgan {
 namespace {
@@ -206,6 +207,12 @@ std::map<std::string, std::string> make_fingerprint(
       {"program", program_version()}};
   if (turns_images(manifest, plan)) {
     fingerprint["orientation"] = "upright, by " + loaded_library("libexif");
+  }
+  const auto moves_objects = [](const SourceSpec& source) {
+    return source.pairs.stills && source.pairs.stills->objects;
+  };
+  if (std::ranges::any_of(manifest.sources, moves_objects)) {
+    fingerprint["cut_out"] = kCutOutMethod;
   }
   for (const auto& [path, value] : manifest_fields(manifest.text))
     fingerprint["manifest " + path] = value;

@@ -8,6 +8,9 @@
 
 namespace eventgan {
 
+/// Of a plan's fingerprint: another one wherever other pixels would be cut out.
+inline constexpr const char* kCutOutMethod = "GrabCut, 48 px and a tenth around";
+
 /// How objects are cut out; other values are for those who measure (cut_out_benchmark.cc).
 struct CutOutSpec {
   int side_px = 48;    ///< of the box's longer side in the copy that is cut; smaller ones are kept

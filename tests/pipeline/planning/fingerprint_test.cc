@@ -80,6 +80,13 @@ TEST_F(Fingerprint, HasFfmpegWhereFramesComeFromVideos) {
   EXPECT_THAT(make().at("libraries"), ::testing::ContainsRegex(", FFmpeg [0-9]+\\.[0-9]+"));
 }
 
+TEST_F(Fingerprint, HasHowObjectsAreCutOutWhereTheyMove) {
+  manifest_.sources[0].pairs.stills.emplace();
+  EXPECT_FALSE(make().contains("cut_out"));
+  manifest_.sources[0].pairs.stills->objects.emplace();
+  EXPECT_TRUE(make().contains("cut_out"));
+}
+
 // Labels may name frames beyond a video's end, and be corrected.
 TEST_F(Fingerprint, HasNoOrientationOfVideosWhateverTheirLabelsName) {
   manifest_.sources[0].dataset = DatasetKind::kFrames;
