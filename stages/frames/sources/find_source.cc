@@ -59,6 +59,17 @@ bool is_simulated(const Place& place) {
   });
 }
 
+/// With what lies beside it; of some layouts several.
+std::vector<FoundSource> source_of(const Place& place) {
+  FoundSource found;
+  found.dataset = place.dataset;
+  found.layout = place.layout->word;
+  found.title = place.title();
+  found.root = place.root;
+  if (place.layout->complete) return place.layout->complete(std::move(found));
+  return {std::move(found)};
+}
+
 std::optional<Place> look_around(const fs::path& path, std::optional<DatasetKind> dataset) {
   if (auto found = look_at(path, dataset, /*own_too=*/false)) return found;
   std::vector<std::string> folders = look_into(path).folders;
@@ -68,11 +79,12 @@ std::optional<Place> look_around(const fs::path& path, std::optional<DatasetKind
     for (const std::string& name : folders) {
       if (const auto found = look_at(path / name, dataset, own_too)) below.push_back(*found);
     }
-    // Beside KITTI object it is where that finds more paired frames.
-    const bool has_object =
-        std::ranges::find(below, DatasetKind::kKittiObject, &Place::dataset) != below.end();
+    // Where KITTI object takes paired frames from.
+    const bool is_part = std::ranges::any_of(below, [](const Place& place) {
+      return place.dataset == DatasetKind::kKittiObject && source_of(place).front().raw_root;
+    });
     std::erase_if(below, [&](const Place& place) {
-      return has_object && place.dataset == DatasetKind::kKittiRaw;
+      return is_part && place.dataset == DatasetKind::kKittiRaw;
     });
     return below;
   };
@@ -290,17 +302,7 @@ std::vector<FoundSource> find_sources(const fs::path& path, std::optional<Datase
                      ", got " + std::string(other ? other->word() : "none of these") + ", in " +
                      path.string() + (other || dataset ? "" : deeper_data(root)));
   }
-  FoundSource found;
-  found.dataset = place->dataset;
-  found.layout = place->layout->word;
-  found.title = place->title();
-  found.root = place->root;
-  std::vector<FoundSource> sources;
-  if (place->layout->complete) {
-    sources = place->layout->complete(std::move(found));
-  } else {
-    sources.push_back(std::move(found));
-  }
+  std::vector<FoundSource> sources = source_of(*place);
   if (is_own(place->dataset)) note_dataset_above(sources.front());
   return sources;
 }

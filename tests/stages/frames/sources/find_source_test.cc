@@ -68,7 +68,10 @@ TEST_F(FindSource, KittiRawAndTheDevkitLieBesideKittiObject) {
   EXPECT_EQ(find("data/kitti").raw_root, at("data")) << "the days themselves";
   touch({"all/training/label_2/000000.txt",
          "all/raw/2011_09_26/2011_09_26_drive_0001_sync/image_02/data/0000000000.png"});
-  EXPECT_EQ(find("all").root, at("all/training")) << "raw is a part of it";
+  EXPECT_THROWS(find("all"), InputError, "expected one dataset, got 2: raw (kitti_raw), training");
+  write("all/devkit/mapping/train_mapping.txt");
+  EXPECT_EQ(find("all").root, at("all/training"));
+  EXPECT_EQ(find("all").raw_root, at("all/raw"));
 }
 
 TEST_F(FindSource, AListOfPeopleIsKnownByItsContent) {
