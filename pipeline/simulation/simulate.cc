@@ -135,7 +135,7 @@ void require_raw_size(ImageSize frame, const std::string& path) {
 
 /// Opens every source's clip and leaves out the recordings that are there, or with `overwrite`
 /// makes sure that they are of this clip. Labels that are missing beside a still's recording are
-/// written. Clips and stills with a fault are left out and added to `faults`.
+/// written. Clips that cannot be opened and stills with a fault are left out and added to `faults`.
 std::vector<SourceWork> plan_work(const SimulationManifest& manifest, const fs::path& folder,
                                   bool overwrite, std::vector<std::string>& kept,
                                   std::vector<std::string>& faults) {
@@ -149,8 +149,8 @@ std::vector<SourceWork> plan_work(const SimulationManifest& manifest, const fs::
     kept.push_back(recording.name);
     return false;
   };
-  const auto plan_stills = [&](const SimulationSource& source) {
-    const auto stills = std::make_shared<const StillScenes>(source, manifest);
+  const auto plan_stills = [&](const SimulationSource& source,
+                               const std::shared_ptr<const StillScenes>& stills) {
     for (PlannedRecording& recording : plan_recordings(manifest, source, *stills, folder, faults)) {
       const std::int64_t position = recording.image.value();
       const bool to_do = is_to_do(recording);
@@ -173,20 +173,27 @@ std::vector<SourceWork> plan_work(const SimulationManifest& manifest, const fs::
       works.back().to_do.push_back(std::move(recording));
     }
   };
-  const auto plan_clip = [&](const SimulationSource& source) {
-    SourceWork work{&source, std::make_unique<ClipFrames>(source, manifest), nullptr, {}, {}};
+  for (const SimulationSource& source : manifest.sources) {
+    SourceWork work{&source, nullptr, nullptr, {}, {}};
+    try {
+      if (source.method.motion == SimulationMethod::kStills) {
+        work.stills = std::make_shared<const StillScenes>(source, manifest);
+      } else {
+        work.clip = std::make_unique<ClipFrames>(source, manifest);
+      }
+    } catch (const InputError& error) {  // the others are made
+      faults.push_back(error.what());
+      continue;
+    }
+    if (work.stills) {
+      plan_stills(source, work.stills);
+      continue;
+    }
     for (PlannedRecording& recording : plan_recordings(manifest, source, *work.clip, folder)) {
       if (is_to_do(recording)) work.to_do.push_back(std::move(recording));
     }
     if (any_size && !work.to_do.empty()) require_raw_size(work.clip->frame(0).size, source.path);
     works.push_back(std::move(work));
-  };
-  for (const SimulationSource& source : manifest.sources) {
-    try {
-      source.method.motion == SimulationMethod::kStills ? plan_stills(source) : plan_clip(source);
-    } catch (const InputError& error) {  // the others are made
-      faults.push_back(error.what());
-    }
   }
   return works;
 }
