@@ -207,11 +207,6 @@ class Sensitivity {
 /// Beyond this share of the threshold another past of the scene is worth a warning.
 constexpr double kMostOfThePast = 0.1;
 
-bool is_at_end(double threshold, const ThresholdRange& range) {
-  constexpr double kNear = 1.01;
-  return threshold <= range.lowest * kNear || threshold >= range.highest / kNear;
-}
-
 double event_sum(const std::vector<PolarityCounts>& counts) {
   double sum = 0;
   for (const auto& [positive, negative] : counts) sum += positive + negative;

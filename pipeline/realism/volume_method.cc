@@ -6,7 +6,6 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
-#include <string_view>
 #include <utility>
 
 #include "manifests/files/sha256.h"
@@ -23,6 +22,11 @@
 #include "stages/generator/weights_file.h"
 
 namespace eventgan {
+bool is_at_end(double threshold, const ThresholdRange& range) {
+  constexpr double kNear = 1.01;
+  return threshold <= range.lowest * kNear || threshold >= range.highest / kNear;
+}
+
 namespace {
 
 std::vector<float> network_volume(const Generator& generator, const IntervalFrames& frames,
@@ -42,13 +46,14 @@ CounterRandom draw_random(const std::string& method, const FrameInterval& interv
       .keyed(std::to_string(draw));
 }
 
-std::string threshold_text(const ContrastThreshold& threshold, bool fitted, double log_epsilon) {
-  constexpr double kNear = 1.001;
-  const bool is_at_end = threshold.mean < kNear * kLeastFittedThreshold ||
-                         threshold.mean * kNear > kMostFittedThreshold;
-  const std::string_view how = !fitted     ? ""
-                               : is_at_end ? " (none of 0.01..5 makes as many events)"
-                                           : " (fitted)";
+std::string threshold_text(const ContrastThreshold& threshold, bool fitted,
+                           const ThresholdRange& range, double log_epsilon) {
+  const std::string how =
+      !fitted ? ""
+      : is_at_end(threshold.positive(), range) || is_at_end(threshold.negative(), range)
+          ? fmt::format(" (none of {:.4g}..{:.4g} makes as many events)", range.lowest,
+                        range.highest)
+          : " (fitted)";
   const std::string text = fmt::format("contrast threshold {:.4g}{} of ln(u/255 + {:.4g})",
                                        threshold.mean, how, log_epsilon);
   if (threshold.ratio == 1) return text;
@@ -69,8 +74,10 @@ class NetworkMethod final : public VolumeMethod {
   std::string settings() const override {
     const std::string text = "weights " + weights_;
     if (!threshold_) return text;
-    return fmt::format("{}, {}, mean of {} draws of events", text,
-                       threshold_text(*threshold_, fitted_, kFrameLogEpsilon), draws());
+    return fmt::format(
+        "{}, {}, mean of {} draws of events", text,
+        threshold_text(*threshold_, fitted_, generator_->thresholds().value(), kFrameLogEpsilon),
+        draws());
   }
   int draws() const override { return threshold_ ? 5 : 1; }
 
@@ -131,8 +138,9 @@ class SimulatedMethod final : public VolumeMethod {
 
   std::string settings() const override {
     const double positive = sensor_.positive_threshold, negative = sensor_.negative_threshold;
-    const std::string text = threshold_text({std::sqrt(positive * negative), negative / positive},
-                                            fitted_, sensor_.log_epsilon);
+    const std::string text =
+        threshold_text({std::sqrt(positive * negative), negative / positive}, fitted_,
+                       {kLeastFittedThreshold, kMostFittedThreshold}, sensor_.log_epsilon);
     return scene_.draws == 1 ? text : fmt::format("{}, mean of {} motions", text, scene_.draws);
   }
 

@@ -85,6 +85,10 @@ std::vector<PolarityCounts> made_events(const Generator& generator,
 inline constexpr double kLeastFittedThreshold = 0.01;
 inline constexpr double kMostFittedThreshold = 5;
 
+/// Whether a threshold that was looked for in a range is where the range ends, within 1 %: none in
+/// it fits.
+bool is_at_end(double threshold, const ThresholdRange& range);
+
 /// The threshold in 0.01..5 with which made(threshold) events are as many as wanted, within 0.5 %
 /// or as near as it gets: by bisection, since a higher threshold makes fewer events.
 double fitted_threshold(double wanted, const std::function<double(double threshold)>& made);
