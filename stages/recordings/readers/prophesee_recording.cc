@@ -357,8 +357,9 @@ class PropheseeEvents final : public EventParts {
     EventIndexes* const indexes = EventIndexes::current();
     std::string key = std::move(index_key);
     if (!key.empty()) {
+      constexpr int kVersion = 2;  // of WordState
       key += fmt::format(" {} {} {} {} {}", to_string(size), static_cast<int>(encoding), first_byte,
-                         shifts, sizeof(DecodingStart));
+                         shifts, kVersion);
     }
     if (indexes != nullptr && !key.empty() && restore(indexes->find(key).value_or(""))) return;
     DecodingStart start{first_byte, {}};

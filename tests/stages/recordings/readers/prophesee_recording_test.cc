@@ -298,6 +298,16 @@ TEST_F(PropheseeTest, OneDamagedTimeIsNoWrapAndIsSaid) {
       kEvt2Header + words<std::uint32_t>({evt2_high(7), evt2(0, 1, 1, 1), evt2_high(0xf000007),
                                           evt2(0, 1, 1, 1), evt2_high(8), evt2(0, 1, 1, 1)}),
       512e-6);
+  // EVT 3.0's counter is of 4096 µs, half of its range 8.4 s: a 32nd of that is 64 counts.
+  for (const int later : {63, 64}) {
+    const auto recording =
+        open(kEvt3Header +
+             words<std::uint16_t>({evt3(kY, 0), evt3(kHigh, 100), evt3(kX, 1), evt3(kHigh, 4000),
+                                   evt3(kX, 1), evt3(kHigh, 100 + later), evt3(kX, 1)}));
+    EXPECT_EQ(recording->notes().size(), later == 63 ? 1u : 0u);
+    EXPECT_EQ(recording->event_span()->at(1),
+              later == 63 ? 4000 * 4096e-6 : (100 + later + 4096) * 4096e-6);
+  }
 }
 
 // What comes after it has its own times, not those of the next range.
