@@ -32,7 +32,7 @@ LabelLosses losses_of(const Annotation& annotation);
 struct InputCounts {
   LabelLosses losses;
   std::int64_t same_images = 0;    ///< pairs of the same image twice
-  std::int64_t empty_volumes = 0;  ///< without any event
+  std::int64_t empty_volumes = 0;  ///< without any event, of other pairs
   OutlineCounts outlines;          ///< of objects that move on their own
 
   /// Those of samples behind these: the first reasons are those of the sum.

@@ -44,8 +44,7 @@ std::int64_t volume_bytes(const JobManifest& manifest, const PlannedShard& shard
 /// A folder in which all is well is not touched.
 void record_place(const fs::path& folder, const JobManifest& manifest,
                   const ConversionOptions& options) {
-  const auto recorded = recorded_manifest_folder(folder);
-  if (recorded && recorded->lexically_normal() == manifest.directory.lexically_normal()) return;
+  if (recorded_manifest_folder(folder) == manifest.directory) return;
   const fs::path record = folder / "run.json";
   if (fs::exists(record)) {
     tell(options.note, record.string() + ": the manifest is now in " + manifest.directory.string());

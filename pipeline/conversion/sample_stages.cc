@@ -54,7 +54,7 @@ void free_memory(std::vector<T>& values) {
 }  // namespace
 
 InputCounts SampleMessage::input_counts() const {
-  const bool is_empty = (sample.statistics.flags & kFlagEmpty) != 0;
+  const bool is_empty = !same_image && (sample.statistics.flags & kFlagEmpty) != 0;
   return {losses_of(sample.annotation), same_image, is_empty, outlines};
 }
 

@@ -11,11 +11,11 @@ using ::testing::IsEmpty;
 
 TEST(InputCounts, AreToldByKindAndTheFirstReasonsNamed) {
   InputCounts counts;
-  counts += {losses_of({})};
+  counts += {losses_of({}), 0, 0, {}};
   EXPECT_THAT(counts.notes(), IsEmpty());
   Annotation annotation;
   annotation.outlines_mended = {"no area, in a.json (annotation 4)"};
-  counts += {losses_of(annotation)};
+  counts += {losses_of(annotation), 0, 0, {}};
   EXPECT_THAT(counts.notes(),
               ElementsAre("1 outline of labels taken without some of its parts: no area, in a.json "
                           "(annotation 4)"));
