@@ -367,8 +367,7 @@ def evaluate_flows(predictions: PathLike, samples: Samples) -> tuple[dict[str, A
         if "flow" not in sample or not sample["flow_valid"].any():
             continue
         if name in labelled:
-            raise ValueError(f"expected samples with ids of their own, got {_brief(name)}, which two samples have, in "
-                             f"{predictions}")
+            raise ValueError(f"expected samples with ids of their own, got {_brief(name)}, which two samples have")
         labelled[name] = i
     if not labelled:
         raise ValueError('expected samples with flow ("flow": true in their source), got none')

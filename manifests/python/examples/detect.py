@@ -51,8 +51,10 @@ def columns(events):
     wrong = p[~np.isin(p, (1, 0, -1, 2**8 - 1, 2**16 - 1, 2**32 - 1))]  # the last three: -1 of an unsigned type
     if len(wrong):
         raise ValueError(f"expected polarities -1 and 1 or 0 and 1, got {wrong[0]}")
+    if (p == 0).any() and not np.isin(p, (0, 1)).all():
+        raise ValueError("expected polarities -1 and 1 or 0 and 1, got both")
     t = np.rint(t * 1e6 if t.dtype.kind == "f" else t)
-    return (*(each.astype(int) for each in (t, x, y, p == 1)),)
+    return tuple(each.astype(int) for each in (t, x, y, p == 1))
 
 
 def read(path):

@@ -390,6 +390,7 @@ def main() -> None:
     if len(positions) > 1:
         raise SystemExit(f"expected flow at the pixels of the next image, or of the previous one (side), got both, in "
                          f"{args.data}")
+    training.require_own_ids(args, test_shards[[*with_flow(test_shards)]])
     position = positions.pop()
     network = FlowNetwork(len(items[0]["volume"]), position)
     training.load_fitting(network, args.pretrained)

@@ -37,8 +37,8 @@ MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", 
               "test", "as_bright", "without_noise"}  # when a run goes on
 
 LEAST = {"epochs": 1, "steps": 1, "every": 1, "batch": 1, "threads": 0, "workers": 0, "images": 0, "rotation": 0}
-# Above 0, finite; an input with 16 times a camera's sides has 256 times its pixels, and the memory holds few.
-MOST = {"minutes": sys.float_info.max, "lr": sys.float_info.max, "sigma": sys.float_info.max, "scale": 16.0}
+ABOVE_0 = ("minutes", "lr", "sigma", "scale")
+MOST_SCALE = 16  # 256 times a camera's pixels
 TUNING_STEPS, TUNING_RATE = 200, 0.25  # the latter a share of the learning rate
 
 
@@ -97,11 +97,12 @@ def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
     for name, least in LEAST.items():
         if name in given and not least <= given[name] < math.inf:
             sys.exit(f"expected --{name} of at least {least}, got {given[name]}")
-    for name, most in MOST.items():
-        if name in given and not 0 < given[name] <= most:
-            also = f"at most {most:g}" if name == "scale" else "finite"
-            sys.exit(f"expected --{name} above 0 and {also}, got {given[name]:g}")
-    classes = (given.get("classes") or "").split(",")
+    for name in ABOVE_0:
+        if name in given and not 0 < given[name] < math.inf:
+            sys.exit(f"expected --{name} above 0 and finite, got {given[name]:g}")
+    if given.get("scale", 1) > MOST_SCALE:
+        sys.exit(f"expected --scale of at most {MOST_SCALE}, got {given['scale']:g}")
+    classes = [name for name in (given.get("classes") or "").split(",") if name]
     twice = [name for name in classes if classes.count(name) > 1]
     if twice:
         sys.exit(f"expected different names in --classes, got {twice[0]} twice")
@@ -275,11 +276,15 @@ def tuned_on(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]]
         sys.exit(str(error))
     if not len(shards):
         sys.exit(f"expected labelled samples to tune on, got none, in {args.tune}")
-    both = sorted({*shards.column("next_path")} & {*tested_shards.column("next_path")})
+    both = sorted({*_frames(shards)} & {*_frames(tested_shards)})
     if both:
         print(f"warning: --tune and {'--test' if args.test else '--data'} share {both[0]}"
               f"{' and others' * (len(both) > 1)}: the score says nothing of other recordings", file=sys.stderr)
     return shards.changed(labelled_frame) if args.frames else shards
+
+
+def _frames(shards: Shards) -> list[str]:
+    return [frame_path(shards.sample(i, {"pair"})) for i in range(len(shards))]
 
 
 def untuned(args: argparse.Namespace) -> argparse.Namespace:
@@ -344,7 +349,8 @@ def frame_path(sample: Sample, side: str = "next") -> str:
     folder = pathlib.Path(sample["shard"]).parent
     try:
         run = json.loads((folder / "run.json").read_bytes())
-        folder /= run.get("manifest_folder") or os.fsdecode(bytes(run["manifest_folder_bytes"]))
+        named = pathlib.Path(run.get("manifest_folder") or os.fsdecode(bytes(run["manifest_folder_bytes"])))
+        folder = named if named.is_absolute() else folder
     except (OSError, ValueError, LookupError, TypeError, AttributeError):
         pass
     return str(folder / sample["pair"][f"{side}_path"])
@@ -541,9 +547,18 @@ def box_predictions(item: dict, found: tuple[torch.Tensor, torch.Tensor, torch.T
             for box, label, score in zip(boxes.tolist(), labels, scores.tolist())]
 
 
+def require_own_ids(args: argparse.Namespace, shards: Shards) -> None:
+    """Ends the program where two of the samples share an id, by which predictions.npz has what was found."""
+    names = shards.column("sample_id").tolist()
+    twice = [name for name in names if names.count(name) > 1] if len(set(names)) < len(names) else []
+    if twice:
+        sys.exit(f"expected samples with ids of their own, got {twice[0]!r}, which two samples have, in "
+                 f"{args.test or args.data}")
+
+
 def write_predictions(args: argparse.Namespace, shards: Shards, entries: Iterable, what: str = "detections") -> None:
     """predictions.json of the samples, ids.txt, which names these, and the line that scores them. `entries`: objects;
-    of "flows" the samples' ids, which no two may share, with flow [2, H, W], for predictions.npz."""
+    of "flows" the samples' ids with flow [2, H, W], for predictions.npz."""
     def write(path: pathlib.Path) -> None:
         with torch.no_grad(), open(path, "wb") as file:
             if what == "flows":
@@ -553,10 +568,6 @@ def write_predictions(args: argparse.Namespace, shards: Shards, entries: Iterabl
 
     name = "predictions.npz" if what == "flows" else "predictions.json"
     names = shards.column("sample_id").tolist()
-    if what == "flows" and len(set(names)) < len(names):
-        twice = next(each for each in names if names.count(each) > 1)
-        sys.exit(f"expected samples with ids of their own, got {twice!r}, which two samples have, in "
-                 f"{args.test or args.data}")
     ids = "".join(f"{each}\n" for each in names)
     replace(pathlib.Path(args.out, name), write)
     replace(pathlib.Path(args.out, "ids.txt"), lambda path: path.write_text(ids, encoding="utf-8"))

@@ -749,7 +749,7 @@ def test_flows_of_a_folder(folder, tmp_path):
 
 def test_flows_of_ids_that_two_have_are_refused(two_shards, tmp_path):
     np.savez(tmp_path / "found.npz", **{"000004": np.zeros((2, 6, 8))})
-    with pytest.raises(ValueError, match='ids of their own, got "000004", which two samples have, in .*found.npz'):
+    with pytest.raises(ValueError, match='ids of their own, got "000004", which two samples have'):
         evaluate_flows(tmp_path / "found.npz", Samples(two_shards, None, None, None))
 
 
