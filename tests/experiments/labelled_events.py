@@ -153,9 +153,12 @@ LAYERS = {
     "EventGAN 16, layers, rests 0": Source(SHIPPED[16], layers=True, rests=0),
     "ESIM, layers, rests 0": Source({"kind": "esim"}, layers=True, rests=0),
 }
-SOURCES = METHODS | SENSORS | LAYERS | {
-    "EventGAN 8, layers, rests 0": Source(SHIPPED[8], layers=True, rests=0),         # as `--camera moves`
+OF_TASKS = {  # but persons
+    "EventGAN 8, layers, rests 0": Source(SHIPPED[8], layers=True, rests=0),        # as `--camera moves`
     "EventGAN 8, layers, rests 0.25": Source(SHIPPED[8], layers=True, rests=0.25),  # as `--camera both`
+    "EventGAN 8, layers, motion": Source({**SHIPPED[8], "scope": "motion"}, layers=True),
+}
+SOURCES = METHODS | SENSORS | LAYERS | OF_TASKS | {
     "EventGAN 16, finer": Source(SHIPPED[16], finer=2),
     "EventGAN 16, eta98": Source(SHIPPED[16], normalize="eta98"),
     "difference, eta98": Source({"kind": "difference"}, normalize="eta98"),
@@ -165,7 +168,6 @@ SOURCES = METHODS | SENSORS | LAYERS | {
     "EventGAN 8, bfloat16": Source({**SHIPPED[8], "precision": "bfloat16"}),
     "EventGAN 8, int8": Source({**SHIPPED[8], "precision": "int8"}),
     "EventGAN 16, motion": Source({**SHIPPED[16], "scope": "motion"}),
-    "EventGAN 8, layers, motion": Source({**SHIPPED[8], "scope": "motion"}, layers=True),
     "EventGAN 16, 4 px": Source(SHIPPED[16], motion_px=4),
     "EventGAN 16, 16 px": Source(SHIPPED[16], motion_px=16),
     "EventGAN 16, 128x224": Source(SHIPPED[16], size=(128, 224)),

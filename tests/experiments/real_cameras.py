@@ -38,7 +38,7 @@ import training
 from eventgan import Shards, drawing
 from eventgan.evaluate import Samples, evaluate_detections
 from eventgan.torch import EventAugmentation
-from labelled_events import LAYERS, METHODS, SENSORS, SOURCES, items_of
+from labelled_events import LAYERS, METHODS, OF_TASKS, SENSORS, SOURCES, items_of
 from labelled_recordings import (PERSON, SIZE, Item, Task, file_name, key_of, recordings_in, replace, test_items,
                                  windows_folder, windows_of)
 from torch import nn
@@ -171,7 +171,7 @@ def ablations() -> list[Row]:
               Row("polarities as they are", network, dataclasses.replace(FULL, invert=0.0)),
               Row("group norm", network, norm="group")]
     found += [Row(f"{count} images", network, images=count) for count in COUNTS]
-    found += [Row(name, (name,)) for name in SOURCES if name.startswith("EventGAN") and name not in METHODS]
+    found += [Row(name, (name,)) for name in SOURCES if name.startswith("EventGAN") and name not in METHODS | OF_TASKS]
     return found + [Row(f"{name}, volume", (f"{name}, eta98",), signed=False)
                     for name in ("EventGAN 16", "difference", "ESIM")]
 
@@ -492,6 +492,7 @@ def run(args: argparse.Namespace) -> None:
         draw(args, [row for row in drawn if row.windows == args.task.windows[-1]])
     else:
         first = {row.name.split(",")[0]: row for row in reversed(drawn)}
-        draw(args, [first[name] for name in ("EventGAN 16", "difference", "grey frames") if name in first])
+        shown = [first[name] for name in ("EventGAN 16", "difference", "grey frames") if name in first]
+        draw(args, shown or drawn[:3])
     if not args.task.methods:
         draw_curves(args, results, len(items_of(args, "EventGAN 16")))
