@@ -191,7 +191,7 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
   ManifestDraft draft = draft_manifest(sources, {folder, /*is_relative=*/false, "."}, wishes.draft);
   if (!draft.has_samples) {
     const char* const wanted = draft.needs_sensor
-                                   ? "--sensor WIDTHxHEIGHT, which the files do not give"
+                                   ? "--sensor WIDTHxHEIGHT, the size that no file gives"
                                : has_events(found.dataset) ? "a recording with windows of events"
                                                            : "labelled frames that make pairs";
     throw InputError(fmt::format(

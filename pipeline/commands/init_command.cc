@@ -63,8 +63,9 @@ std::vector<FoundSource> find_all(const std::vector<std::string>& where) {
   std::vector<FoundSource> found;
   for (std::size_t i = dataset ? 1 : 0; i < where.size(); ++i) {
     if (i == 0 && where.size() > 1 && !fs::exists(where[i])) {  // it may have been meant as a word
-      throw UsageError(fmt::format("DATASET or PATH: expected a dataset ({}) or a path that exists, got {}",
-                                   fmt::join(words, ", "), where[i]));
+      throw UsageError(
+          fmt::format("DATASET or PATH: expected a dataset ({}) or a path that exists, got {}",
+                      fmt::join(words, ", "), where[i]));
     }
     std::vector<FoundSource> here = find_sources(where[i], dataset);
     const std::string_view split = split_by_names ? split_named(where[i]) : "";

@@ -117,7 +117,8 @@ void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut
   // Normalised values end at 1; the statistics are of the values before that.
   const bool is_normalized = sample.reader.header().normalization == Normalization::kEta98;
   const double largest = is_normalized ? 1.0 : sample.labels.statistics.max;
-  if (largest > full_scale) ++left_out["samples with values above the full scale, cut to it (--full-scale)"];
+  if (largest > full_scale)
+    ++left_out["samples with values above the full scale, cut to it (--full-scale)"];
 }
 
 Outline shown_outline(const ShardSample& sample, const VolumeBox& box, ImageSize volume) {

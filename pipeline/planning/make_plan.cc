@@ -420,9 +420,9 @@ void note_unknown_sizes(Plan& plan) {
     const Unknown& unknown = sources[i];
     if (unknown.samples.empty()) continue;
     plan.sources[i].notes.push_back(
-        "no readable image, so no known size, of " +
-        count_text(std::ssize(unknown.samples), "sample") + " (" + some_of(unknown.samples, 5) +
-        "): quarantined in " + std::to_string(unknown.shards) +
+        count_text(std::ssize(unknown.samples), "sample") + " without a readable image (" +
+        some_of(unknown.samples, 5) + "), so of unknown size: quarantined in " +
+        std::to_string(unknown.shards) +
         (unknown.shards == 1 ? " shard of its own" : " shards of their own") +
         " until the images are mended and eventgan retry has run");
   }

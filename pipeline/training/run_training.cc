@@ -243,11 +243,10 @@ StepLosses TrainingRun::take_step(const std::vector<TrainingSample>& batch) {
   try {
     return trainer_.step(position_.phase, position_.step, batch);
   } catch (const UnsoundLoss&) {
-    const fs::path good = last_checkpoint(folder_.checkpoints());
     std::throw_with_nested(std::runtime_error(
         "training diverged in phase " + std::string(to_string(position_.phase)) + ", step " +
         std::to_string(position_.step) +
-        "; last good checkpoint: " + (good.empty() ? "none" : good.string()) +
+        "; last good checkpoint: " + last_checkpoint(folder_.checkpoints()).string() +
         " (try a lower learning rate with --overwrite, or other recordings in another folder)"));
   }
 }

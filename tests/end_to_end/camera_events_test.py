@@ -550,7 +550,7 @@ class WithoutFrames(program.InFolder):
         self.assertIn('// "sensor": { "width": 640, "height": 480 },', manifest.read_text())
         out = self.folder / "out"
         error = run("convert", self.folder / "camera.dat", "--output", out, expect=66)[1]
-        self.assertIn("expected --sensor WIDTHxHEIGHT, which the files do not give, got none", error)
+        self.assertIn("expected --sensor WIDTHxHEIGHT, the size that no file gives, got none", error)
         for wrong in ("640", "0x480", "640x", "640x480x2", "x480"):
             self.assertIn("--sensor: expected WIDTHxHEIGHT",
                           run("convert", self.folder / "camera.dat", "--sensor", wrong, expect=64)[1])

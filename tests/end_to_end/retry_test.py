@@ -272,13 +272,13 @@ class UnknownSizes(program.InFolder):
         for path in bad:
             path.write_bytes(b"version https://git-lfs.github.com/spec/v1\n")
         text, _ = run("plan", manifest)
-        self.assertIn("no known size, of 3 samples", text)
+        self.assertIn("3 samples without a readable image", text)
         text, _ = run("convert", manifest, "--output", out)
         self.assertIn("1 note on the inputs", text)
-        self.assertIn("without knowing the size of 3 samples", text)
-        self.assertIn("without knowing the size of 3 samples", run("status", out)[0])
+        self.assertIn("3 samples without a readable image", text)
+        self.assertIn("3 samples without a readable image", run("status", out)[0])
         text, _ = run("finalize", out)
-        self.assertIn("without knowing the size of 3 samples", text)
+        self.assertIn("3 samples without a readable image", text)
         notes = json.loads((out / "dataset.json").read_text())["sources"][0]["notes"]
         self.assertEqual(len(notes), 1)
         run("verify", out, "--deep")

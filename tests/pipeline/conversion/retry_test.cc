@@ -280,7 +280,7 @@ TEST_F(Retry, MendsASourceOfWhichNoSizeWasKnown) {
   for (int frame = 0; frame < 12; ++frame) spoil(frame);
   const ConversionReport first = run();
   EXPECT_EQ(first.quarantined.size(), 11u);
-  EXPECT_THAT(first.notes, texts_with({"no known size, of 11 samples"}));
+  EXPECT_THAT(first.notes, texts_with({"11 samples without a readable image"}));
   finalize(out_, {});
   for (int frame = 0; frame < 6; ++frame) mend(frame);
   for (int frame = 6; frame < 12; ++frame) {

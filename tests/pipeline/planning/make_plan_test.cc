@@ -215,8 +215,8 @@ TEST_F(MakePlan, SaysWhichSamplesHaveNoKnownSizeAndFindsItOnceTheyAreMended) {
   EXPECT_TRUE(plan.shards[1].size_unknown);
   EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{4, 6}));
   const std::string& id = plan.shards[1].samples.at(0).sample_id;
-  EXPECT_THAT(plan.sources[0].notes,
-              testing::texts_with({{"no known size, of 1 sample", "(" + id + ")", "eventgan retry"}}));
+  EXPECT_THAT(plan.sources[0].notes, testing::texts_with({{"1 sample without a readable image",
+                                                           "(" + id + ")", "eventgan retry"}}));
   complete_plan(manifest_, datasets, plan);
   EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{4, 6})) << "the guess stays";
   testing::write_flat_image(folder_ / "clip" / "f_03.png", {8, 10}, 100);
