@@ -103,13 +103,15 @@ done = False
 many = np.broadcast_to(images[:1], (2_000_000 // images[0].size, *images[0].shape))
 calls = [lambda: generator.many(many, many, threads=int(sys.argv[1])), lambda: on(one)]
 for call in calls:
-    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+    timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
     begun = time.monotonic()
     try:
         while True:
             call()
     except KeyboardInterrupt:
         assert time.monotonic() - begun < 100
+    timer.join()
     one()
     assert threading.active_count() == 1
 print("done")
