@@ -360,8 +360,8 @@ std::vector<std::string> frame_topics(const RosbagFile& bag, const std::string& 
   for (const auto& [topic, connections] : topics_of(bag, MessageKind::kImage)) {
     if (topic.starts_with(namespace_of(events))) topics.push_back(topic);
   }
-  std::ranges::stable_partition(
-      topics, [](const std::string& topic) { return topic.ends_with("/image_raw"); });
+  std::stable_partition(topics.begin(), topics.end(),
+                        [](const std::string& topic) { return topic.ends_with("/image_raw"); });
   return topics;
 }
 
