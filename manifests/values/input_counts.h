@@ -26,6 +26,7 @@ struct LabelLosses {
   bool operator==(const LabelLosses&) const = default;
 };
 
+/// Of one sample.
 LabelLosses losses_of(const Annotation& annotation);
 
 /// What a person should know of the inputs of samples that are valid, of one or of many.

@@ -20,7 +20,7 @@ namespace eventgan {
 // Options that several commands have, each declared once. What takes a value must outlive the
 // parsing.
 
-/// Numbers from `least` to `most`: of NaN, CLI::Range says nothing.
+/// Numbers from `least` to `most`; not NaN, which CLI::Range lets pass.
 CLI::Validator finite_range(double least, double most);
 
 /// DIR, a folder that convert has written.

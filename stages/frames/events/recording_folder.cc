@@ -3,18 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <exception>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
 #include <system_error>
 #include <utility>
 
-#include "manifests/documents/json_text.h"
-#include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
 #include "stages/frames/events/recording_labels.h"
 #include "stages/frames/listing/source_folders.h"
+#include "stages/frames/naming/found_frames.h"
 #include "stages/frames/own_labels/yolo_text.h"
 #include "stages/recordings/readers/recording.h"
 
@@ -22,16 +19,6 @@ namespace eventgan {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A manifest of this program may lie beside a recording under its name.
-bool is_manifest(const fs::path& file) try {
-  if (file.extension() != ".json") return false;
-  const nlohmann::ordered_json document =
-      parse_json_data(read_text_file(file), file.filename().string(), JsonComments::kPassedOver);
-  return document.is_object() && document.value("format", "") == "eventgan-manifest";
-} catch (const std::exception&) {  // reported when it is read as labels
-  return false;
-}
 
 /// Prophesee's NAME_bbox.npy is that of NAME_td.dat, NAME_td.dat.h5 and NAME.raw.
 std::string bbox_name(std::string name) {
@@ -177,7 +164,8 @@ class FolderSearch {
       // A table of events is a .csv, too.
       const fs::path own = fs::absolute(base / recorded.path).lexically_normal();
       std::erase_if(files, [&](const fs::path& file) {
-        return !fs::exists(file) || is_manifest(file) ||
+        return !fs::exists(file) ||
+               (file.extension() == ".json" && is_manifest(beginning_of(file))) ||
                (is_window_label_file(file) && !fs::is_regular_file(file)) ||
                fs::absolute(file).lexically_normal() == own;
       });

@@ -64,6 +64,16 @@ std::string beginning_of(const fs::path& file) {
   return text;
 }
 
+bool is_manifest(std::string_view text) {
+  const std::size_t key = text.find("\"format\"");
+  return key != text.npos &&
+         std::ranges::any_of(
+             std::array{"manifest", "training", "simulation"}, [&](const char* kind) {
+               return text.substr(key, 64).find(std::string("\"eventgan-") + kind + '"') !=
+                      text.npos;
+             });
+}
+
 const std::vector<std::string>& image_names_of(const FoundFrames& frames) {
   if (frames.image_names) return *frames.image_names;
   frames.image_names = std::make_shared<std::vector<std::string>>();

@@ -63,6 +63,10 @@ struct FoundFrames {
 /// The first bytes of a file, where a format shows; a byte order mark left out.
 std::string beginning_of(const std::filesystem::path& file);
 
+/// Whether a JSON file with this beginning is a manifest of a job, a training or a simulation,
+/// which may lie beside images, videos or recordings and name them.
+bool is_manifest(std::string_view beginning);
+
 /// Names of all images below the root, listed once; none of videos.
 const std::vector<std::string>& image_names_of(const FoundFrames& frames);
 

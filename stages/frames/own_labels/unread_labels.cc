@@ -43,17 +43,6 @@ bool may_have_images(const std::string& folder) {
   return starts_with_any(folder, {"image", "img", "jpegimages"});
 }
 
-/// A manifest of a job, a training or a simulation, which may name the images.
-bool is_manifest(std::string_view text) {
-  const std::size_t key = text.find("\"format\"");
-  return key != text.npos &&
-         std::ranges::any_of(
-             std::array{"manifest", "training", "simulation"}, [&](const char* kind) {
-               return text.substr(key, 64).find(std::string("\"eventgan-") + kind + '"') !=
-                      text.npos;
-             });
-}
-
 /// Columns that say nothing of what an image shows.
 bool is_of_files(std::string_view header) {
   static const std::set<std::string> kFileColumns{

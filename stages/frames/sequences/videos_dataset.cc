@@ -22,6 +22,7 @@
 #include "stages/frames/listing/image_folder.h"
 #include "stages/frames/listing/source_folders.h"
 #include "stages/frames/naming/absent_frames.h"
+#include "stages/frames/naming/found_frames.h"
 #include "stages/frames/own_labels/label_readers.h"
 #include "stages/frames/sequences/frames_dataset.h"
 
@@ -37,16 +38,13 @@ std::optional<VideoLabels> read_video_labels(const std::filesystem::path& file,
   };
   nlohmann::ordered_json labels;
   try {
-    labels =
-        parse_json_data(read_text_file(file), file.filename().string(), JsonComments::kPassedOver);
+    const std::string text = read_text_file(file);
+    if (is_manifest(text)) return std::nullopt;
+    labels = parse_json_data(text, file.filename().string(), JsonComments::kPassedOver);
   } catch (const std::runtime_error& error) {
     refuse("a JSON object from frame number to label", "\"" + std::string(error.what()) + "\"");
   }
   if (!labels.is_object()) refuse("a JSON object from frame number to label", labels.type_name());
-  if (const auto format = labels.find("format");
-      format != labels.end() && *format == "eventgan-manifest") {
-    return std::nullopt;
-  }
 
   VideoLabels by_frame;
   for (const auto& [key, label] : labels.items()) {
