@@ -17,6 +17,7 @@ sys.path[:0] = [str(PACKAGE), str(SOURCE / "tests" / "stages" / "shards")]
 
 from example_shards import NAME, ExampleShards
 
+TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
 SECOND = "demo-train-00001-of-00002.h5"
 
 
@@ -87,3 +88,21 @@ def data(tmp_path_factory):
                    check=True, capture_output=True)
     subprocess.run([program, "finalize", demo / "out"], check=True, capture_output=True)
     return demo / "out"
+
+
+@pytest.fixture
+def trainer(monkeypatch):
+    """Puts the folder of a trainer's modules first on the path. Both trainers have a `utils`:
+    what others have loaded of them is forgotten."""
+
+    def use(path, *modules):
+        if not (TRAINERS / path).is_dir():
+            pytest.skip(f"no ../shared/trainers/{path}")
+        for module in modules:
+            pytest.importorskip(module)
+        for name, module in list(sys.modules.items()):
+            if str(TRAINERS) in str(getattr(module, "__file__", None)):
+                monkeypatch.delitem(sys.modules, name)
+        monkeypatch.syspath_prepend(str(TRAINERS / path))
+
+    return use

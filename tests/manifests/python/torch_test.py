@@ -1,14 +1,12 @@
 """eventgan.torch: volumes, boxes and joints that stay together whatever is done to them."""
 
 import dataclasses
-import os
-import pathlib
 import re
 
 import h5py
 import numpy as np
 import pytest
-from conftest import NAME, SOURCE
+from conftest import NAME, SOURCE, TRAINERS
 
 torch = pytest.importorskip("torch")
 from torch.utils.data import DataLoader
@@ -20,7 +18,6 @@ from eventgan.torch import (DetectionDataset, EventAugmentation, FlowDataset, Ha
                             move_points, warp)
 
 JOINTS = ["nose", "left hand", "right hand"]
-TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
 
 
 @pytest.fixture
