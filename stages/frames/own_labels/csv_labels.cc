@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <set>
 #include <utility>
@@ -169,7 +168,7 @@ NamedBox box_of(const Row& row, bool has_sides, char separator) {
 /// An image's rows, one after the other.
 class ImageRows {
  public:
-  /// Beside the rows before it. Throws BadLabel.
+  /// Beside the rows before it, whose text lives as long as this. Throws BadLabel.
   void add(const Row& row, bool has_sides, char separator, const CsvRecord& record,
            const std::string& place) {
     const auto is_empty = [](std::string_view field) { return field.empty(); };
@@ -182,7 +181,7 @@ class ImageRows {
     is_without_boxes_ = is_alone;
     if (is_alone) return;
     NamedBox box = box_of(row, has_sides, separator);
-    if (!lines_.insert(std::hash<std::string_view>()(trimmed(record.bytes))).second) {
+    if (!lines_.insert(trimmed(record.bytes)).second) {
       box.again_at = place;
       labels_.boxes.push_back(std::move(box));
       return;
@@ -200,7 +199,7 @@ class ImageRows {
   ImageLabels labels_;
   bool is_without_boxes_ = false;
   std::set<std::int64_t> tracks_;
-  std::set<std::size_t> lines_;  // hashes, since there may be millions
+  std::set<std::string_view> lines_;
 };
 
 }  // namespace

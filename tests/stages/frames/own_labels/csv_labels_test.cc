@@ -59,6 +59,16 @@ TEST(CsvLabels, ARowThatIsThereAlreadyIsLeftOut) {
   EXPECT_THAT(images.at("b.png")->boxes, SizeIs(1));
 }
 
+TEST(CsvLabels, RowsOfOneHashAreTwoBoxes) {
+  const std::string first = "aa.png,1,1,9,99,Ik2zwEQHfwcepYyN";
+  const std::string second = "aa.png,1,1,9,99,gA3HLHx23cvE3cyp";
+  ASSERT_EQ(std::hash<std::string>()(first), std::hash<std::string>()(second));
+  const auto images = parse_csv_labels(
+      "image,left,top,right,bottom,class\n" + first + "\n" + second + "\n", "labels.csv");
+  ASSERT_THAT(images.at("aa.png")->boxes, SizeIs(2));
+  EXPECT_TRUE(images.at("aa.png")->boxes[1].again_at.empty());
+}
+
 TEST(CsvLabels, ColumnsComeInAnyOrderAndTrackMayBeAbsent) {
   const auto images = parse_csv_labels(
       "\xEF\xBB\xBF"
