@@ -16,6 +16,7 @@
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/codec/volume_codec.h"
 #include "tests/stages/generator/engine_trials.h"
+#include "tests/testing/texts.h"
 
 // What becomes of images, weights and calibrations at the ends of what numbers can say, for every
 // engine, precision and width of shipped weights: three tables of cases, each with its outcome,
@@ -259,7 +260,7 @@ class Extremes : public ::testing::TestWithParam<EngineCase> {
   }
 
   void expect_refused(const std::string& name, const Weights& weights) const {
-    EXPECT_ANY_THROW(engine(ready(weights))) << name;
+    EXPECT_THROWS(engine(ready(weights)), std::exception, "expected ") << name;
   }
 
   const Precision precision_ = GetParam().precision;
@@ -353,7 +354,7 @@ TEST_P(Extremes, CalibrationsThatDoNotFit) {
     one.change(*calibration);
     weights.calibration = calibration;
     if (one.in_int8 == Outcome::kRefused) {
-      EXPECT_ANY_THROW(engine(weights)) << one.name;
+      EXPECT_THROWS(engine(weights), std::exception, "expected ") << one.name;
     } else {
       expect_outcome(one.name, *engine(weights), natural(kSize), kSize, one.in_int8, {});
     }

@@ -57,7 +57,8 @@ TEST(Simulators, ARowMakesOneKnownToEveryCommand) {
                            &Word<SimulationMethod>::value) == 1;
     EXPECT_EQ(is_in_simulate, row.has_sensor_settings);
     if (!row.has_sensor_settings) {
-      EXPECT_THROW(simulator(row.value), std::invalid_argument);
+      EXPECT_THROWS(simulator(row.value), std::invalid_argument,
+                    "expected a kind of simulator, got " + std::string(row.word));
       continue;
     }
     EXPECT_EQ(simulator(row.value).kind, row.value);

@@ -299,7 +299,8 @@ TEST_F(StillScenesTest, WhatCannotBeMadeAgainIsKeptWithItsLabels) {
   const auto before = files("out");
   write_job(R"("frames": 6)", "5", "1e-6");
   const std::string noise = R"(, "sensor": {"shot_noise_rate_hz": 1e5})";  // fits no memory
-  EXPECT_ANY_THROW(run("out", 1, noise, SimulatedFile::kHdf5, true));
+  EXPECT_THROWS(run("out", 1, noise, SimulatedFile::kHdf5, true), std::exception,
+                "expected a sensor whose events fit into memory");
   EXPECT_EQ(files("out"), before);
 }
 

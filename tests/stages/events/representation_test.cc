@@ -87,21 +87,23 @@ TEST(Representations, AreParsedWithTheirNumbersAndNoOthers) {
 
 TEST(Representations, AreZerosWithoutEventsAndRefuseWhatIsNoEvent) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const std::vector<Event> unsound[] = {{{3, 0, 0, true}},
-                                        {{0, -1, 0, true}},
-                                        {{0, 0, nan, true}},
-                                        {{0, 0, -1e308, true}, {0, 0, 1e308, true}},
-                                        {{0, 0, 1, true}, {0, 0, 0.5, true}}};
+  const std::pair<std::vector<Event>, const char*> unsound[] = {
+      {{{3, 0, 0, true}}, "inside 3x2 pixels, got x=3 y=0"},
+      {{{0, -1, 0, true}}, "inside 3x2 pixels, got x=0 y=-1"},
+      {{{0, 0, nan, true}}, "expected an event with a finite time"},
+      {{{0, 0, -1e308, true}, {0, 0, 1e308, true}}, "expected times whose differences are finite"},
+      {{{0, 0, 1, true}, {0, 0, 0.5, true}}, "expected events in time order"}};
   for (const RepresentationRow& row : representations()) {
     EXPECT_THAT(values_of({}, of_number(row)), Each(0)) << row.word;
-    for (const std::vector<Event>& events : unsound) {
-      EXPECT_THROW(values_of(events, of_number(row)), std::invalid_argument) << row.word;
+    for (const auto& [events, why] : unsound) {
+      EXPECT_THROWS(values_of(events, of_number(row)), std::invalid_argument, why) << row.word;
     }
     const std::vector<Event> late{{0, 0, 2, true}};
-    EXPECT_THROW(values_of(late, of_number(row), kImage, {{0, 1}}), std::invalid_argument);
+    EXPECT_THROWS(values_of(late, of_number(row), kImage, {{0, 1}}), std::invalid_argument,
+                  "expected events from t=0");
     std::array<std::byte, 1> small{};
-    EXPECT_THROW(represent({}, parse_representation(of_number(row)), kImage, {}, small),
-                 std::invalid_argument);
+    EXPECT_THROWS(represent({}, parse_representation(of_number(row)), kImage, {}, small),
+                  std::invalid_argument, "expected room for", "bytes, got 1");
   }
 }
 

@@ -332,9 +332,9 @@ TEST(MatToJson, RefusesComplexNumbers) {
   double real = 1, imaginary = 2;
   mat_complex_split_t parts{&real, &imaginary};
   std::size_t dims[] = {1, 1};
-  EXPECT_THROW(
+  EXPECT_THROWS(
       json_of(Mat_VarCreate(nullptr, MAT_C_DOUBLE, MAT_T_DOUBLE, 2, dims, &parts, MAT_F_COMPLEX)),
-      std::invalid_argument);
+      std::invalid_argument, "complex");
 }
 
 TEST(MatField, FindsFieldsOfOneStructOnly) {
