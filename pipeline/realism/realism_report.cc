@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "manifests/documents/report.h"
+#include "manifests/values/generators.h"
 #include "manifests/values/text.h"
 #include "stages/events/realism/realism_scores.h"
 
@@ -250,9 +251,14 @@ std::string verdict_text(std::span<const RealismReport> reports) {
   if (ranked.size() < 2) return {};
   std::ranges::stable_sort(ranked, std::greater(),
                            [](const MethodSummary* method) { return method->mean.f1_time; });
-  const bool has_esim = std::ranges::find(ranked, "esim", &MethodSummary::name) != ranked.end();
-  const auto best = std::ranges::find_if(
-      ranked, [](const MethodSummary* method) { return method->name != "esim"; });
+  // What moves one frame does not know the motion between two.
+  const auto moves_one_frame = [](const MethodSummary* method) {
+    const auto row = std::ranges::find(kGenerators, method->name, &GeneratorRow::word);
+    return row != kGenerators.end() && row->moves_one_frame;
+  };
+  const auto best = std::ranges::find_if_not(ranked, moves_one_frame);
+  const auto for_stills = std::ranges::find_if(ranked, moves_one_frame);
+  if (best == ranked.end()) return {};
   if (!((*best)->mean.f1_time > 0)) return {};
   return fmt::format(
       "By F1 summed over time: {}. For your own videos and sequences take \"{}\" as "
@@ -262,9 +268,11 @@ std::string verdict_text(std::span<const RealismReport> reports) {
                return fmt::format("{} {:.3f}", method->name, method->mean.f1_time);
              }),
       (*best)->name,
-      has_esim ? " esim is for photographs: it follows the motion that convert draws for them, and "
-                 "does not know the motion between two frames, hence its F1 here."
-               : "");
+      for_stills == ranked.end()
+          ? ""
+          : fmt::format(" {} is for photographs: it follows the motion that convert draws for "
+                        "them, and does not know the motion between two frames, hence its F1 here.",
+                        (*for_stills)->name));
 }
 
 }  // namespace
