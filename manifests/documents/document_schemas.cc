@@ -48,7 +48,7 @@ std::vector<DocumentKind> document_kinds() {
        schema_of(list_training)},
       {"sensor.schema.json",
        "eventgan sensor, version 1",
-       "An event camera: what its volumes need to be told of it, as `eventgan fit` finds it.",
+       "An event camera: what convert needs of it, as `eventgan fit` finds it.",
        {"a range's second number is not below its first"},
        schema_of(list_camera_sensor)}};
 }

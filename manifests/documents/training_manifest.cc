@@ -91,7 +91,7 @@ void list_network(Fields& fields, NetworkSpec& spec) {
               "this many times next - previous, for those of previous and next: the same networks, "
               "learned sooner. 0: as published.");
   fields.find("sensor", spec.sensor, booleans(),
-              "The generator is told the sensor's contrast threshold: it sees the change of log "
+              "The generator gets the sensor's contrast threshold: it sees the change of log "
               "intensity in thresholds beside the two frames, and learns the number of events to "
               "be expected, by losses.likelihood. false: as published, normalised volumes of the "
               "frames.");

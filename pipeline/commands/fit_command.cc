@@ -109,7 +109,7 @@ void add_fit_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "fit",
       "Find a camera's thresholds and noise\nFinds out of recordings of one event camera what "
-      "convert needs to be told of it: the contrast threshold with which the model difference, and "
+      "convert needs of it: the contrast threshold with which the model difference, and "
       "a network that knows its sensor, make as many events as the camera, and the noise of pixels "
       "that stay still. Writes a sensor's document (manifests/guides/sensor.md).");
   const auto arguments = std::make_shared<FitArguments>();

@@ -137,7 +137,7 @@ bool ShardSink::commit() {
   span.note("samples", record_.samples);
   const std::int64_t start_ns = thread_processor_ns();
   if (outdate_dataset(job_.folder, shard_->name) && job_.options.warn) {
-    job_.options.warn("dataset.json and dataset.h5 told of " + shard_->name +
+    job_.options.warn("dataset.json and dataset.h5 described " + shard_->name +
                       " as it was and are removed until all shards are done");
   }
   ShardReceipt receipt;

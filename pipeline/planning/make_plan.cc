@@ -424,7 +424,7 @@ void note_unknown_sizes(Plan& plan) {
         some_of(unknown.samples, 5) + "), so of unknown size: quarantined in " +
         std::to_string(unknown.shards) +
         (unknown.shards == 1 ? " shard of its own" : " shards of their own") +
-        " until the images are mended and eventgan retry has run");
+        " until the images are repaired and eventgan retry has run");
   }
 }
 

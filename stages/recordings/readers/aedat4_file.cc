@@ -223,7 +223,7 @@ std::vector<PacketPlace> Aedat4File::find_packets(const std::vector<PacketPlace>
     }
     if (packet.byte <= end &&
         (!header_.streams.contains(packet.stream) || packet.size_bytes <= 0)) {
-      refuse(fmt::format("expected a packet of a stream that the header tells of, got {} "
+      refuse(fmt::format("expected a packet of a stream of the header, got {} "
                          "bytes of stream {}",
                          packet.size_bytes, packet.stream),
              byte);
