@@ -15,6 +15,7 @@ floating-point): .npy, .npz, or HDF5 in MVSEC's or DSEC's layout, as eventgan si
 import argparse
 import csv
 import json
+import os
 import pathlib
 import re
 import sys
@@ -30,12 +31,14 @@ class Detector:
         self.told = json.loads(files["detector.json"])
 
     def __call__(self, events, size, score=None):
-        """Of events in time order, of a sensor of the size H, W: boxes [n, 4] (left, top, width, height in pixels),
-        classes and scores, the surest first, of at least `score` (None: as the training says)."""
+        """Of events in time order, of a sensor of the size H, W: boxes [n, 4] (left, top, width, height in pixels of the
+        sensor, to which they are cut), classes and scores, the surest first, of at least `score` (None: as the training
+        says)."""
         with torch.no_grad():
             boxes, labels, scores = (each.double().numpy() for each in
                                      self.model(*map(torch.from_numpy, columns(events)), *size))
-        kept = scores >= (self.told["score"] if score is None else score)
+        boxes = boxes.clip(0, [size[1], size[0]] * 2)
+        kept = (scores >= (self.told["score"] if score is None else score)) & (boxes[:, 2:] > boxes[:, :2]).all(1)
         boxes[:, 2:] -= boxes[:, :2]
         return boxes[kept], [self.told["classes"][int(label)] for label in labels[kept]], scores[kept]
 
@@ -133,4 +136,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except BrokenPipeError:  # as of `| head`; what is left to write has no reader
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
