@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <string_view>
@@ -55,15 +56,46 @@ std::string name_after(fs::path path) {
   return name.empty() ? "" : name.substr(0, kLongest) + "-events";
 }
 
+/// The set of driving scenes that the source is one of, as the folders around its images or the
+/// file of its labels are called; empty: none that is known.
+std::string_view driving_set(const FoundSource& found) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kSets{
+      {{"bdd100k", "BDD100K"},
+       {"camvid", "CamVid"},
+       {"cityscapes", "Cityscapes"},
+       {"leftImg8bit", "Cityscapes"},
+       {"kitti", "KITTI"},
+       {"nuimages", "nuImages"},
+       {"CAM_FRONT", "nuImages"}}};
+  if (found.dataset == DatasetKind::kKittiObject) return "KITTI";
+  if (!found.labels) return {};
+  constexpr int kFoldersAround = 4;  // bdd100k/images/100k/train
+  std::vector<std::string> names{found.labels->path.filename().string()};
+  fs::path folder = found.root;
+  for (int i = 0; i < kFoldersAround; ++i, folder = folder.parent_path()) {
+    names.push_back(folder.filename().string());
+  }
+  const auto same_letter = [](unsigned char a, unsigned char b) {
+    return std::tolower(a) == std::tolower(b);
+  };
+  for (const auto& [word, title] : kSets) {
+    for (const std::string& name : names) {
+      if (!std::ranges::search(name, word, same_letter).empty()) return title;
+    }
+  }
+  return {};
+}
+
 /// Writes manifests.
 class Draft {
  public:
   Draft(const DraftPlace& place, std::string name, const DraftWishes& wishes)
       : place_(place), name_(std::move(name)), wishes_(wishes) {}
 
-  /// Photographs of one's own whose objects move on their own.
+  /// Photographs whose objects move on their own.
   static bool is_in_layers(const SourceDraft& source) {
-    return source.is_stills && source.found.labels;
+    return source.is_stills &&
+           (source.found.labels || source.found.dataset == DatasetKind::kKittiObject);
   }
 
   std::string text(const std::vector<SourceDraft>& sources) const {
@@ -97,6 +129,12 @@ class Draft {
     constexpr double kLeastSpeedup = 1.3;
     has_int8_ = int8_speedup(read_shipped_weights(moves() ? kWideWeights : kNarrowWeights)) >=
                 kLeastSpeedup;
+    if (!wishes_.camera) {
+      for (const SourceDraft& source : sources) {
+        const std::string why = camera_text(source);
+        if (!why.empty() && std::ranges::find(lines, why) == lines.end()) lines.push_back(why);
+      }
+    }
     if (!is_network(sources)) return lines;
     if (const OnednnSupport int8 = onednn_support(Precision::kInt8); int8.able && !int8.native) {
       lines.push_back(
@@ -113,7 +151,28 @@ class Draft {
  private:
   bool is_network(const std::vector<SourceDraft>& sources) const {
     return !has_events(sources.front().found.dataset) &&
-           (moves() || !std::ranges::all_of(sources, is_in_layers));
+           !std::ranges::all_of(sources, [&](const SourceDraft& source) {
+             return is_in_layers(source) && camera_of(source) == CameraMotion::kRests;
+           });
+  }
+
+  CameraMotion camera_of(const SourceDraft& source) const {
+    return wishes_.camera.value_or(driving_set(source.found).empty() ? CameraMotion::kRests
+                                                                     : CameraMotion::kMoves);
+  }
+
+  /// What is assumed of the camera before which photographs in layers are seen; of others nothing.
+  std::string camera_text(const SourceDraft& source) const {
+    if (!is_in_layers(source)) return "";
+    const std::string_view drives = driving_set(source.found);
+    return drives.empty() ? fmt::format(
+                                "\"rests\": {}, for a camera that stays still; --camera "
+                                "moves or both for another",
+                                rests_of(CameraMotion::kRests))
+                          : fmt::format(
+                                "\"rests\": 0, since cameras of driving scenes ({}) move; "
+                                "--camera rests or both for another",
+                                drives);
   }
 
   /// Why what moves is enough, where at least a third of the tiles of all frames rests, as far as
@@ -245,7 +304,7 @@ class Draft {
     const std::string image = fmt::format(
         R"("translation_px": [{}, {}], "rotation_deg": {}, "scale": {}, "frames": {})",
         spec.translation_px[0], spec.translation_px[1], spec.rotation_deg, spec.scale, spec.frames);
-    if (!source.found.labels && source.found.dataset != DatasetKind::kKittiObject) {
+    if (!is_in_layers(source)) {
       return fmt::format(
           R"(      // The motion of each image is drawn: what moves is everything, as before a moving camera.
       "pairs": {{
@@ -255,7 +314,7 @@ class Draft {
 )",
           image);
     }
-    const bool drives = source.found.dataset == DatasetKind::kKittiObject;
+    const std::string_view drives = wishes_.camera ? "" : driving_set(source.found);
     return fmt::format(
         R"(      // The motion of each image is drawn{}
       // Each object moves on its own; one whose labels have no outline is cut out of its box.
@@ -268,10 +327,11 @@ class Draft {
         }}
       }}
 )",
-        drives ? ", and none rests, since the camera drives."
-               : "; \"rests\" is the share before a camera at rest, 0 for a camera that moves.",
-        image, drives ? 0 : rests_of(wishes_.camera.value_or(CameraMotion::kRests)),
-        object.translation_px[0], object.translation_px[1], object.rotation_deg, object.scale);
+        drives.empty()
+            ? "; \"rests\" is the share before a camera at rest, 0 for a camera that moves."
+            : fmt::format(", and none rests, since cameras of driving scenes ({}) move.", drives),
+        image, rests_of(camera_of(source)), object.translation_px[0], object.translation_px[1],
+        object.rotation_deg, object.scale);
   }
 
   static std::string window_text(const SourceDraft& source) {

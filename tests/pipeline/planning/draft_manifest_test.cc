@@ -367,6 +367,39 @@ TEST_F(DraftManifest, OfSingleImagesWithBoxesTheImageRestsUnlessItsCameraDrives)
   EXPECT_EQ(with_a_sequence.generator.kind, GeneratorKind::kNetwork);
 }
 
+TEST_F(DraftManifest, DrivingScenesAreForACameraThatMoves) {
+  constexpr const char* kSets[][2] = {{"BDD100K", "bdd100k/images/100k/train"},
+                                      {"Cityscapes", "x/leftImg8bit/train/ulm"},
+                                      {"Cityscapes", "Cityscapes_small/train/some"},
+                                      {"nuImages", "nuimages/samples/CAM_BACK"},
+                                      {"nuImages", "some/samples/CAM_FRONT"},
+                                      {"CamVid", "CamVid/701_StillsRaw_full"},
+                                      {"KITTI", "kitti_mini/images"},
+                                      {"", "photos"},
+                                      {"", "bdd100k/one/two/three/four/five/photos"},
+                                      {"", "people/at_kit"}};
+  for (const auto& [title, path] : kSets) {
+    SCOPED_TRACE(path);
+    FoundSource photos = images(path, {kOneSize});
+    const auto table = folder_.path() / "table.csv";
+    testing::write_file(table, "image,class,left,top,right,bottom\n0.png,a,1,2,9,9\n");
+    photos.labels = {LabelFormat::kCsv, table};
+    const bool drives = *title != 0;
+    const ManifestDraft made = draft({photos});
+    const JobManifest job = read(made);
+    EXPECT_EQ(job.sources[0].pairs.stills->rests, drives ? 0 : 0.5);
+    EXPECT_EQ(job.generator.kind, drives ? GeneratorKind::kNetwork : GeneratorKind::kEsim);
+    EXPECT_THAT(
+        made.findings,
+        Contains(HasSubstr(drives ? "cameras of driving scenes (" + std::string(title) + ") move"
+                                  : "\"rests\": 0.5, for a camera that stays still")));
+    const ManifestDraft wished = draft({photos}, {CameraMotion::kRests, {}});
+    EXPECT_EQ(read(wished).sources[0].pairs.stills->rests, 0.5);
+    EXPECT_EQ(read(wished).generator.kind, GeneratorKind::kEsim);
+    EXPECT_THAT(wished.text, Not(HasSubstr("driving")));
+  }
+}
+
 TEST_F(DraftManifest, HasSamplesOnlyIfEachSourceHas) {
   const FoundSource walk = images("walk", {kOneSize, kOneSize});
   fs::create_directories(folder_ / "kitti/label_2");
