@@ -1,11 +1,13 @@
 #include "stages/frames/listing/image_folder.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <limits>
 #include <map>
 #include <optional>
 #include <set>
+#include <string_view>
 #include <tuple>
 #include <utility>
 
@@ -163,8 +165,10 @@ ImageFolder list_image_folder(const fs::path& folder) {
 namespace {
 
 bool is_label_folder(const std::string& name) {
-  const std::string small = in_small_letters(name);
-  return small == "masks" || small == "instances" || small == "annotations" || small == "labels";
+  constexpr std::array<std::string_view, 13> kNames{
+      "masks",    "instances",  "annotations", "labels",     "flow_occ",   "flow_noc", "disp_occ",
+      "disp_noc", "disp_occ_0", "disp_occ_1",  "disp_noc_0", "disp_noc_1", "obj_map"};
+  return std::ranges::find(kNames, in_small_letters(name)) != kNames.end();
 }
 
 bool has_images_or_videos(const fs::path& folder, int levels) {

@@ -47,9 +47,10 @@ struct ImageFolder {
 /// left out. An absent folder is empty. Throws InputError if it cannot be listed.
 ImageFolder list_image_folder(const std::filesystem::path& folder);
 
-/// Takes the folders that are called as those of labels (masks, instances, annotations, labels, in
-/// any letters) from `names`, folders in `root`, where images or videos lie in `root` or, up to two
-/// folders deep, in another folder of it. Cannot fail.
+/// Takes the folders that are called as those of labels (masks, instances, annotations, labels, and
+/// those of KITTI's flow and stereo, flow_occ, disp_noc_0; in any letters) from `names`, folders in
+/// `root`, where images or videos lie in `root` or, up to two folders deep, in another folder of
+/// it. Cannot fail.
 void drop_label_folders(const std::filesystem::path& root, std::vector<std::string>& names);
 
 /// Throws UsageError if images or videos lie in `folder` that the program has not drawn: among

@@ -74,6 +74,7 @@ std::optional<Place> look_around(const fs::path& path, std::optional<DatasetKind
   if (auto found = look_at(path, dataset, /*own_too=*/false)) return found;
   std::vector<std::string> folders = look_into(path).folders;
   std::erase_if(folders, [](const std::string& name) { return name.starts_with('.'); });
+  drop_label_folders(path, folders);
   const auto look_below = [&](bool own_too) {
     std::vector<Place> below;
     for (const std::string& name : folders) {

@@ -194,6 +194,12 @@ TEST_F(MaskLabels, FoldersOfLabelsHoldNoImages) {
   fs::remove_all(at("ade/images"));
   EXPECT_THAT(ids_of(*open_frames_dataset(spec, folder_.path())), ElementsAre("annotations/1"))
       << "alone they may be anything";
+
+  add("flow/training/image_2/1.png", "flow/training/flow_occ/1.png", two_);
+  write("flow/training/disp_noc_0/1.png", "no PNG");
+  spec.root = "flow";
+  EXPECT_THAT(ids_of(*open_frames_dataset(spec, folder_.path())),
+              ElementsAre("training/image_2/1"));
 }
 
 TEST_F(MaskLabels, AreFoundBesideImages) {

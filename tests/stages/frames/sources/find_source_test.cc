@@ -293,6 +293,10 @@ TEST_F(FindSource, FoldersOfSequencesMayBeTwoDeep) {
   touch({"sets/one/images/1.jpg", "sets/two/images/1.jpg"});
   EXPECT_THROWS(find("sets"), InputError,
                 "expected one dataset, got 2: one (frames), two (frames), in ");
+  // KITTI's flow: the labels are no images.
+  touch({"flow/image_2/1.png", "flow/image_3/1.png", "flow/flow_occ/1.png"});
+  EXPECT_THROWS(find("flow"), InputError,
+                "expected one dataset, got 2: image_2 (frames), image_3 (frames), in ");
 }
 
 TEST_F(FindSource, KnowsRecordingsOfEventCameras) {
