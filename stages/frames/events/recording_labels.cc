@@ -39,7 +39,7 @@ constexpr std::array kCategoryWords{Word<Category>{"easy", {0, false}},
 constexpr double kLatest_s = 1e12;  // no clock runs longer; what is beyond is a slip
 
 /// Classes by their names, numbered as they first occur.
-class ClassNumbers {
+class NumberedNames {
  public:
   int of(const std::string& name) {
     const auto [known, is_new] = numbers_.try_emplace(name, static_cast<int>(names_.size()));
@@ -185,7 +185,7 @@ class CsvLabels {
   int line_ = 1;
   Places places_;  ///< empty: no header yet
   std::size_t columns_ = 0;
-  ClassNumbers classes_;
+  NumberedNames classes_;
   RecordingLabels labels_;
 };
 
@@ -207,7 +207,7 @@ Rectangle read_rectangle(const StrictValue& value) {
   return {pixel(edges[0]), pixel(edges[1]), pixel(edges[2]), pixel(edges[3])};
 }
 
-Box read_box(const StrictValue& value, ClassNumbers& classes) {
+Box read_box(const StrictValue& value, NumberedNames& classes) {
   Box box;
   StrictObject object = value.object();
   box.xyxy = {pixel(object.at("left")), pixel(object.at("top")), pixel(object.at("right")),
@@ -275,7 +275,7 @@ std::vector<std::string> read_joint_names(const StrictValue& value) {
 
 RecordingLabels read_json(std::string_view text, const std::string& file) {
   RecordingLabels labels;
-  ClassNumbers classes;
+  NumberedNames classes;
   FaultList faults(file);
   if (const auto document = parse_json_text(text, faults)) {
     StrictObject object = StrictValue(*document, faults).object();
@@ -378,7 +378,7 @@ class BboxReader {
     const TypedArray& class_id = need("class_id");
     const TypedArray* const track_id = find("track_id");
     RecordingLabels labels;
-    ClassNumbers classes;
+    NumberedNames classes;
     for (row_ = 0; row_ < t.size(); ++row_) {
       const double time_s = value("t", t, 0, kLatest_s * kTicksPerSecond) / kTicksPerSecond;
       Box box;
