@@ -106,7 +106,8 @@ std::optional<OriginalIds> original_ids(const ExportSource& source, const Annota
   }
 }
 
-/// Where the ids of COCO's labels can be kept.
+/// Where the ids of COCO's labels can be kept. Samples of other labels, in the same split, are
+/// numbered after them.
 class KeptIds {
  public:
   /// Reads the labels of all sources that have COCO's.
@@ -115,7 +116,6 @@ class KeptIds {
       const ExportSource& source = input.source_of(shard);
       Split& split = splits_[source.split];
       if (!source.has_coco_labels) {
-        split.is_kept = false;
         persons_agree_ = persons_agree_ && !source.has_joints();
         continue;
       }
@@ -125,12 +125,25 @@ class KeptIds {
         if (sample.valid) add(source, reader.header().label_schema, sample.annotation, split);
       }
     }
-    for (auto& [name, split] : splits_) split.images = split.annotations = {};
+    for (auto& [name, split] : splits_) {
+      const Last last{last_of(split.images), last_of(split.annotations)};
+      constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max() / 2;
+      split.is_kept = split.is_kept && std::max(last.image, last.annotation) <= kLargest;
+      if (split.is_kept) split.last = last;
+      split.images = split.annotations = {};
+    }
     if (!persons_agree_) persons_.clear();
   }
 
-  /// Whether a split's samples and annotations keep their ids: all have one, each another.
+  /// Whether a split's samples and annotations of COCO's labels keep their ids: all have one, each
+  /// another.
   bool in(const std::string& split) const { return splits_.at(split).is_kept; }
+
+  /// The largest ids that are kept; 0 if none is.
+  struct Last {
+    std::int64_t image = 0, annotation = 0;
+  };
+  Last last(const std::string& split) const { return splits_.at(split).last; }
 
   /// Categories of persons by their numbers, if the labels of all sources with joints have them.
   struct PersonCategory {
@@ -152,7 +165,12 @@ class KeptIds {
   struct Split {
     bool is_kept = true;
     std::set<std::int64_t> images, annotations;
+    Last last;
   };
+
+  static std::int64_t last_of(const std::set<std::int64_t>& ids) {
+    return ids.empty() ? 0 : std::max(*ids.rbegin(), std::int64_t{0});
+  }
 
   void add(const ExportSource& source, const LabelSchema& schema, const Annotation& annotation,
            Split& split) {
@@ -331,8 +349,10 @@ class CocoExporter : public Exporter {
     const PersonCategories categories =
         persons ? person_categories(work.input) : PersonCategories();
     CocoFile file(step.file(name));
-    // Unless it keeps its own, an image's number is its place in the split, in both of its files.
-    std::int64_t place = 0;
+    const KeptIds::Last last = kept_ids_ ? kept_ids_->last(split) : KeptIds::Last();
+    // Unless it keeps its own, an image's number is its place in the split, in both of its files;
+    // behind those that are kept.
+    std::int64_t place = last.image;
     file.begin_list("images");
     work.walk(shards, [&](const OutgoingSample& sample) {
       ++place;
@@ -341,8 +361,8 @@ class CocoExporter : public Exporter {
                           sample.reader.header().volume.size, sample.labels.sample_id));
     });
     file.begin_list("annotations");
-    place = 0;
-    std::int64_t id = 0;
+    place = last.image;
+    std::int64_t id = last.annotation;
     work.walk(shards, [&](const OutgoingSample& sample) {
       ++place;
       if (!is_for(sample.shard, work, persons)) return;

@@ -352,6 +352,30 @@ class Formats(Export):
             self.assertEqual([(one["id"], one["category_id"]) for one in found["annotations"]],
                              [(8, 9)] if kept else [(1, 1)])
 
+    def test_coco_ids_are_kept_beside_sources_without(self):
+        labels = "labels.json", json.dumps({
+            "images": [{"id": 40, "file_name": "a.png", "width": 621, "height": 188}],
+            "annotations": [{"id": 70, "image_id": 40, "category_id": 9, "bbox": [290, 80, 30, 20], "area": 600,
+                             "iscrowd": 0}], "categories": [{"id": 9, "name": "person"}]})
+        boxes = demo.folder / "boxes.csv"
+        boxes.write_text("image,class,left,top,right,bottom\nb.png,Zebra,290,80,330,110\n")
+        for name, more in (("bare", {}), ("labelled", {"labels": {"path": str(boxes), "format": "csv"}})):
+            with self.subTest(name=name):
+                other = {"dataset": "frames", "root": "images", "pairs": {"from": "stills"}, "split": "val", **more}
+                source = self.converted_photographs(f"beside_{name}", labels, other)
+                out = self.out.parent / f"beside_{name}"
+                self.export("coco", source=source, out=out)
+                found = json.loads((out / "instances_val.json").read_text())
+                images = {image["id"] for image in found["images"]}
+                self.assertEqual(len(images), len(found["images"]))
+                self.assertIn(40, images)
+                places = [(one["id"], one["image_id"], one["category_id"] == 9) for one in found["annotations"]]
+                self.assertIn((70, 40, True), places)
+                others = [place for place in places if not place[2]]
+                self.assertEqual(len(places), 1 + len(others))
+                self.assertEqual([place[0] for place in others], [71] if more else [])
+                self.assertTrue(all(image > 40 and image in images for _, image, _ in others))
+
     def test_mpii(self):
         self.out, out = demo.exported("mpii")
         self.assertIn("for MMPose --to coco", out)
