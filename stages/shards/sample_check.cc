@@ -369,6 +369,18 @@ std::string text(const char* name, double recorded, double stored) {
   return fmt::format("expected {} {:g} as recorded, got {:g}", name, recorded, stored);
 }
 
+/// Whether the scale is that of a volume whose largest value is `largest`. Of floats nothing else
+/// depends on it here, but other readers multiply by it; and a slightly other one of uint8 gives
+/// values that come near enough to the statistics.
+std::optional<std::string> scale_fault(StoredType type, float scale, double largest) {
+  constexpr float kRounding = 1e-6f;
+  const float expected = std::isfinite(largest)
+                             ? quantization(type, static_cast<float>(std::max(largest, 0.0))).scale
+                             : 1;
+  if (std::abs(scale - expected) <= kRounding * expected) return std::nullopt;
+  return fmt::format("expected scale {} by the recorded largest value, got {}", expected, scale);
+}
+
 }  // namespace
 
 std::optional<std::string> volume_fault(const ShardHeader& header, const ShardSample& sample,
@@ -376,7 +388,7 @@ std::optional<std::string> volume_fault(const ShardHeader& header, const ShardSa
   const Found found = look_at(volume);
   if (!found.sound) return "expected finite values >= 0 in the volume, got others";
   if (!sample.valid) {
-    if (found.nonzero == 0) return std::nullopt;
+    if (found.nonzero == 0) return scale_fault(header.dtype, sample.scale, 0);
     return "expected zeros for a quarantined sample, got other values";
   }
 
@@ -401,6 +413,7 @@ std::optional<std::string> volume_fault(const ShardHeader& header, const ShardSa
   if (!as_generated) max = recorded.max > 0 ? 1 : 0;
   if (saturated) max = std::min<double>(max, kLargestHalf);
   if (!near(max, found.max, 1)) return text("largest value", max, found.max);
+  if (auto fault = scale_fault(header.dtype, sample.scale, max)) return fault;
 
   const bool vanished = found.nonzero == 0 && recorded.max > 0;
   if (((recorded.flags & kFlagVanished) != 0) != vanished) {

@@ -25,9 +25,9 @@ std::vector<std::string> label_faults(const ShardHeader& header, const ShardTabl
                                       int slot, const ShardSample& sample);
 
 /// What is wrong with a volume as read back from a shard: values that are not finite or below zero,
-/// or that do not agree with the sample's statistics as closely as the stored type allows; values
-/// other than zero in the slot of a quarantined sample. Text without the file's name; nothing if
-/// sound. Thread safe.
+/// or that do not agree with the sample's statistics as closely as the stored type allows; a scale
+/// that VolumeCodec does not give to their largest value; values other than zero in the slot of a
+/// quarantined sample. Text without the file's name; nothing if sound. Thread safe.
 std::optional<std::string> volume_fault(const ShardHeader& header, const ShardSample& sample,
                                         std::span<const float> volume);
 

@@ -427,6 +427,21 @@ TEST_F(ShardCheck, VolumesWithNanOrOtherValuesAreFound) {
   EXPECT_THAT(faults(), IsEmpty());
 }
 
+TEST_F(ShardCheck, AnotherScaleIsFound) {
+  for (const StoredType type : {StoredType::kFloat32, StoredType::kFloat16, StoredType::kUint8}) {
+    write(testing::example_shard(type));
+    const std::vector<float> scales = ShardReader(shard_).tables().events.scale;
+    for (std::size_t slot = 0; slot < scales.size(); ++slot) {  // 1: all zeros, 2: quarantined
+      std::vector<float> changed = scales;
+      changed[slot] *= 1.001f;
+      overwrite("/events/scale", H5T_NATIVE_FLOAT, changed);
+      EXPECT_THAT(faults(), texts_with({{"expected scale ", "(sample " + std::to_string(slot)}}));
+    }
+    overwrite("/events/scale", H5T_NATIVE_FLOAT, scales);
+    EXPECT_THAT(faults(), IsEmpty());
+  }
+}
+
 TEST_F(ShardCheck, ALostChunkAndLabelsInTheWrongPlaceAreFound) {
   testing::ExampleShard example = testing::example_shard();
   example.volumes[4].assign(example.volumes[4].size(), 0);  // statistics stay those of the full one
