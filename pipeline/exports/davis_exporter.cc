@@ -55,13 +55,13 @@ std::string kitti_image(const std::string& sample_id) {
   return sample_id.substr(0, sample_id.find('@'));
 }
 
-/// The same as a number.
-std::size_t kitti_row(const std::string& sample_id) {
+/// The same as a number. `shard`: for messages, as below.
+std::size_t kitti_row(const std::string& sample_id, const std::string& shard) {
   const std::string digits = kitti_image(sample_id);
   std::size_t row = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), row);
   if (error != std::errc() || end != digits.data() + digits.size()) {
-    throw UsageError("expected a KITTI image id, digits only, got " + sample_id);
+    throw UsageError("expected a KITTI image id, digits only, got " + sample_id + ", in " + shard);
   }
   return row;
 }
@@ -70,13 +70,14 @@ std::size_t kitti_row(const std::string& sample_id) {
 using RowIds = std::map<std::size_t, std::string>;
 
 /// The next sample's row.
-std::size_t add_row(RowIds& ids, const ExportSource& source, const std::string& id) {
-  const std::size_t row = source.dataset == "kitti_object" ? kitti_row(id) : ids.size();
+std::size_t add_row(RowIds& ids, const ExportSource& source, const std::string& id,
+                    const std::string& shard) {
+  const std::size_t row = source.dataset == "kitti_object" ? kitti_row(id, shard) : ids.size();
   if (const auto [earlier, is_new] = ids.emplace(row, id); !is_new) {
-    throw UsageError(
-        fmt::format("expected one sample of each image for --to davis, got {} and "
-                    "{} (in the manifest: \"choose\": \"one\")",
-                    earlier->second, id));
+    throw UsageError(fmt::format(
+        "expected one sample of each image for --to davis, got {} and {}, in {} (in the "
+        "manifest: \"choose\": \"one\")",
+        earlier->second, id, shard));
   }
   return row;
 }
@@ -100,7 +101,8 @@ class DavisExporter : public Exporter {
         for (int slot = 0; slot < reader.header().sample_count; ++slot) {
           check_stop();
           const ShardSample sample = reader.sample(slot);
-          if (sample.valid) add_row(ids, source, sample.sample_id);
+          if (!sample.valid) continue;
+          add_row(ids, source, sample.sample_id, (input.folder() / shard->outline.name).string());
         }
       }
     }
@@ -156,7 +158,8 @@ class DavisExporter : public Exporter {
     }
     RowIds ids;
     work.walk(set.shards, [&](const OutgoingSample& sample) {
-      const std::size_t row = add_row(ids, source, sample.labels.sample_id);
+      const std::size_t row = add_row(ids, source, sample.labels.sample_id,
+                                      (work.input.folder() / sample.shard.outline.name).string());
       layout.rows_of[{sample.shard.outline.name, sample.slot}] = {row};
       layout.row_count = std::max(layout.row_count, row + 1);
     });

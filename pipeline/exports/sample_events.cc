@@ -116,8 +116,14 @@ std::vector<Event> SampleEvents::recorded(const OutgoingSample& sample) const {
 std::vector<Event> SampleEvents::of(const OutgoingSample& sample, double duration_s) const {
   if (!counts_) return recorded(sample);
   const PairKey key{seed_, sample.source.dataset, sample.labels.sample_id, sample.source.key};
-  return sample_events(sample.reader.volume(sample.slot), sample.reader.header().volume, duration_s,
-                       *counts_, key.pair());
+  try {
+    return sample_events(sample.reader.volume(sample.slot), sample.reader.header().volume,
+                         duration_s, *counts_, key.pair());
+  } catch (const UsageError& error) {
+    throw UsageError(fmt::format("{}, in {} ({})", error.what(),
+                                 (input_.folder() / sample.shard.outline.name).string(),
+                                 sample.labels.sample_id));
+  }
 }
 
 double known_gap_s(const FramePair& pair) {

@@ -82,9 +82,9 @@ std::string tar_member(std::string_view name, std::string_view bytes) {
   constexpr std::uint64_t kLargest = std::uint64_t{1} << 33;
   if (name.empty() || name.size() > kLongestName || bytes.size() >= kLargest) {
     throw std::invalid_argument(
-        fmt::format("expected a tar member with a name of 1..100 bytes and less than 8 GiB, got "
-                    "{} and {} bytes",
-                    name.size(), bytes.size()));
+        fmt::format("expected a tar member with a name of 1..100 bytes and less than 8 GiB, got {} "
+                    "and {} bytes, in {}",
+                    name.size(), bytes.size(), name));
   }
   std::string header(kTarBlock, '\0');
   header.replace(0, name.size(), name);

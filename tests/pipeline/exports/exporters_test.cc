@@ -293,6 +293,48 @@ TEST_F(Exporters, DavisHasARowForEachPerson) {
   EXPECT_EQ(column("imgname").text(0), "000000");
 }
 
+TEST_F(Exporters, NameTheShardAndTheSampleThatTheyCannotExport) {
+  const auto refused = [&](std::string_view word, void (*change)(testing::ExampleShard&),
+                           const std::string& what) {
+    testing::ConvertedFolder converted(0);
+    for (int shard = 0; shard < 4; ++shard) converted.add(shard, change);
+    finalize(converted.path(), {});
+    EXPECT_THAT([&] { exported(word, {}, converted); },
+                ThrowsMessage<UsageError>(
+                    AllOf(HasSubstr(what), HasSubstr(", in " + converted.shard(1).string()))));
+  };
+  static constexpr auto kWithoutPersons = [](testing::ExampleShard& example) {
+    example.header.manifest_text = kManifest;
+    example.header.label_schema.joint_names = example.header.label_schema.joint_aliases = {};
+    for (ShardSample& sample : example.samples) {
+      sample.annotation.persons.clear();
+      sample.labels.persons.clear();
+    }
+  };
+  refused(
+      "davis",
+      [](testing::ExampleShard& example) {
+        kWithoutPersons(example);
+        example.samples[0].sample_id = "first";
+      },
+      "digits only, got first, in ");
+  refused(
+      "davis",
+      [](testing::ExampleShard& example) {
+        kWithoutPersons(example);
+        example.samples[0].sample_id = "000001@before1";
+      },
+      "got 000001@before1 and 000001, in ");
+  refused(
+      "events",
+      [](testing::ExampleShard& example) {
+        example.header.manifest_text = kManifest;
+        example.header.dtype = StoredType::kFloat32;
+        for (float& value : example.volumes[0]) value *= 1e9f;
+      },
+      "expected values of at most 1e+09 events altogether");
+}
+
 TEST_F(Exporters, WebdatasetHasTheVolumeAsItIsStored) {
   const std::filesystem::path tar = exported("webdataset") / "demo-val-00000-of-00001.tar";
   testing::write_file(folder_ / "a.npz", tar_content(tar, "000003.npz"));

@@ -46,7 +46,7 @@ TEST(TarMember, IsAnUstarHeaderOfAShortNameAndPaddedBytes) {
   EXPECT_EQ(tar_end(), std::string(1024, '\0'));
   EXPECT_NO_THROW(tar_member(std::string(100, 'a'), ""));
   EXPECT_THROWS(tar_member(std::string(101, 'a'), ""), std::invalid_argument,
-                "expected a tar member with a name of 1..100 bytes and less");
+                "expected a tar member with a name of 1..100 bytes and less", "in aaa");
   EXPECT_THROWS(tar_member("", ""), std::invalid_argument,
                 "expected a tar member with a name of 1..100 bytes and less");
 }
