@@ -190,25 +190,61 @@ std::string representations_page() {
   return page;
 }
 
+/// Of the page of all keys the rows of those whose path, without the marks of lists, begins with
+/// `start` at one of its names.
+std::string keys_page_of(const std::string& start) {
+  constexpr std::string_view kRow = "| `";
+  std::string page, head;
+  std::vector<std::string> names;
+  std::istringstream lines(keys_page());
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("## ")) head = (page.empty() ? "" : "\n") + line + "\n\n";
+    if (!line.starts_with('|')) continue;
+    if (!line.starts_with(kRow)) {
+      head += line + "\n";
+      continue;
+    }
+    std::string key = line.substr(kRow.size(), line.find('`', kRow.size()) - kRow.size());
+    for (std::size_t at = 0; (at = key.find("[]")) != key.npos;) key.erase(at, 2);
+    bool is_wanted = false;
+    for (bool is_last = false; !is_last; key.erase(0, key.find('.') + 1)) {
+      is_last = key.find('.') == key.npos;
+      names.push_back(key);
+      is_wanted = is_wanted || key.starts_with(start);
+    }
+    if (is_wanted) page += std::exchange(head, "") + line + "\n";
+  }
+  if (!page.empty()) return page;
+  throw UsageError("expected the beginning of a key, such as pairs.motion, got " + start +
+                   did_you_mean(start, names) + " (eventgan help keys)");
+}
+
 }  // namespace
 
 void add_help_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "help",
       "Show the help of the program or of a command\n`help keys` lists every key of the "
-      "manifests, with its values and its default, `help representations` how "
-      "events become arrays, `help cluster` says where the scripts for Slurm and Kubernetes are.");
+      "manifests, with its values and its default, `help keys pairs.motion` those that "
+      "begin so, `help representations` how events become arrays, `help cluster` says where the "
+      "scripts for Slurm and Kubernetes are.");
   const auto name = std::make_shared<std::string>();
+  const auto start = std::make_shared<std::string>();
   command->add_option("COMMAND", *name,
                       "The command, keys, representations, or cluster; default: list all commands");
-  command->callback([&app, name, &exit_code] {
+  command->add_option("KEY", *start, "With keys: what the keys begin with; default: list all");
+  command->callback([&app, name, start, &exit_code] {
+    if (!start->empty() && *name != "keys") {
+      throw UsageError("expected one command, got " + *name + " and " + *start +
+                       " (eventgan help --help)");
+    }
     const auto known =
         app.get_subcommands([&](const CLI::App* one) { return one->get_name() == *name; });
     if (name->empty()) {
       // App::help() would be that of the command that was given: this one's.
       std::cout << app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal);
     } else if (*name == "keys") {
-      std::cout << keys_page();
+      std::cout << (start->empty() ? keys_page() : keys_page_of(*start));
     } else if (*name == "representations") {
       std::cout << representations_page();
     } else if (*name == "cluster") {

@@ -67,6 +67,21 @@ class CommandLine(program.InFolder):
                      "| `recordings[].path` | path | required | ", "## eventgan sensor, version 1"]:
             self.assertIn(f"\n{line}", page)
 
+    def test_help_keys_lists_those_that_begin_with_a_word(self):
+        whole, _ = run("help", "keys")
+        for start, keys in {"pairs.motion": "sources[].pairs.motion", "sources.root": "sources[].root"}.items():
+            page, _ = run("help", "keys", start)
+            rows = [line for line in page.splitlines() if line.startswith("| `")]
+            self.assertEqual(rows, [line for line in whole.splitlines() if line.startswith(f"| `{keys}")])
+            self.assertGreater(len(rows), 0)
+            self.assertTrue(page.startswith("## eventgan job manifest, version 1\n\n| key | "), page)
+        page, _ = run("help", "keys", "name")
+        self.assertIn("\n\n## eventgan training manifest, version 1\n\n| key | ", page)
+        _, err = run("help", "keys", "pairs.motoin", expect=64)
+        self.assertIn("got pairs.motoin; did you mean pairs.motion?", err)
+        _, err = run("help", "convert", "pairs", expect=64)
+        self.assertIn("expected one command, got convert and pairs", err)
+
     def test_help_representations_has_a_row_for_each(self):
         page, _ = run("help", "representations")
         rows = re.findall(r"(?m)^(\w+)(?::([A-Z]+))?  (uint8|float32) (\[.*\])$", page)
