@@ -275,23 +275,25 @@ class RecordingDataset final : public Dataset {
     }
   }
 
-  /// Of several recordings, those that do not open are told of and left out.
+  /// Of several recordings, those that do not open are told of and left out. Labels with mistakes
+  /// are not.
   void open_all(const fs::path& base) {
     const bool is_one = recordings_.size() + unreadable_.size() == 1;
     std::exception_ptr first;
     for (auto entry = recordings_.begin(); entry != recordings_.end();) {
       try {
         open(entry->second, base);
-        if (entry->second.is_window()) read_window(entry->second);
-        fit_boxes(entry->second);
-        ++entry;
       } catch (const InputError& error) {
         if (is_one) throw;
         if (!first) first = std::current_exception();
         unreadable_.emplace_back(error.what());
         unopened_[entry->first] = error.what();
         entry = recordings_.erase(entry);
+        continue;
       }
+      if (entry->second.is_window()) read_window(entry->second);
+      fit_boxes(entry->second);
+      ++entry;
     }
     if (recordings_.empty()) std::rethrow_exception(first);
   }

@@ -1,9 +1,13 @@
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text_lines.h"
 #include "stages/frames/events/recording_labels.h"
 #include "stages/frames/naming/found_frames.h"
 #include "stages/frames/own_labels/yolo_text.h"
@@ -13,7 +17,17 @@ namespace eventgan {
 bool is_window_label_file(const std::filesystem::path& file) { return file.extension() == ".txt"; }
 
 std::optional<bool> is_window_label_text(const std::filesystem::path& file) {
-  return is_yolo_text(beginning_of(file));
+  const std::string text = beginning_of(file);
+  const std::optional<bool> is_sound = is_yolo_text(text);
+  if (is_sound.value_or(true)) return is_sound;
+  return std::ranges::any_of(split_lines(text), [](const TextLine& line) {
+    const auto columns = split_columns(line.bytes);
+    if (is_yolo_text(line.bytes).value_or(false)) return true;
+    if (columns.size() != 5) return false;
+    const std::string shares =
+        fmt::format("{}", fmt::join(columns.begin() + 1, columns.end(), " "));
+    return parse_whole(columns[0]).value_or(-1) >= 0 || is_yolo_text("0 " + shares).value_or(false);
+  });
 }
 
 WindowLabels::Names& WindowLabels::names_of(const std::filesystem::path& file) {

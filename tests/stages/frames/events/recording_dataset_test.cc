@@ -662,6 +662,12 @@ TEST_F(WindowTextsTest, AreLabelsOnlyIfOneSaysSo) {
   EXPECT_THAT(classes(1), ElementsAre(0));
 }
 
+TEST_F(WindowTextsTest, WithAMistakeInTheFirstLineAreLabels) {
+  boxes("b.txt", {0});
+  text("a.txt", "0 0.5 0.5 0.1 1.2\n");
+  EXPECT_THROWS(open(), InputError, "expected a share 0..1, got '1.2'", "windows/a.txt:1");
+}
+
 TEST_F(WindowTextsTest, OfATableWithoutEventsAreOfAStillScene) {
   text("b.csv", "t,x,y,p\n");
   boxes("a.txt", {0});

@@ -285,7 +285,13 @@ TEST_F(WindowLabelsTest, MistakesAreNamedByTheirLine) {
 TEST_F(WindowLabelsTest, OtherTextsAreNone) {
   for (const auto& [text, is] : {std::pair("", std::optional<bool>()),
                                  {"0 0.5 0.5 0.1 0.2\n", true},
+                                 {"0 0.5 0.5 0.1 1.2\n", true},  // with a mistake, as below
+                                 {"0 0.5 0.5 x 0.2\n", true},
+                                 {"person 0.5 0.5 0.1 0.2\n", true},
+                                 {"0 0.5 0.5 0.1\n0 0.5 0.5 0.1 0.2\n", true},
+                                 {"0 0.5 0.5 0.1\n", false},
                                  {"recorded on a Monday\n", false},
+                                 {"it was a sunny day\n", false},
                                  {"0.003811 96 133 0\n", false}}) {
     write_file(file_, text);
     EXPECT_EQ(is_window_label_text(file_), is) << text;
