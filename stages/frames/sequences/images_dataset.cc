@@ -307,23 +307,17 @@ class ImagesDataset final : public Dataset {
     for (const auto& [number, name] : folder.frames.frames()) {
       stems.insert(fs::path(name).stem().string());
     }
-    std::vector<std::string> alone;
     std::vector<std::string> left_out = folder.left_out;
     for (const auto& [stem, name] : folder.sidecars) {
-      if (labels_) {
-        left_out.push_back(name);
-      } else if (!stems.contains(stem)) {
-        alone.push_back(name);
-      }
+      if (labels_ || !stems.contains(stem)) left_out.push_back(name);
     }
     if (labels_) {  // which may lie beside the images
       std::erase_if(left_out, [&](const std::string& name) {
         return std::ranges::binary_search(annotation_files_,
                                           root_.written(spelled(fs::path(listed.path) / name)));
       });
-      std::ranges::sort(left_out);
     }
-    if (!alone.empty()) notes_.push_back(counted(alone, "label", " without an image" + place));
+    std::ranges::sort(left_out);
     if (!listed.name.empty() && !folder.folders.empty()) {
       notes_.push_back(counted(folder.folders, "folder", " left out" + place));
     }

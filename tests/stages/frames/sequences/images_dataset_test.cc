@@ -338,11 +338,9 @@ TEST_F(ImagesDatasetTest, WhatIsLeftOutIsCountedAndNamed) {
   const auto dataset = open();
   EXPECT_THAT(ids(), ElementsAre("a/001", "a/002", "b/1"));
   EXPECT_THAT(dataset->notes(), ElementsAre("1 file left out in clip: readme.md",
-                                            "1 label without an image in clip/a: 009.json",
-                                            "1 file left out in clip/a: 002.png",
-                                            "2 labels without an image in clip/b: 10.json, 11.json",
+                                            "2 files left out in clip/a: 002.png, 009.json",
                                             "1 folder left out in clip/b: deeper",
-                                            "1 file left out in clip/b: 1.txt"));
+                                            "3 files left out in clip/b: 1.txt, 10.json, 11.json"));
 }
 
 TEST_F(ImagesDatasetTest, PassesSidecarsThroughByteForByte) {
