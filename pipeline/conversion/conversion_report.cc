@@ -59,7 +59,10 @@ std::string labels_text(const ConversionReport& report) {
     parts.push_back(grouped(report.persons) + (report.persons == 1 ? " person" : " persons") +
                     " with joints");
   }
-  if (parts.empty()) parts.emplace_back("NO LABELS: no boxes and no persons with joints");
+  if (parts.empty()) {
+    parts.push_back((report.is_labelled ? "EMPTY LABELS" : "NO LABELS") +
+                    std::string(": no boxes and no persons with joints"));
+  }
   return fmt::format("{}", fmt::join(parts, "; "));
 }
 

@@ -210,7 +210,10 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
     (is_own ? own : elsewhere).push_back(&frozen.plan.shards[i]);
   }
   ConversionReport report = empty_report(folder, frozen.plan, own, options.part);
-  report.is_labelled = std::ranges::any_of(manifest.sources, has_labels);
+  report.is_labelled = std::ranges::any_of(planned.datasets, [](const auto& dataset) {
+    const LabelSchema& names = dataset->label_schema();
+    return !names.class_names.empty() || !names.joint_names.empty();
+  });
   report.notes = std::move(notes);
   say_part(report, options);
   EarlierShards earlier = look_back(job, options, own, elsewhere, report);

@@ -183,6 +183,15 @@ class FoundLabels(program.InFolder):
         with h5py.File(next((self.folder / "out").glob("*-val-*.h5"))) as file:
             self.assertEqual([text(name) for name in file["pairs/sample_id"]], ["frame_02"])
 
+    def test_images_without_objects_have_empty_labels(self):
+        self.images("images")
+        self.write("data.yaml", "names: [car]\n")
+        for name in NAMES:
+            self.write(f"labels/{name[:-4]}.txt", "")
+        told, err = self.convert()
+        self.assertNotIn("NO LABELS", told + err)
+        self.assertIn("\nEMPTY LABELS: no boxes and no persons with joints\n", told)
+
     def test_images_alone_have_no_labels(self):
         self.images("images")
         self.write("captions.json", json.dumps([{"image": name, "caption": "a street"} for name in NAMES]))

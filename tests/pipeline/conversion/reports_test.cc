@@ -40,7 +40,10 @@ TEST(ReportText, SaysWhatWasWrittenLostAndSpent) {
 
 TEST(ReportText, SaysBoxesByClass) {
   ConversionReport some = report();
+  EXPECT_THAT(to_text(some), HasSubstr("\nEMPTY LABELS: no boxes and no persons with joints\n"));
+  some.is_labelled = false;
   EXPECT_THAT(to_text(some), HasSubstr("\nNO LABELS: no boxes and no persons with joints\n"));
+  some.is_labelled = true;
   some.boxes = {{"0", 9}};
   EXPECT_THAT(to_text(some), HasSubstr("\nboxes: 9 of class 0\n"));
   some.boxes.clear();
