@@ -164,6 +164,7 @@ class WithoutManifest(program.InFolder):
         self.assertIn("--camera moves --classes dog,car: expected a folder, video or recording, got a manifest", err)
         _, err = convert("photos", "new", "--classes", "dgo", expect=66)
         self.assertIn("expected classes of the source (car, cat, dog), got dgo", err)
+        self.assertIn("; did you mean dog?", err)
 
     def test_one_of_44_photographs_may_fail(self):
         save_photographs(self.folder / "photos", 44, ("car",))

@@ -1,12 +1,17 @@
 #include "stages/frames/sources/class_numbers.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstddef>
-#include <functional>
 #include <map>
 #include <set>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
+#include "manifests/documents/strict_json.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "stages/frames/dataset/wrapped_dataset.h"
@@ -73,8 +78,12 @@ ClassNames taken_of(const Dataset& dataset, const SourceSpec& source) {
   ClassNames taken;
   for (const std::string& name : source.classes) {
     if (std::ranges::find(all, name) == all.end()) {
-      throw InputError("expected classes of the source (" + joined(all, ", ", std::identity()) +
-                       "), got " + name + ", in " + source.root);
+      constexpr std::size_t kMostNamed = 20;
+      const std::vector<std::string_view> known(all.begin(), all.end());
+      const std::string_view meant = near_word(name, known);
+      throw InputError(fmt::format("expected classes of the source ({}), got {}, in {}{}",
+                                   some_of(all, kMostNamed), name, source.root,
+                                   meant.empty() ? "" : fmt::format("; did you mean {}?", meant)));
     }
     if (std::ranges::find(taken, name) == taken.end()) taken.push_back(name);
   }

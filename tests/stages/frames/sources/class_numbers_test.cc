@@ -148,6 +148,18 @@ TEST_F(ClassNumbers, OthersThanTheSourceTakesAreLeftOutAndCounted) {
   sources_[1].classes = {"bike"};
   EXPECT_THROWS(number_classes(sources_, datasets_), InputError,
                 StrEq("expected classes of the source (car, person), got bike, in val/images"));
+  sources_[1].classes = {"persn"};
+  EXPECT_THROWS(number_classes(sources_, datasets_), InputError,
+                "got persn, in val/images; did you mean person?");
+}
+
+TEST_F(ClassNumbers, OfManyTwentyAreNamed) {
+  ClassNames many;
+  for (char letter = 'a'; letter <= 'z'; ++letter) many.emplace_back(3, letter);
+  add_table("train", many);
+  sources_[0].classes = {"zz"};
+  EXPECT_THROWS(number_classes(sources_, datasets_), InputError, "(aaa, bbb, ",
+                ", ttt, ...), got zz, in train/images; did you mean zzz?");
 }
 
 TEST_F(ClassNumbers, WhatIsStoredKeepsItsNumbers) {
