@@ -423,15 +423,21 @@ SensorFit fit_sensor(std::span<const FitPart> parts, const Generator* network,
     videos.push_back(read_video(parts[i], pairs[i].fitted));
     read_pairs(parts[i], pairs[i].kept, hot, kept);
   }
+  const auto has_events = [&] {
+    return std::ranges::any_of(fitted, [](const auto& pair) { return pair.event_count > 0; });
+  };
+  // Not one in all that time: a camera that was covered or off, or a file that lost them.
+  if (fit.noise && fit.noise->hot_pixels == 0 && !has_events()) {
+    fit.noise.reset();
+    fit.warnings.emplace_back("no noise, since the recordings have no events between these frames");
+  }
   fit.fitted_pairs = fitted.size();
   fit.kept_pairs = kept.size();
   describe_light(fitted, fit);
   if (fit.noise) {
     for (IntervalFrames& frames : fitted) frames = without_noise(std::move(frames), *fit.noise);
   }
-  const bool has_events = std::ranges::any_of(
-      fitted, [](const IntervalFrames& frames) { return frames.event_count > 0; });
-  if (has_events) {
+  if (has_events()) {
     const Fitter fitter(fitted, threads, fit);
     fit.difference = fitter.difference(videos);
     if (fit.difference) fit.difference_anew = fitter.difference_anew();
