@@ -249,7 +249,8 @@ class Init(program.InFolder):
         self.assertIn("PATH: expected a value, got nothing", self.init(self.folder / "k", "", expect=64))
         self.assertIn("DATASET or PATH: expected a dataset (kitti_object, ", self.init("kitti", empty, expect=64))
         self.assertIn("manifests/examples has a manifest", self.init("dhp19", empty, expect=64))
-        self.assertIn("expected mpii, got kitti_object, in ", self.init("mpii", self.folder / "k", expect=66))
+        self.assertIn("expected MPII Human Pose (mpii), got KITTI object (kitti_object), in ",
+                      self.init("mpii", self.folder / "k", expect=66))
         shutil.rmtree(self.folder / "k" / "image_2")
         self.assertIn("expected a folder, got nothing that can be read, in ", self.init(self.folder / "k", expect=66))
         (self.folder / "v").mkdir()
@@ -285,7 +286,8 @@ class Init(program.InFolder):
         self.assertEqual(read_commented(manifest)["name"], "all-events")
         _, manifest = self.init("frames", *given[2:])  # of one kind: as of one
         self.assertEqual((read_commented(manifest)["image"], len(read_commented(manifest)["sources"])), ({}, 2))
-        self.assertIn("expected kitti_object, got mpii_list, in ", self.init("kitti_object", *given[:3], expect=66))
+        self.assertIn("expected KITTI object (kitti_object), got MPII as a list of people (mpii_list), in ",
+                      self.init("kitti_object", *given[:3], expect=66))
         for same in given[0] / "label_2" / "..", given[0]:
             self.assertIn(f"expected each folder or video once, got it twice: {given[0]}",
                           self.init(given[0], given[2], same, expect=64))

@@ -1,5 +1,7 @@
 #include "stages/frames/sources/find_source.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <system_error>
@@ -299,9 +301,16 @@ std::vector<FoundSource> find_sources(const fs::path& path, std::optional<Datase
   if (!place) {
     if (const std::string fault = fault_of_file(root); !fault.empty()) throw InputError(fault);
     const auto other = dataset ? look_around(root, std::nullopt) : std::nullopt;
-    throw InputError("expected " + (dataset ? std::string(to_string(*dataset)) : known_titles()) +
-                     ", got " + std::string(other ? other->word() : "none of these") + ", in " +
-                     path.string() + (other || dataset ? "" : deeper_data(root)));
+    if (!dataset) {
+      throw InputError("expected " + known_titles() + ", got none of these, in " + path.string() +
+                       deeper_data(root));
+    }
+    throw InputError(fmt::format(
+        "expected {} ({}), got {}, in {} (manifests/guides/datasets.md shows what it "
+        "holds{})",
+        dataset_row(*dataset).title, to_string(*dataset),
+        other ? fmt::format("{} ({})", other->title(), other->word()) : "none", path.string(),
+        other ? fmt::format("; eventgan init \"{}\" takes what is there", root.string()) : ""));
   }
   std::vector<FoundSource> sources = source_of(*place);
   if (is_own(place->dataset)) note_dataset_above(sources.front());

@@ -127,12 +127,13 @@ TEST_F(FindSource, SaysWhatThereIsInstead) {
     const char* name;
     std::optional<DatasetKind> dataset;
     const char* got;
-  } cases[] = {{"notes", {}, "got none of these, in "},
-               {"notes/readme.txt", {}, "got none of these, in "},
-               {"testing", {}, "got none of these, in "},
-               {"absent", {}, "expected a folder or a video, got "},
-               {"images", kMpii, "expected mpii, got frames, in "},
-               {"notes", kFrames, "expected frames, got none of these, in "}};
+  } cases[] = {
+      {"notes", {}, "got none of these, in "},
+      {"notes/readme.txt", {}, "got none of these, in "},
+      {"testing", {}, "got none of these, in "},
+      {"absent", {}, "expected a folder or a video, got "},
+      {"images", kMpii, "expected MPII Human Pose (mpii), got images or videos (frames), in "},
+      {"notes", kFrames, "expected images or videos (frames), got none, in "}};
   for (const auto& [name, dataset, got] : cases) {
     EXPECT_THROWS(find(name, dataset), InputError, AllOf(HasSubstr(got), Not(HasSubstr("\n"))));
   }
