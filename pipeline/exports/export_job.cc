@@ -178,7 +178,7 @@ Report table_of(const ExportReport& report) {
           {"left_out", report.left_out,
            joined(report.left_out, "",
                   [](const auto& what) {
-                    return fmt::format("left out: {} {}\n", what.second, what.first);
+                    return fmt::format("left out: {}: {}\n", what.first, what.second);
                   })},
           {"notes", report.notes, listed(report.notes, "note: {}")},
           {"missing_shards", report.missing,

@@ -204,7 +204,7 @@ class Formats(Export):
         described = self.described()["left_out"]
         for name, count in left_out.items():
             self.assertEqual(described[f"boxes of class {name}"], count)
-            self.assertIn(f"left out: {count} boxes of class {name}", out)
+            self.assertIn(f"left out: boxes of class {name}: {count}\n", out)
 
     def test_yolo_full_scale(self):
         self.export("yolo", "--split", "val", "--full-scale", "4")

@@ -187,6 +187,12 @@ class Exporters : public ::testing::Test {
   static inline std::unique_ptr<testing::ConvertedFolder> converted_;
 };
 
+TEST(ExportReport, SaysWhatIsLeftOutAndThenHowMany) {
+  EXPECT_EQ(to_text({"out", 1, 2, {{"samples of a kind", 1}}, {}, {}}),
+            "out: 1 sample, 2 quarantined samples left out (listed in export.json)\n"
+            "left out: samples of a kind: 1\n");
+}
+
 TEST_F(Exporters, YoloHasBoxesAndPosesInSharesOfTheVolume) {
   const std::filesystem::path out = exported("yolo");
   // {1, 1, 4.25, 4.5} and {5, 0, 8, 3} of 8 x 6; DontCare is left out.
