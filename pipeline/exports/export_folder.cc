@@ -258,6 +258,8 @@ bool ExportFolder::Step::is_done() const {
     const fs::path relative = file.key();
     if (relative.parent_path() != folder) {
       require_no_link(folder_.folder_, folder = relative.parent_path());
+      // Where nothing is written any more, what a killed run has left may have been too new before.
+      folder_.make_folder(folder_.folder_ / folder);
     }
     folder_.require_own_name(file.key());
     std::error_code missing;

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -70,6 +71,28 @@ TEST_F(ExportRuns, KeepWhatIsDone) {
   const auto time = std::filesystem::last_write_time(path_ / "data.yaml");
   run(files);
   EXPECT_EQ(std::filesystem::last_write_time(path_ / "data.yaml"), time);
+}
+
+TEST_F(ExportRuns, RemoveOldTemporariesAlsoWhereAllIsDone) {
+  const Files files{{"a", {"images/a/1.png", "data.yaml"}}};
+  run(files);
+  // Of another host: whether its writer lives, only the age tells.
+  const auto temporary = path_ / "images/a/.1.png.elsewhere-1.7.0.tmp";
+  const auto mine = path_ / "images/a/.mine.tmp";
+  for (const auto& path : {temporary, mine}) testing::write_file(path, "part");
+  const auto finished = [&] {
+    ExportFolder out(path_, "job a\n", /*overwrite=*/false);
+    return ExportFolder::Step(out, "a", "input").is_done();
+  };
+  EXPECT_TRUE(finished());
+  EXPECT_TRUE(std::filesystem::exists(temporary)) << "it may be being written";
+  using namespace std::chrono_literals;
+  for (const auto& path : {temporary, mine}) {
+    std::filesystem::last_write_time(path, std::filesystem::file_time_type::clock::now() - 2h);
+  }
+  EXPECT_TRUE(finished());
+  EXPECT_FALSE(std::filesystem::exists(temporary));
+  EXPECT_TRUE(std::filesystem::exists(mine)) << "no name of ours";
 }
 
 TEST_F(ExportRuns, RemoveWhatAStepNoLongerMakes) {
