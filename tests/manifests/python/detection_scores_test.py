@@ -71,6 +71,13 @@ def test_a_second_one_is_wrong_for_voc_and_takes_another_box_for_coco():
     assert match_as_coco(found, truth)[0][:, 0].tolist() == [True, True]
 
 
+def test_of_boxes_that_fit_alike_coco_takes_the_last():
+    truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 0], [0, CAR, 4, 0, 14, 10, 0, 0])
+    # the first has IoU 8/12 with both; the second is the first box, and has 6/14 with the other
+    found = found_of([0, CAR, 2, 0, 12, 10, 0.9], [0, CAR, 0, 0, 10, 10, 0.8])
+    assert match_as_coco(found, truth)[0][:, 0].tolist() == [True, True]
+
+
 def test_equal_scores_stay_in_the_order_of_the_list():
     truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 0])
     right, wrong = [0, CAR, 0, 0, 10, 10, 0.5], [0, CAR, 20, 0, 30, 10, 0.5]

@@ -65,6 +65,8 @@ def test_poses_worked_out_by_hand():
     hidden[1, 3] = True
     head = head_lengths(names, joints, annotated)
     np.testing.assert_array_equal(head, [20, 20, np.nan])  # within 6 px is near
+    for shoulder in (1, 2):  # without one of them their middle is not known
+        assert np.isnan(head_lengths(names, joints, annotated & (np.arange(4) != shoulder))).all()
     persons = Persons(names, np.array([[0, 0], [0, 1], [1, 0]]), joints / 2, joints, annotated, hidden, head,
                       np.array([np.nan, np.nan, 100.0]), np.tile(np.eye(2, 3) / 2, (3, 1, 1)))
     found = joints.copy()
@@ -82,6 +84,16 @@ def test_poses_worked_out_by_hand():
     assert every["pckh"] == 3 / 7 and every["pckh_mpii"] == 1  # the first person's 4, the second's 3; the third's 3
     assert every["mpjpe_source"] == pytest.approx((6 + math.sqrt(45) + 30) / 7)
     assert pose_scores(found / 2, persons, hidden=True)["hand"]["scored"] == 3
+
+
+def test_pckh_of_all_joints_leaves_out_pelvis_and_thorax_as_mpii_does():
+    names = ["pelvis", "thorax", "r_knee"]
+    joints, annotated = np.full((1, 3, 2), 50.0), np.ones((1, 3), bool)
+    persons = Persons(names, np.array([[0, 0]]), joints, joints, annotated, ~annotated, np.array([100.0]),
+                      np.array([100.0]), np.eye(2, 3)[None])
+    scores = pose_scores(joints + [[[31, 0], [0, 31], [30, 0]]], persons)  # near is 0.5 x 0.6 x 100 px
+    assert [scores[name]["pckh_mpii"] for name in names] == [0, 0, 1]
+    assert scores["all"]["pckh_mpii"] == 1 and scores["all"]["pckh"] == 1 / 3
 
 
 def test_poses_without_a_head_or_a_person():
@@ -217,6 +229,22 @@ def test_difficulty_gives_the_recalls_and_kitti_s_levels(folder, tmp_path):
     result, _, _ = evaluate_detections(found, Samples(folder, None, None, None))
     assert result["classes"]["Car"]["easy"] == 2 and result["classes"]["Car"]["recall_easy"] == 0.5
     assert result["kitti"]["Car"].keys() == KITTI_LEVELS.keys()
+    samples = Samples(folder, None, None, None)
+    _, _, truth = evaluate_detections(found, samples)
+    cars = np.flatnonzero((truth.label == samples.classes.index("Car")) & ~truth.ignore)
+    ids, corners = samples.shards.column("sample_id")[truth.image[cars]], truth.xyxy[cars].reshape(-1, 2, 2)
+    sides = corners[:, 1] - corners[:, 0]
+    assert len(cars) == 2 and (2 <= sides[:, 1]).all() and (sides[:, 1] < 40).all()
+    found = write(tmp_path / "found.json", [box(name, "Car", [*corner, *side]) for name, corner, side
+                                            in zip(ids.tolist(), corners[:, 0].tolist(), sides.tolist())])
+    del samples  # and with them the open file
+    # The level is of boxes of 40 pixels of the source, and so of these where a row of the volume shows 20.
+    for scale_x, scale_y, counts in ((1, 1 / 20, True), (1 / 20, 1, False)):
+        with h5py.File(folder / NAME, "r+") as file:
+            file["pairs/source_to_volume"][...] = [[scale_x, 0, 0], [0, scale_y, 0]]
+        record.write_text(json.dumps({**json.loads(record.read_text()), "size_bytes": (folder / NAME).stat().st_size}))
+        result, _, _ = evaluate_detections(found, Samples(folder, None, None, None))
+        assert (result["kitti"]["Car"]["easy"] > 0) == counts
 
 
 @pytest.mark.parametrize(("entry", "error"), [

@@ -45,8 +45,9 @@ def test_of_a_drawing():
 def test_where_few_pixels_or_none_have_events():
     volume = np.zeros((2, 20, 20), np.float32)
     assert not signed_channel(volume).any()
-    volume[1, 3, 4] = 7  # 0.25 % of the pixels: the percentile is 0
-    assert signed_channel(volume)[0, 3, 4] == -1
+    for strength in (7, 0.25):
+        volume[1, 3, 4] = strength  # 0.25 % of the pixels: the percentile is 0
+        assert signed_channel(volume)[0, 3, 4] == -1
     assert signed_channel(np.zeros((2, 0, 5), np.float32)).shape == (1, 0, 5)
     assert not signed_channel(np.full((4, 4), 9, np.uint8)).any()
 
@@ -196,3 +197,7 @@ def test_shards_as_representations(example):
     np.testing.assert_array_equal(shards.represent("voxel:3", seed=4)[0]["volume"],
                                   shards.represent("voxel:3", seed=4)[0]["volume"])
     assert shards.represent("histogram:4")[0]["volume"].shape == (8, *volume.shape[1:])
+    # Events are spread over the pair's time: 0.2 s, and of the last sample, whose times are not known, 1 s.
+    surfaces = shards.represent("time_surface:1", counts="rounded")
+    oldest = [surfaces[i]["volume"][surfaces[i]["volume"] > 0].min() for i in (0, -1)]
+    assert np.exp(-0.2) - 1e-6 <= oldest[0] and np.exp(-1.0) - 1e-6 <= oldest[1] < np.exp(-0.2)

@@ -120,6 +120,8 @@ def test_another_sensor_s_threshold():
         left = EventAugmentation(threshold=(0.5, 0.5)).sensor(volume)
         strongest = 98 + 0.02 * (200 - 98)
         assert torch.equal(left, torch.where(counts >= 0.5 * strongest, volume, torch.zeros(())))
+    alike = torch.ones(2, 4, 4)
+    assert torch.equal(EventAugmentation(threshold=(1, 1)).sensor(alike), alike)  # none has fewer than the strongest
     torch.manual_seed(3)
     least = [EventAugmentation(threshold=(0.1, 0.3)).sensor(counts)[counts > 0] for _ in range(200)]
     least = torch.stack([each[each > 0].min() for each in least])  # each draw has a threshold of its own
@@ -525,6 +527,18 @@ def test_heatmaps():
     assert np.unravel_index(maps[0].argmax(), (12, 10)) == (4, 5) and maps[0].max() == 1
     np.testing.assert_allclose(maps[0, 4, 3:9], np.exp(-np.array([4, 1, 0, 1, 4, 9]) / 2), rtol=1e-6)
     assert maps[0, 4, 9] == 0 and maps[1, 2, 0] == np.float32(np.exp(-0.5)) and not maps[2:].any()
+    corners = np.array([[59, 2], [2, 59]])  # of which a map of 64 x 32 has one, and one of 32 x 64 the other
+    for height, width, inside in ((32, 64, [[1], [0]]), (64, 32, [[0], [1]])):
+        assert heatmaps(corners, np.array([True, True]), height, width, 1.0)[1].tolist() == inside
+
+
+def test_a_box_around_joints_has_a_margin_of_its_longer_side():
+    from eventgan.torch import _around
+
+    # from the left edge of the first joint's pixel to the right one of the last: 21 x 5, and 0.1 x 21 around
+    boxes, found = _around(np.array([[[10, 12], [30, 16]]]), np.array([[True, True]]), 0.1)
+    np.testing.assert_allclose(boxes, [[10 - 2.1, 12 - 2.1, 31 + 2.1, 17 + 2.1]])
+    assert found.all()
 
 
 @pytest.mark.skipif(not TRAINERS.is_dir(), reason="no ../shared/trainers")
