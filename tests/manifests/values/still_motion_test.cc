@@ -323,6 +323,22 @@ TEST(Carriers, AreNotWhatSomebodyStandsBefore) {
   EXPECT_THAT(carriers({bicycle, rider}), ElementsAre(1, 1));
 }
 
+TEST(ClipPoses, AnObjectThatIsFarFromItsPlaceTurnsBack) {
+  const double radius = 0.3 * 480;  // of the image's shorter side
+  // From there it turns by 0.5 rad a frame, less the 0.15 that it may turn the other way: half
+  // round on a circle of a step of 8 px by 0.35 rad.
+  const double farthest = radius + 2 * 8 / 0.35;
+  int beyond = 0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    for (const StillPose& pose : poses_of({outlined(0, {200, 150, 300, 250})}, seed)) {
+      const double away_px = std::hypot(pose.objects[0]->x_px, pose.objects[0]->y_px);
+      EXPECT_LE(away_px, farthest);
+      beyond += away_px > radius;
+    }
+  }
+  EXPECT_GT(beyond, 20);
+}
+
 TEST(ClipPoses, WhatHoldsNoPixelDoesNotMove) {
   Box sliver = outlined(0, {20, 20, 80, 50});
   sliver.outline = {{{{20, 20}, {80, 50}, {80, 50.05}}}};
