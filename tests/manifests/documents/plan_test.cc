@@ -47,6 +47,14 @@ TEST(PlanJson, AShardOfUnknownSizeSaysSo) {
   EXPECT_EQ(to_json(back), text);
 }
 
+TEST(PlanJson, AVideosFirstFrameIsStillOfAVideo) {
+  Plan plan = small_plan();
+  plan.shards[1].samples[0].pair.previous = {"clip.mp4", 0, 0};
+  const FrameRef back = parse_plan(to_json(plan), "plan.json").shards[1].samples[0].pair.previous;
+  EXPECT_EQ(back.video_frame, 0);
+  EXPECT_EQ(back.index, 0);
+}
+
 TEST(PlanJson, AStillsMotionIsStoredToTheLastBit) {
   Plan plan = small_plan();
   const ImageMotion motion{1.0 / 3, -1e-17, 2 - 1e-15, 1 + 1e-15};
