@@ -211,7 +211,9 @@ TEST(MapLabels, WhatAPersonMustBeIsChecked) {
                     }),
        ""},
       {person({{{1300, 10}, 1}, {{1241.5, 374.5}, 0}}), ""},  // the very corner
+      {person({{{-0.5, -0.5}, 1}}), ""},                      // of the first pixel
       {person({{{1241.6, 10}, 1}}), "expected a joint inside the image"},
+      {person({{{-0.6, 10}, 1}}), "expected a joint inside the image"},
       {person({{kMissingPoint, 0}, {{1300, 10}, 1}, {{10, 400}, 1}}),
        "expected a joint inside the image of 1242x375 pixels, got all annotated ones outside it, "
        "the first at (1300, 10), in person 1 of 1, in label_2/001497.txt"},
