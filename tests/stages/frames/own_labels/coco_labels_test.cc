@@ -211,6 +211,8 @@ TEST_F(CocoLabels, WholeBodysFeetFaceAndHandsAreJoints) {
       {2, "left_big_toe"},      {8 + 0, "right_face_0"},   {8 + 16, "left_face_0"},
       {8 + 8, "face_8"},        {8 + 36, "right_face_36"}, {8 + 45, "left_face_36"},
       {8 + 46, "left_face_41"}, {8 + 30, "face_30"},       {8 + 67, "left_face_65"},
+      {8 + 26, "left_face_17"}, {8 + 35, "left_face_31"},  {8 + 42, "left_face_39"},
+      {8 + 54, "left_face_48"}, {8 + 59, "left_face_55"},  {8 + 64, "left_face_60"},
       {8 + 68, "left_hand_0"},  {117, "right_hand_20"}};
   for (const auto& [i, name] : at) EXPECT_EQ(names[i], name);
   const Annotation read = annotation();

@@ -159,6 +159,7 @@ TEST(CsvLabels, ARowThatDoesNotTellItsImageIsRefused) {
       {header + "a.png,car,0,0.25,1,1,\n", shares},
       {header + "a.png,car,-0.004,0,1.0004,1,\n", shares},
       {header + "a.png,car,0,0,1,1,\nb.png,car,0,0,0.5,1,\n", shares},
+      {header + "a.png,car,0,0,1,1,\nb.png,car,0,0,1,1,\nc.png,car,0,0,1,1,\n", shares},  // whole
       {"image,class,x,y,w,h\na.png,car,0.5,0.25,0.5,0.75\n", "got shares of the image"},
       {header + "a.png,car,1,2,3,4\n", "expected 7 fields, got 6, in labels.csv:2"},
       {header + "a.png,car,1,2,3,4,,\n", "expected 7 fields, got 8, in labels.csv:2"},

@@ -131,6 +131,19 @@ TEST_F(NamedLabels, OneEdgeAt0TellsThatVocsCountFrom0) {
   }
 }
 
+TEST_F(NamedLabels, TheEdgesAt0MayBeLeftOrTop) {
+  images({"i/1.png"});
+  const struct {
+    const char *left, *top;
+    double from;
+  } cases[] = {{"0", "5", 0}, {"0.5", "5", 0}, {"5", "0", 0}, {"1", "1", 1}};  // VOC's first pixel
+  for (const auto& [left, top, from] : cases) {
+    write("x/1.xml", cat(left, top, "40"));
+    EXPECT_THAT(boxes_of(*voc(), "1.xml"),
+                ElementsAre(Rectangle{std::stod(left) - from, std::stod(top) - from, 40, 20}));
+  }
+}
+
 TEST_F(NamedLabels, WhatVocHasBesideItsFormatIsANote) {
   images({"i/1.png", "i/2.png", "i/3.png"});
   const std::string mark = "<difficult>Unspecified</difficult>";
@@ -268,6 +281,8 @@ TEST_F(NamedLabels, MotOfImagesWithoutNumbersNeedsAllOfThem) {
   // seqinfo.ini counts frames without labels, too.
   write("m/s/seqinfo.ini", "[Sequence]\nframeRate=25\nseqLength=6\nimWidth=40\nimHeight=30\n");
   EXPECT_THROWS(mot("m", "m"), InputError, "all 6 frames of m/s/gt.txt, got 5");
+  write("m/s/seqinfo.ini", "[Sequence]\nframeRate=25\nseqLength=4\nimWidth=40\nimHeight=30\n");
+  EXPECT_THROWS(mot("m", "m"), InputError, "all 4 frames of m/s/gt.txt, got 5");
   // Numbers from 0 may have gaps.
   images({"n/00.png", "n/01.png", "n/04.png"});
   write("n/gt.txt", "5,1,1,1,5,5,1\n");

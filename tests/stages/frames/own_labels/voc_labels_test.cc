@@ -153,7 +153,9 @@ TEST(VocLabels, MarksThatAreNoMarksAreUnknown) {
   const auto marked = [](const std::string& marks) {
     return read_voc(annotation(object("<name>a</name>" + std::string(kBox) + marks)));
   };
-  const ImageLabels share = marked("<truncated>0.0625</truncated><difficult>True</difficult>");
+  // Of an occlusion there is no share, so that half of one is neither 0 nor 1.
+  const ImageLabels share =
+      marked("<truncated>0.0625</truncated><occluded>0.5</occluded><difficult>True</difficult>");
   EXPECT_EQ(share.boxes.at(0).box,
             (Box{.xyxy = {0, 0, 30, 20}, .truncation = 0.0625f, .ignore = true}));
   EXPECT_THAT(share.remarks, IsEmpty());

@@ -126,6 +126,9 @@ TEST(YoloText, JointsWithoutVisibility) {
   EXPECT_THAT(schema.names.joint_names, ElementsAre("0", "1"));
   EXPECT_THAT(read_yolo("0 0.5 0.5 1 1 0.25 0.5 0 0", schema).persons.at(0).joints,
               ElementsAre(Joint{{9.5, 14.5}, -1}, Joint{kMissingPoint, 0}));
+  // Shares are taken that rounding has put a little beyond 0..1: the image's edges.
+  EXPECT_THAT(read_yolo("0 0.5 0.5 1 1 1.005 -0.01 -0.005 1.01", schema).persons.at(0).joints,
+              ElementsAre(Joint{{39.5, -0.5}, -1}, Joint{{-0.5, 29.5}, -1}));
 }
 
 TEST(YoloYaml, NamesAreAListOrAMap) {
