@@ -358,6 +358,13 @@ TEST_F(StillObjects, NoPointOfAnOutlineBeyondItsBoxMovesFarther) {
   const double chord = 2 * std::sin(1.5 * std::numbers::pi / 180);
   EXPECT_NEAR(frames_between(shared(), pair_, {}, boxes_).displacement_px,
               chord * std::hypot(45, 5), 1e-9);
+  ImageSpec stretched;
+  stretched.fit = ImageFit::kStretch;
+  for (const ImageSize size : {ImageSize{180, 80}, {60, 240}}) {  // three times as high, or as wide
+    stretched.size = size;
+    EXPECT_NEAR(frames_between(shared(), pair_, stretched, boxes_).displacement_px,
+                3 * chord * std::hypot(45, 5), 1e-9);
+  }
 }
 
 TEST_F(StillObjects, WhatDoesNotMoveOnItsOwnIsAPartOfTheImage) {

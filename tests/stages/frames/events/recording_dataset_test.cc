@@ -87,6 +87,20 @@ TEST_F(RecordingDatasetTest, LabelsAreAtTheEndOrInTheMiddleOfTheirWindows) {
   EXPECT_EQ(window(*dataset, 1), (std::array{1.5, 2.0}));
 }
 
+TEST_F(RecordingDatasetTest, AWindowIsAsLongAsTheIntervalThatItsLabelLiesInOrEnds) {
+  auto datasets = testing::small_mvsec();
+  datasets["davis/left/image_raw_ts"] = {{3}, std::vector<double>{1.0, 1.5, 2.5}};
+  datasets.erase("davis/left/image_raw_event_inds");
+  testing::write_hdf5(at("drive.h5"), datasets);
+  label("0.75\n1\n1.25\n1.5\n2\n2.5\n3\n");  // as long as the nearest
+  const auto dataset = open();
+  const double lengths[] = {0.5, 0.5, 0.5, 0.5, 1, 1, 1};
+  for (std::size_t i = 0; i < std::size(lengths); ++i) {
+    const auto [begin_s, end_s] = window(*dataset, i);
+    EXPECT_EQ(end_s - begin_s, lengths[i]) << end_s;
+  }
+}
+
 TEST_F(RecordingDatasetTest, AWindowMayLastSoManySeconds) {
   label("1\n1.5\n2.5\n");
   spec_.window.duration_s = 0.25;

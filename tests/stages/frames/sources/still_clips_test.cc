@@ -201,6 +201,18 @@ TEST_F(StillClipsTest, WithoutMotionLabelsAreTheStillsInTheWindow) {
   EXPECT_DOUBLE_EQ(annotation.persons[0].scale, 2);
 }
 
+TEST_F(StillClipsTest, APersonsScaleGrowsWithTheImageUnlessItIsUnknown) {
+  pairs().stills = StillsSpec{{0, 0}, 0, 0.02};
+  still_.boxes.clear();
+  still_.persons.resize(2);
+  for (Person& person : still_.persons) person.joints = {{{80, 60}, 1}};
+  still_.persons[1].scale = 2;
+  const Annotation annotation = annotation_of(open(), 9);
+  ASSERT_EQ(annotation.persons.size(), 2u);
+  EXPECT_EQ(annotation.persons[0].scale, -1);
+  EXPECT_NE(annotation.persons[1].scale, 2);
+}
+
 TEST_F(StillClipsTest, WhatIsCoveredIsToldAndJointsBehindItAreHidden) {
   nothing_moves();
   still_.boxes = {still_object({60, 40, 90, 70}), still_object({60, 45, 90, 75})};
