@@ -42,8 +42,10 @@ TEST_F(ListedPersonTest, NeedsCentreScaleAndAJoint) {
   other.center = kMissingPoint;
   EXPECT_EQ(why_not_listed(other, choice_), "no centre or no scale");
   other = person_;
-  other.scale = -1;
-  EXPECT_EQ(why_not_listed(other, choice_), "no centre or no scale");
+  for (const double scale : {-1.0, 0.0}) {  // which a trainer divides by
+    other.scale = scale;
+    EXPECT_EQ(why_not_listed(other, choice_), "no centre or no scale");
+  }
   other = person_;
   other.joints.assign(3, kMissingPoint);
   EXPECT_EQ(why_not_listed(other, choice_), "no joint annotated");
@@ -95,6 +97,12 @@ TEST_F(ListedPersonTest, PckhTruthHasMatlabsOrderAndCountsFromOne) {
   EXPECT_NEAR((boxes[7] + boxes[8]) / 2, 4 + 1, 1e-12);
   EXPECT_EQ(std::vector<double>(boxes.begin() + 11, boxes.end()),
             (std::vector<double>{1, 2, 1, 2}));
+}
+
+TEST_F(ListedPersonTest, NoHeadSpansFromAJointToItself) {
+  PckhTruth truth(choice_.names);
+  person_.joints = {{3, 4}, {8, 9}, {3, 4}};  // neck and head
+  EXPECT_FALSE(truth.add(listed_person(person_, choice_))) << "no distance is within a share of 0";
 }
 
 TEST_F(ListedPersonTest, PckhTruthIsTheSameEachTimeAndWholeOrNotThere) {
