@@ -47,6 +47,13 @@ TEST(CompactEvents, HoldAnyNumbers) {
   }
 }
 
+TEST(CompactEvents, TimesOfAnyNumbersAreDivided) {
+  CompactEvents kept = compact({{0, 0, 3e6, 1}, {1.5, 0, 4e6, 1}, {2, 0, 5e6, 300}});
+  kept.divide_times(1e6);
+  EXPECT_THAT(kept.times_s(), ElementsAre(3, 4, 5));
+  for (const std::int64_t i : {0, 1, 2}) EXPECT_EQ(kept[i].t_s, 3 + static_cast<double>(i));
+}
+
 /// Three parts, of times 1, 2, 2; 3; 5, 6 s.
 class TestParts final : public EventParts {
  public:

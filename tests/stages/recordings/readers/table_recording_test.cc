@@ -5,12 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <string>
 #include <tuple>
 
 #include "manifests/values/faults.h"
 #include "stages/base/archives/numpy_arrays.h"
+#include "stages/recordings/readers/detail/event_parts.h"
 #include "tests/testing/npy_bytes.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -180,6 +182,13 @@ TEST_F(TableRecordingTest, IsSortedByTimeAndSaysSo) {
   EXPECT_THAT(open("a.csv")->notes(),
               ElementsAre(HasSubstr("microseconds: 2e-06 s, 3 events, "),
                           AllOf(HasSubstr("first at event 2"), HasSubstr("sorted by time"))));
+  // So it is where it is read again, since others have taken its place in memory.
+  const auto recording = open("a.csv");
+  const auto* const last = reinterpret_cast<const EventParts*>(UINTPTR_MAX);
+  recent_events().forget({nullptr, 0}, {last, SIZE_MAX});
+  EXPECT_THAT(
+      recording->events_in(0, 1),
+      ElementsAre(Event{0, 2, 5e-6, true}, Event{3, 0, 7e-6, false}, Event{1, 1, 7e-6, true}));
   testing::write_file(folder_ / "b.csv", "t,x,y,p\n5,0,2,1\n7,1,1,1\n");
   EXPECT_EQ(open("b.csv")->notes().size(), 1u);
 }

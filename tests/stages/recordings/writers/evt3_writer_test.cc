@@ -66,14 +66,19 @@ std::vector<StampedEvent> decode(const std::vector<unsigned>& words) {
 TEST(Evt3Writer, WritesWhatHasChanged) {
   const TemporaryFolder folder;
   Evt3Writer writer(folder / "a.raw", {480, 640});
-  const std::vector<StampedEvent> events{
-      {0, 7, 3, true}, {0, 8, 3, false}, {4097, 639, 479, true}, {4097, 0, 479, true}};
+  // The lower bits go with each of the upper ones: for readers these begin at 0.
+  const std::vector<StampedEvent> events{{0, 7, 3, true},
+                                         {0, 8, 3, false},
+                                         {4097, 639, 479, true},
+                                         {4097, 0, 479, true},
+                                         {8193, 0, 479, true}};
   writer.add_events(events);
-  writer.commit(5000);
+  writer.commit(9096);
   const std::string bytes = testing::read_file(folder / "a.raw");
   EXPECT_NE(bytes.find("\n% format EVT3;height=480;width=640\n"), std::string::npos);
-  EXPECT_EQ(words_of(bytes), (std::vector<unsigned>{0x8000, 0x6000, 0x0003, 0x2807, 0x2008, 0x8001,
-                                                    0x6001, 0x01df, 0x2a7f, 0x2800, 0x6388}));
+  EXPECT_EQ(words_of(bytes),
+            (std::vector<unsigned>{0x8000, 0x6000, 0x0003, 0x2807, 0x2008, 0x8001, 0x6001, 0x01df,
+                                   0x2a7f, 0x2800, 0x8002, 0x6001, 0x2800, 0x6388}));
 }
 
 TEST(Evt3Writer, IsReadBackEventForEventOverWrapsAndSilence) {
