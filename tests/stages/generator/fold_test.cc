@@ -69,6 +69,10 @@ TEST(FoldGenerator, DividesBySpectralNormAfterOnePowerIteration) {
   // v = 1/√27 each, W v = √27, u = 1, σ = √27: the stored v plays no part.
   EXPECT_THAT(layer(fold_generator(state, "test"), "decoders.3").weight,
               ::testing::Each(::testing::FloatNear(float(1 / std::sqrt(27.0)), 1e-6f)));
+  // The bias lies beside the weight, and is not divided: 3 + (0.5 - 5) x 1.
+  state[module + ".module.bias"] = {{1}, {0.5f}};
+  EXPECT_THAT(layer(fold_generator(state, "test"), "decoders.3").bias,
+              ::testing::ElementsAre(::testing::FloatNear(-1.5f, 1e-5f)));
 }
 
 /// The network that was folded elsewhere: convolutions with a bias, no batch norm.
