@@ -95,6 +95,14 @@ TEST_F(ExportRuns, RemoveOldTemporariesAlsoWhereAllIsDone) {
   EXPECT_TRUE(std::filesystem::exists(mine)) << "no name of ours";
 }
 
+TEST_F(ExportRuns, WriteAgainWhatWasCut) {
+  const Files files{{"a", {"labels/a/1.txt", "labels/a/2.txt"}}};
+  run(files);
+  std::filesystem::resize_file(path_ / "labels/a/2.txt", 2);
+  run(files);
+  EXPECT_EQ(testing::read_file(path_ / "labels/a/2.txt"), "input");
+}
+
 TEST_F(ExportRuns, RemoveWhatAStepNoLongerMakes) {
   run({{"a", {"labels/a/1.txt", "labels/a/2.txt"}}, {"b", {"labels/b/3.txt"}}});
   run({{"a", {"labels/a/2.txt"}}, {"b", {}}}, "another input");
