@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -160,6 +161,23 @@ TEST(Representations, OfVoxelsArePositiveMinusNegativeBinsOfAVolume) {
   }
   EXPECT_NEAR(sum, 0, 1e-4);
   EXPECT_NEAR(squares / static_cast<double>(voxels.size()), 1, 1e-4);
+}
+
+TEST(Representations, OfVoxelsThatOnlyRoundingTellsApartAreTheMean) {
+  // Of each pixel one event as long after the begin as another is before the end: 1 in both bins,
+  // but for rounding, which must not become values of 1.
+  std::vector<Event> events;
+  constexpr ImageSize kSize{1, 400};
+  for (int x = 0; x < kSize.width; ++x) {
+    const double share = (x + 1) / 1000.0;
+    events.push_back({x, 0, share, true});
+    events.push_back({x, 0, 1 - share, true});
+  }
+  std::ranges::sort(events, {}, &Event::t_s);
+  const auto [least, most] = std::ranges::minmax(values_of(events, "voxel:2", kSize, {{0, 1}}));
+  EXPECT_LT(least, most);
+  EXPECT_THAT(values_of(events, "voxel_normalized:2", kSize, {{0, 1}}),
+              Each(::testing::DoubleNear(0, 1e-6)));
 }
 
 TEST(Representations, OfHistogramsAreCutAtTen) {
