@@ -202,6 +202,18 @@ def test_a_number_is_the_place_in_the_split_whatever_is_scored_of_it(two_shards,
     assert samples.of([box(n, 1, right) for n in range(1, 9)], "").tolist() == [-1] * 6 + [0, -1]
 
 
+def test_predictions_for_samples_of_a_source_without_boxes_do_not_count(two_shards, tmp_path):
+    with h5py.File(two_shards / SECOND, "r+") as file:
+        del file["labels/boxes/class_id"].attrs["class_names"]
+        file["labels/boxes/offsets"][...] = 0
+    record, size_bytes = (two_shards / SECOND).with_suffix(".json"), (two_shards / SECOND).stat().st_size
+    record.write_text(json.dumps({**json.loads(record.read_text()), "size_bytes": size_bytes}))
+    found = write(tmp_path / "found.json", [box(number, "Car", [1, 1, 3.25, 3.5]) for number in (1, 5)])
+    result, _, _ = evaluate_detections(found, Samples(two_shards, "train", None, None))
+    assert result["counts"]["samples"] == 4 and result["counts"]["not_of_these_samples"] == 1
+    assert result["classes"]["Car"]["precision"] == 1
+
+
 def test_average_precision_has_no_least_score_and_no_suppression(folder, tmp_path):
     found = write(tmp_path / "found.json",
                   [box("000003", "Car", [0, 0, 3, 3], 0.06), box("000000", "Car", [1, 1, 3.25, 3.5], 0.05),
