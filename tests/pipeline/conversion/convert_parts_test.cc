@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "manifests/files/unfinished_files.h"
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/convert.h"
 #include "tests/pipeline/conversion/small_conversion.h"
@@ -141,6 +143,29 @@ TEST_F(ConvertParts, WhatAnotherWorkerFinishesMeanwhileIsTaken) {
   EXPECT_EQ(report.written, 11);
   EXPECT_THAT(shown.str(), ::testing::HasSubstr("9/9 pairs"));
   EXPECT_THAT(to_text(report), ::testing::HasSubstr("(1 done by others)"));
+}
+
+TEST_F(ConvertParts, WhatAnotherWorkerFinishesWhileItIsMadeHereTooIsTaken) {
+  const std::string shard = "job-train-00000-of-00006";
+  ConversionOptions shared = options("out", /*threads=*/1);  // so that it is asked between writes
+  // Asked before each sample is written. Takes the unfinished shard and its claim away, as a worker
+  // does that takes this one for dead, and makes the shard in its place.
+  shared.since_stop_request = [&]() -> std::optional<double> {
+    if (!std::filesystem::exists(out(""))) return std::nullopt;
+    std::vector<UnfinishedFile> files = unfinished_files(out(""));
+    std::erase_if(files, [&](const auto& file) { return file.name.target != shard + ".h5"; });
+    if (files.size() < 2) return std::nullopt;
+    for (const char* extension : {".h5", ".json"}) {
+      std::filesystem::copy_file(out(shard + extension, "whole"), out(shard + extension));
+    }
+    for (const UnfinishedFile& file : files) std::filesystem::remove(file.path);
+    return std::nullopt;
+  };
+  const ConversionReport report = run(shared);
+  EXPECT_TRUE(report.complete());
+  EXPECT_EQ(report.shards_done_by_others, 1);
+  EXPECT_EQ(report.written, 11);
+  EXPECT_EQ(shards(), shards("whole"));
 }
 
 /// Deletes a file whenever it is asked for a volume, as a person might who tidies up.
