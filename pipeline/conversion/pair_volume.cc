@@ -13,11 +13,10 @@
 namespace eventgan {
 namespace {
 
-/// Whether the generator gives events although nothing moves.
+/// Whether the sensor gives events although nothing moves.
 bool has_events_at_rest(const GeneratorSpec& spec) {
-  const GeneratorRow& row = generator_row(spec.kind);
-  return row.moves_one_frame ||
-         (row.has_sensor_settings && idle_event_bytes(spec.sensor, 1, spec.duration_s) > 0);
+  return generator_row(spec.kind).has_sensor_settings &&
+         idle_event_bytes(spec.sensor, 1, spec.duration_s) > 0;
 }
 
 bool is_same_image(const PreparedPair& pair) {
@@ -38,7 +37,8 @@ GeneratedPart generate_volume(const Generator& generator, const GeneratorSpec& s
         wanted_tiles(spec.scope, pair.input, pair.content, pair.content_y, pair.content_x, labels);
     part.tiles = tiles_of_volume(wanted, pair.content_y, pair.content_x, pair.placement.volume);
   }
-  part.same_image = is_same_image(pair);
+  const bool rests = pair.between.at && pair.between.displacement_px == 0;
+  part.same_image = (rests || !generator_row(spec.kind).moves_one_frame) && is_same_image(pair);
   if (part.same_image && !has_events_at_rest(spec)) {
     std::ranges::fill(volume, 0.0f);
     part.notes.sound = true;

@@ -23,15 +23,16 @@ struct GeneratedPart {
   /// generated.
   std::vector<std::uint8_t> tiles;
   std::optional<ContrastThreshold> threshold;  ///< pair_threshold()
-  bool same_image = false;  ///< both frames are the same image: a sensor sees nothing there
+  /// Both frames are the same image, and nothing moves between them: a sensor sees nothing there.
+  bool same_image = false;
 };
 
 /// Generates what the scope wants of a pair's volume, zeros elsewhere, by the sensor that the
 /// manifest tells; and draws events if it gives rates and the manifest wants events (draw_events).
 /// Of the same image twice all is zeros and the generator is not asked, unless it draws a motion of
-/// its own (GeneratorRow::moves_one_frame) or its sensor has leak or noise.
-/// `volume`: [2 bins, y, x] of pair.content, overwritten whole. `labels` are in pixels of the whole
-/// volume. Throws as Generator::generate. Thread safe.
+/// its own (GeneratorRow::moves_one_frame, but for a still that rests) or its sensor has leak or
+/// noise. `volume`: [2 bins, y, x] of pair.content, overwritten whole.
+/// `labels` are in pixels of the whole volume. Throws as Generator::generate. Thread safe.
 GeneratedPart generate_volume(const Generator& generator, const GeneratorSpec& spec,
                               const PairKey& key, const PreparedPair& pair,
                               const VolumeLabels& labels, std::span<float> volume);
