@@ -59,6 +59,9 @@ void require_kept(const DraftWishes& wishes, const JobManifest& manifest, const 
     return stills && stills->objects && stills->rests == rests_of(*wishes.camera);
   };
   if (wishes.camera && std::ranges::none_of(manifest.sources, has_rests)) refuse("--camera");
+  if (wishes.camera == CameraMotion::kMoves && manifest.generator.weights != "shipped:16") {
+    refuse("--camera");  // what is written where the folders' names alone tell that it moves
+  }
   const auto has_classes = [&](const SourceSpec& source) {
     return source.classes == wishes.classes;
   };
@@ -112,10 +115,12 @@ std::string GivenWishes::text() const {
 }
 
 void add_draft_options(CLI::App& command, DraftWishes& wishes) {
-  take_one_of(command.add_option("--camera", wishes.camera,
-                                 "Of photographs with boxes: the camera whose events are wanted "
-                                 "rests, moves, or does both; default: rests"),
-              kCameras);
+  take_one_of(
+      command.add_option("--camera", wishes.camera,
+                         "Of photographs with boxes: the camera whose events are wanted "
+                         "rests, moves, or does both; default: moves for driving scenes, as "
+                         "their folders are called, else rests"),
+      kCameras);
   command
       .add_option("--classes", wishes.classes,
                   "Take only the boxes of these classes; others are left out and counted")

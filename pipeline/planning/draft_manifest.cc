@@ -57,7 +57,8 @@ std::string name_after(fs::path path) {
 }
 
 /// The set of driving scenes that the source is one of, as the folders around its images or the
-/// file of its labels are called; empty: none that is known.
+/// file of its labels are called: with a word of these that is no part of a longer one. Empty: none
+/// that is known.
 std::string_view driving_set(const FoundSource& found) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kSets{
       {{"bdd100k", "BDD100K"},
@@ -68,19 +69,23 @@ std::string_view driving_set(const FoundSource& found) {
        {"nuimages", "nuImages"},
        {"CAM_FRONT", "nuImages"}}};
   if (found.dataset == DatasetKind::kKittiObject) return "KITTI";
-  if (!found.labels) return {};
   constexpr int kFoldersAround = 4;  // bdd100k/images/100k/train
-  std::vector<std::string> names{found.labels->path.filename().string()};
+  std::vector<std::string> names;
+  if (found.labels) names.push_back(found.labels->path.filename().string());
   fs::path folder = found.root;
   for (int i = 0; i < kFoldersAround; ++i, folder = folder.parent_path()) {
     names.push_back(folder.filename().string());
   }
-  const auto same_letter = [](unsigned char a, unsigned char b) {
-    return std::tolower(a) == std::tolower(b);
+  const auto byte = [](char letter) { return static_cast<unsigned char>(letter); };
+  const auto same_letter = [&](char a, char b) {
+    return std::tolower(byte(a)) == std::tolower(byte(b));
   };
   for (const auto& [word, title] : kSets) {
     for (const std::string& name : names) {
-      if (!std::ranges::search(name, word, same_letter).empty()) return title;
+      const auto at = std::ranges::search(name, word, same_letter);
+      const bool is_longer = (at.begin() != name.begin() && std::isalpha(byte(at.begin()[-1]))) ||
+                             (at.end() != name.end() && std::isalpha(byte(*at.end())));
+      if (!at.empty() && !is_longer) return title;
     }
   }
   return {};
@@ -142,8 +147,10 @@ class Draft {
                       "({}) has no instructions for int8",
                       precision(), int8.instruction_set));
     }
-    if (const std::string why = rest_text(sources); !why.empty()) {
-      lines.push_back("\"scope\": \"motion\", since " + why);
+    if (const SeenMotion seen = motion_of(sources); seen.pairs > 0) {
+      lines.push_back(
+          (rests(seen) ? "\"scope\": \"motion\", since " : "all tiles are generated: ") +
+          motion_text(seen));
     }
     return lines;
   }
@@ -175,35 +182,43 @@ class Draft {
                                 drives);
   }
 
-  /// Why what moves is enough, where at least a third of the tiles of all frames rests, as far as
-  /// the pairs that were looked at tell; else empty.
-  static std::string rest_text(const std::vector<SourceDraft>& sources) {
-    constexpr double kLeast = 1.0 / 3;
+  /// Of the sources together, by their numbers of frames.
+  static SeenMotion motion_of(const std::vector<SourceDraft>& sources) {
+    SeenMotion seen;
     double frames = 0, moving = 0;
-    int pairs = 0, resting = 0;
     for (const SourceDraft& source : sources) {
       const auto count = static_cast<double>(source.labelled_frames);
       frames += count;
       moving += count * source.motion.tiles;
-      pairs += source.motion.pairs;
-      resting += source.motion.resting;
+      seen.pairs += source.motion.pairs;
+      seen.resting += source.motion.resting;
     }
-    if (pairs == 0 || 1 - moving / frames < kLeast) return "";
-    return fmt::format("the image rests in {} of {} pairs: {:.0f} % of the tiles move", resting,
-                       pairs, 100 * moving / frames);
+    if (frames > 0) seen.tiles = moving / frames;
+    return seen;
+  }
+
+  /// Whether what moves is enough: at least a third of the tiles rests.
+  static bool rests(const SeenMotion& seen) {
+    constexpr double kLeast = 1.0 / 3;
+    return seen.pairs > 0 && 1 - seen.tiles >= kLeast;
+  }
+
+  static std::string motion_text(const SeenMotion& seen) {
+    return fmt::format("the image rests in {} of {} pairs: {:.0f} % of the tiles move",
+                       seen.resting, seen.pairs, 100 * seen.tiles);
   }
 
   const char* precision() const { return has_int8_ ? "int8" : "auto"; }
 
   std::string generator_text(const std::vector<SourceDraft>& sources) const {
-    const std::string rest = rest_text(sources);
-    const std::string scope = rest.empty() ? "" : R"(, "scope": "motion")";
+    const SeenMotion seen = motion_of(sources);
+    const std::string scope = rests(seen) ? R"(, "scope": "motion")" : "";
     const std::string scope_comment =
-        rest.empty() ? ""
-                     : fmt::format(
-                           "  // Only what moves is generated (\"scope\"), since {}\n  // "
-                           "(manifests/guides/speed.md).\n",
-                           rest);
+        rests(seen) ? fmt::format(
+                          "  // Only what moves is generated (\"scope\"), since {}\n  // "
+                          "(manifests/guides/speed.md).\n",
+                          motion_text(seen))
+                    : "";
     if (moves()) {
       return fmt::format(
           R"(  // Before a moving camera detectors of persons learn most from the wide weights (manifests/guides/choose.md).

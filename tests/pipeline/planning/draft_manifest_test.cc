@@ -132,14 +132,16 @@ TEST_F(DraftManifest, GeneratesWhatMovesWhereAThirdOfTheTilesRests) {
     }
   }
   // Of several sources each counts as often as it has frames.
-  const auto scope = [&](int resting, int moving) {
-    const std::string both = std::to_string(number++);
-    return read(
-               draft({blinking("rests" + both, resting, 0), blinking("moves" + both, moving, 128)}))
-        .generator.scope.scope;
+  const auto both = [&](int resting, int moving) {
+    const std::string name = std::to_string(number++);
+    return draft({blinking("rests" + name, resting, 0), blinking("moves" + name, moving, 128)});
   };
-  EXPECT_EQ(scope(16, 24), Scope::kMotion);
-  EXPECT_EQ(scope(12, 28), Scope::kWhole);
+  EXPECT_EQ(read(both(16, 24)).generator.scope.scope, Scope::kMotion);
+  const ManifestDraft whole = both(12, 28);
+  EXPECT_EQ(read(whole).generator.scope.scope, Scope::kWhole);
+  EXPECT_THAT(whole.findings.back(),
+              AllOf(HasSubstr("all tiles are generated: the image rests in "),
+                    HasSubstr("70 % of the tiles move")));
 }
 
 TEST_F(DraftManifest, PassesOverImagesThatCannotBeRead) {
@@ -377,7 +379,10 @@ TEST_F(DraftManifest, DrivingScenesAreForACameraThatMoves) {
                                       {"KITTI", "kitti_mini/images"},
                                       {"", "photos"},
                                       {"", "bdd100k/one/two/three/four/five/photos"},
-                                      {"", "people/at_kit"}};
+                                      {"", "people/at_kit"},
+                                      {"", "kitties/images"},
+                                      {"", "webcamvideos/images"},
+                                      {"KITTI", "my-KITTI2/images"}};
   for (const auto& [title, path] : kSets) {
     SCOPED_TRACE(path);
     FoundSource photos = images(path, {kOneSize});
