@@ -26,7 +26,7 @@ import recordings
 import torch
 import train_detector
 import training
-from eventgan import Generator, Shards, convert, signed_channel
+from eventgan import Generator, Shards, convert, represent, sample_events, signed_channel
 from eventgan.detection_scores import overlapping
 from eventgan.outlines import mask
 from eventgan.torch import DetectionDataset
@@ -53,10 +53,16 @@ class Source:
     # photographs in layers: each object moves on its own, over a background that rests in this share of them
     layers: bool = False
     rests: float = 0.5
+    clips: bool = False  # of CLIP frames each, of which networks see the surface that the events leave
 
 
 # of an object, on top of the image's motion
 OBJECTS = {"translation_px": [0, MOTION_PX], "rotation_deg": 3, "scale": 0.04}
+# from frame to frame of a clip
+CLIP, CLIP_MOTION = 11, {"translation_px": [0, 3], "rotation_deg": 1, "scale": 0.01,
+                         "objects": {"translation_px": [0, 3], "rotation_deg": 2, "scale": 0.02}}
+# DHP19's kernel of 10 px where persons are half as high, and its blur; isolated events to a pixel and clip, at most
+EROS, BLUR, ISOLATED = "eros:6", (3, 3), 0.1
 
 
 def grey(args: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
@@ -153,12 +159,15 @@ LAYERS = {
     "EventGAN 16, layers, rests 0": Source(SHIPPED[16], layers=True, rests=0),
     "ESIM, layers, rests 0": Source({"kind": "esim"}, layers=True, rests=0),
 }
+CLIPS = {f"{name}, clips": Source(generator, layers=True, clips=True)
+         for name, generator in (("EventGAN 16", SHIPPED[16]), ("EventGAN 8", SHIPPED[8]), ("ESIM", {"kind": "esim"}),
+                                 ("difference", {"kind": "difference"}))}
 OF_TASKS = {  # but persons
     "EventGAN 8, layers, rests 0": Source(SHIPPED[8], layers=True, rests=0),        # as `--camera moves`
     "EventGAN 8, layers, rests 0.25": Source(SHIPPED[8], layers=True, rests=0.25),  # as `--camera both`
     "EventGAN 8, layers, motion": Source({**SHIPPED[8], "scope": "motion"}, layers=True),
 }
-SOURCES = METHODS | SENSORS | LAYERS | OF_TASKS | {
+SOURCES = METHODS | SENSORS | LAYERS | CLIPS | OF_TASKS | {
     "EventGAN 16, finer": Source(SHIPPED[16], finer=2),
     "EventGAN 16, eta98": Source(SHIPPED[16], normalize="eta98"),
     "difference, eta98": Source({"kind": "difference"}, normalize="eta98"),
@@ -193,7 +202,9 @@ def manifest_of(args: argparse.Namespace, name: str, source: Source) -> dict[str
             motion = {"translation_px": [0, source.motion_px], "rotation_deg": 2, "scale": 0.03, "frames": 1}
             found["pairs"] = {"from": "stills", "motion": motion}
             if source.layers:
-                motion |= {"objects": OBJECTS, "rests": source.rests}
+                motion |= {"objects": OBJECTS, **(CLIP_MOTION if source.clips else {}), "rests": source.rests}
+                if source.clips:
+                    found["pairs"]["frames"] = CLIP
                 found["outlines"] = str(_outlines(args, folder))
         sources.append(found)
     generator = dict(source.generator)
@@ -319,6 +330,9 @@ def items_of(args: argparse.Namespace, name: str, signed: bool = True) -> list[I
 
     def make() -> list[Item]:
         shards = shards_of(args, name if source.generator else f"EventGAN 16{', layers' if source.layers else ''}")
+        if source.clips:
+            # simulators' volumes are counts of events
+            return surfaces_of(shards, "poisson" if "weights" in source.generator else "rounded")
         if source.of_pair:
             shards = shards.changed(functools.partial(source.of_pair, args))
         elif signed and source.finer == 1:
@@ -332,6 +346,34 @@ def items_of(args: argparse.Namespace, name: str, signed: bool = True) -> list[I
         return [halved(without_small(item, args.task.least_px)) for item in items]
 
     return kept(args, f"{file_name(name)}{'' if signed else '-volume'}", make)
+
+
+def surfaces_of(shards: Shards, counts: str) -> list[Item]:
+    """The surface [1, H, W], 0..1, that a clip's events leave behind among isolated ones, as DHP19's pictures show it,
+    with the joints of the last frame."""
+    clips = collections.defaultdict(list)
+    for i, (clip, index) in enumerate(zip(shards.column("sequence").tolist(), shards.column("label_index").tolist())):
+        clips[clip].append((index, i))
+    items = []
+    for clip, pairs in clips.items():
+        seed = zlib.crc32(clip.encode())
+        random = np.random.default_rng(seed)
+        drawn = []
+        for at, (_, i) in enumerate(sorted(pairs)):
+            sample = shards[i]
+            events = sample_events(sample["volume"], seed=seed + at, counts=counts)
+            events["t"] += at
+            drawn.append(events)
+        height, width = sample["volume"].shape[1:]
+        isolated = np.zeros(random.poisson(random.uniform(0, ISOLATED) * height * width), drawn[0].dtype)
+        for name, end in (("t", len(pairs)), ("x", width), ("y", height)):
+            isolated[name] = random.uniform(0, end, len(isolated))
+        events = np.concatenate([*drawn, isolated])
+        surface = represent(events[np.argsort(events["t"], kind="stable")], EROS, size=(height, width))
+        sample["volume"] = signed_channel(np.stack([cv2.GaussianBlur(surface.reshape(height, width), BLUR, 0),
+                                                    np.zeros((height, width), np.uint8)]))
+        items.append(with_joints(sample, shards.joint_names(i)))
+    return items
 
 
 def without_small(item: Item, least_px: float) -> Item:

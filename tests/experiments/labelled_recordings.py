@@ -31,6 +31,9 @@ PERSON = "person"  # the class of labels that name none
 JOINTS = ["head", *(f"{side}_{name}" for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
                     for side in ("right", "left"))]
 
+# the names of right and left in joints.csv: of CDEHP, and of DHP19, which has surfaces
+SIDES = {False: ("red", "green"), True: ("a", "b")}
+
 Item = dict[str, Any]  # of DetectionDataset, its volume in half precision
 
 
@@ -63,6 +66,9 @@ class Task:
     least_px: float = 0  # boxes with a smaller side, in a volume's pixels, are neither right nor wrong in training
     joints: bool = False  # in place of boxes
     polarity: bool = True  # False: networks see events without it, as some of the recordings have them
+    # recordings are surfaces, which events raise and later ones around them lower (DHP19's); so is what networks learn
+    surfaces: bool = False
+    bright: float | None = None  # networks see which pixels are above it, and nothing else
     # the first windows of a recording that rows may learn from, which are then tested on the others
     learnt: Mapping[str, int] = dataclasses.field(default_factory=dict)
     windows: tuple[int, ...] = ()  # so many of these, on which a network of the first method is tuned
@@ -71,14 +77,14 @@ class Task:
 
 
 def recordings_in(args: argparse.Namespace, folder: pathlib.Path) -> list[pathlib.Path]:
-    """The task's recordings: of joints, folders with a joints.csv in CDEHP's form (DHP19's pictures are surfaces, which
-    decay, and not of events); of persons, folders of windows (NAME.npz and NAME.txt) or of drawn events (images/ with
-    labels/ beside it); of these and others, folders of drawn events (images/) with boxes in the boxes.csv of the folder
-    above."""
+    """The task's recordings: of joints, folders with a joints.csv in CDEHP's form, or in DHP19's if they are surfaces;
+    of persons, folders of windows (NAME.npz and NAME.txt) or of drawn events (images/ with labels/ beside it); of these
+    and others, folders of drawn events (images/) with boxes in the boxes.csv of the folder above."""
     folders = [each for each in (folder, *sorted(folder.iterdir())) if each.is_dir()]
     if args.task.joints:
+        known = {surfaces: f"{side}_shoulder_x" for surfaces, (side, _) in SIDES.items()}[args.task.surfaces]
         found = [path.parent for path in (each / "joints.csv" for each in folders)
-                 if path.exists() and "uncertain" in path.read_text(encoding="utf-8").partition("\n")[0]]
+                 if path.exists() and known in path.read_text(encoding="utf-8").partition("\n")[0]]
     else:
         found = [each for each in folders if PERSON in args.task.classes
                  and (any(each.glob("*.npz")) and any(each.glob("*.txt")) or
@@ -111,9 +117,11 @@ def _joints(path: pathlib.Path) -> dict[str, np.ndarray]:
     found = {}
     with open(path, newline="", encoding="utf-8") as file:
         for row in csv.DictReader(file):
-            names = [name.replace("right", "red").replace("left", "green").replace("wrist", "hand")
+            right, left = next(sides for sides in SIDES.values() if f"{sides[0]}_shoulder_x" in row)
+            names = [name.replace("right", right).replace("left", left).replace("wrist", "hand")
                      .replace("ankle", "foot") for name in JOINTS]
-            found[row["image"]] = np.array([[math.nan if name in row["uncertain"] else float(row[f"{name}_{axis}"])
+            uncertain = row.get("uncertain", "")
+            found[row["image"]] = np.array([[math.nan if name in uncertain else float(row[f"{name}_{axis}"])
                                              for axis in "xy"] for name in names])
     return found
 

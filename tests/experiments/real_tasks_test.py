@@ -143,8 +143,12 @@ def test_pictures_of_joints_have_no_polarity(tmp_path):
     with open(tmp_path / "real" / "clips" / "joints.csv", "w", newline="") as file:
         csv.writer(file).writerow(["image", *(f"{name}_{axis}" for name in CDEHP for axis in "xy"), "uncertain"])
         csv.writer(file).writerow(["a.png", *joints.ravel(), "green_elbow red_knee"])
-    (tmp_path / "real" / "surfaces").mkdir()
-    (tmp_path / "real" / "surfaces" / "joints.csv").write_text("image,head_x,head_y,a_shoulder_x,a_shoulder_y\n")
+    (tmp_path / "real" / "surfaces" / "images").mkdir(parents=True)
+    cv2.imwrite(str(tmp_path / "real" / "surfaces" / "images" / "a.png"), image // 2)
+    names = [name.replace("red", "a").replace("green", "b") for name in CDEHP]
+    with open(tmp_path / "real" / "surfaces" / "joints.csv", "w", newline="") as file:
+        csv.writer(file).writerow(["image", *(f"{name}_{axis}" for name in names for axis in "xy")])
+        csv.writer(file).writerow(["a.png", *joints.ravel()])
     [folder] = labelled_recordings.recordings_in(args, args.real)
     [item] = labelled_recordings.test_items(args, folder, (192, 320))
     assert item["volume"].min() == 0 and item["volume"].max() == 1
@@ -154,6 +158,35 @@ def test_pictures_of_joints_have_no_polarity(tmp_path):
     for x, y in expected[np.isfinite(expected[:, 0])].round().astype(int):
         assert item["volume"][0, y, x] > 0.5
     assert labelled_recordings.test_items(args, folder, (192, 320), shown="frames") == []
+    args.task = dataclasses.replace(args.task, surfaces=True, bright=0.3)
+    [folder] = labelled_recordings.recordings_in(args, args.real)
+    [surface] = labelled_recordings.test_items(args, folder, (192, 320))
+    assert folder.name == "surfaces" and torch.isfinite(surface["joints"]).all()
+    known = torch.isfinite(item["joints"])
+    torch.testing.assert_close(surface["joints"][known], item["joints"][known])
+    assert set(real_cameras._float(args, surface)["volume"].unique().tolist()) == {0, 1}
+
+
+def test_a_clip_leaves_the_surface_of_its_last_events():
+    """A line moves by 8 px a pair: around its last place nothing is older, where it was it has faded."""
+    class Clip:
+        def column(self, name):
+            return np.array({"sequence": ["a"] * 3, "label_index": [2, 0, 1]}[name])  # not in order
+
+        def __getitem__(self, i):
+            volume = np.zeros((2, 60, 80), np.float32)
+            volume[:, 10:50, 20 + 8 * int(self.column("label_index")[i])] = 1
+            joints = np.full((1, 14, 2), 10.0 * i, np.float32)
+            return {"volume": volume, "pair": {"sample_id": f"a/{i}"},
+                    "persons": {"joints": joints, "joints_source": joints}}
+
+        def joint_names(self, _):
+            return ["neck", "head_top", *JOINTS[1:]]
+
+    [item] = labelled_events.surfaces_of(Clip(), "rounded")
+    line = [float(item["volume"][0, 20:40, x].float().mean()) for x in (36, 28, 20, 70)]
+    assert line[0] > 0.5 and line[0] > 2 * line[3] and line[1] > line[3]
+    assert item["id"] == "a/0" and (item["joints"] == 0).all()  # of the frame with the highest number
 
 
 def test_joints_of_photographs(tmp_path):
