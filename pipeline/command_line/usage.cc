@@ -192,7 +192,11 @@ std::string representations_page() {
 
 /// Of the page of all keys the rows of those whose path, without the marks of lists, begins with
 /// `start` at one of its names.
-std::string keys_page_of(const std::string& start) {
+std::string keys_page_of(std::string start) {
+  const auto remove_marks = [](std::string& path) {
+    for (std::size_t at = 0; (at = path.find("[]")) != path.npos;) path.erase(at, 2);
+  };
+  remove_marks(start);
   constexpr std::string_view kRow = "| `";
   std::string page, head;
   std::vector<std::string> names;
@@ -205,7 +209,7 @@ std::string keys_page_of(const std::string& start) {
       continue;
     }
     std::string key = line.substr(kRow.size(), line.find('`', kRow.size()) - kRow.size());
-    for (std::size_t at = 0; (at = key.find("[]")) != key.npos;) key.erase(at, 2);
+    remove_marks(key);
     bool is_wanted = false;
     for (bool is_last = false; !is_last; key.erase(0, key.find('.') + 1)) {
       is_last = key.find('.') == key.npos;

@@ -210,10 +210,13 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
     (is_own ? own : elsewhere).push_back(&frozen.plan.shards[i]);
   }
   ConversionReport report = empty_report(folder, frozen.plan, own, options.part);
-  report.is_labelled = std::ranges::any_of(planned.datasets, [](const auto& dataset) {
-    const LabelSchema& names = dataset->label_schema();
-    return !names.class_names.empty() || !names.joint_names.empty();
-  });
+  report.is_labelled = false;
+  for (std::size_t i = 0; i < manifest.sources.size(); ++i) {
+    const LabelSchema& names = planned.datasets[i]->label_schema();
+    const bool has_names = !names.class_names.empty() || !names.joint_names.empty();
+    report.is_labelled |=
+        has_events(manifest.sources[i].dataset) ? has_names : has_labels(manifest.sources[i]);
+  }
   report.notes = std::move(notes);
   say_part(report, options);
   EarlierShards earlier = look_back(job, options, own, elsewhere, report);

@@ -391,8 +391,7 @@ Report table_of(const RetryReport& report) {
               [](const QuarantinedSlot& sample) { return "quarantined: " + sample.reason; })},
       {"dataset_outdated", report.dataset_outdated,
        "dataset.json and dataset.h5 described the shards as they were and are removed: run "
-       "eventgan "
-       "finalize again"},
+       "eventgan finalize again"},
       {"stopped", report.stopped, "stopped before all were done: run again"},
       {"notes", report.notes, notes_text(report.notes)},
       {"folder", report.folder, report.folder},

@@ -446,7 +446,7 @@ SensorFit fit_sensor(std::span<const FitPart> parts, const Generator* network,
       fit.warnings.emplace_back("fewer than 3 pairs of frames do not tell how sure a threshold is");
     }
   } else {
-    fit.warnings.emplace_back("no threshold, since the camera has no events but noise");
+    fit.warnings.emplace_back("no threshold, since the camera has no events that are no noise");
   }
   if (!kept.empty()) fit.rows = compare(kept, network, fit, threads);
   return fit;

@@ -369,16 +369,16 @@ std::string text(const char* name, double recorded, double stored) {
   return fmt::format("expected {} {:g} as recorded, got {:g}", name, recorded, stored);
 }
 
-/// Whether the scale is that of a volume whose largest value is `largest`. Of floats nothing else
-/// depends on it here, but other readers multiply by it; and a slightly other one of uint8 gives
-/// values that come near enough to the statistics.
+/// What is wrong with the scale of a volume whose largest value is `largest`. Of floats nothing
+/// else depends on it here, but other readers multiply by it; and a slightly other one of uint8
+/// gives values that come near enough to the statistics.
 std::optional<std::string> scale_fault(StoredType type, float scale, double largest) {
   constexpr float kRounding = 1e-6f;
   const float expected = std::isfinite(largest)
                              ? quantization(type, static_cast<float>(std::max(largest, 0.0))).scale
                              : 1;
   if (std::abs(scale - expected) <= kRounding * expected) return std::nullopt;
-  return fmt::format("expected scale {} by the recorded largest value, got {}", expected, scale);
+  return fmt::format("expected scale {} for the recorded largest value, got {}", expected, scale);
 }
 
 }  // namespace

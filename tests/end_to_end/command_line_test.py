@@ -69,7 +69,8 @@ class CommandLine(program.InFolder):
 
     def test_help_keys_lists_those_that_begin_with_a_word(self):
         whole, _ = run("help", "keys")
-        for start, keys in {"pairs.motion": "sources[].pairs.motion", "sources.root": "sources[].root"}.items():
+        for start, keys in {"pairs.motion": "sources[].pairs.motion", "sources.root": "sources[].root",
+                            "sources[].root": "sources[].root"}.items():
             page, _ = run("help", "keys", start)
             rows = [line for line in page.splitlines() if line.startswith("| `")]
             self.assertEqual(rows, [line for line in whole.splitlines() if line.startswith(f"| `{keys}")])

@@ -139,7 +139,7 @@ class Terminal(program.InFolder):
         record.write_text("torn")
         text = on_terminal("convert", self.manifest, "--output", self.folder / "out")
         self.assertIn(f"{YELLOW}warning: {PLAIN}{record}", text)
-        self.assertIn(f"{YELLOW}warning: {PLAIN}dataset.json and dataset.h5 told of {record.stem}", text)
+        self.assertIn(f"{YELLOW}warning: {PLAIN}dataset.json and dataset.h5 described {record.stem}", text)
         self.assertEqual(text.count("\x1b[1"), 2, text)
         for row in bars(text):
             self.assertNotIn("\x1b", row)

@@ -31,9 +31,8 @@ class Detector:
         self.told = json.loads(files["detector.json"])
 
     def __call__(self, events, size, score=None):
-        """Of events in time order, of a sensor of the size H, W: boxes [n, 4] (left, top, width, height in pixels of the
-        sensor, to which they are cut), classes and scores, the surest first, of at least `score` (None: as the training
-        says)."""
+        """Of events in time order, of a sensor of the size H, W: boxes [n, 4] (left, top, width, height in pixels, cut
+        to the sensor), classes and scores, the surest first, of at least `score` (None: as the training says)."""
         with torch.no_grad():
             boxes, labels, scores = (each.double().numpy() for each in
                                      self.model(*map(torch.from_numpy, columns(events)), *size))

@@ -49,8 +49,8 @@ std::vector<std::filesystem::path> recording_label_companions(const std::filesys
 /// .npz or .csv, as PEDRo has them.
 bool is_window_label_file(const std::filesystem::path& file);
 
-/// Whether it is YOLO's text, or one with mistakes, by its beginning; none if that is blank, a
-/// window without objects or anything, or cannot be read.
+/// Whether it is YOLO's text, by its first line, in which one column may be a mistake; none if it
+/// is blank, a window without objects or anything, or cannot be read.
 std::optional<bool> is_window_label_text(const std::filesystem::path& file);
 
 /// Reads such texts; looks once into each folder. Their classes are named by data.yaml, classes.txt

@@ -1,8 +1,9 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "manifests/files/input_file.h"
@@ -20,14 +21,18 @@ std::optional<bool> is_window_label_text(const std::filesystem::path& file) {
   const std::string text = beginning_of(file);
   const std::optional<bool> is_sound = is_yolo_text(text);
   if (is_sound.value_or(true)) return is_sound;
-  return std::ranges::any_of(split_lines(text), [](const TextLine& line) {
-    const auto columns = split_columns(line.bytes);
-    if (is_yolo_text(line.bytes).value_or(false)) return true;
+  for (const TextLine& line : split_lines(text)) {
+    std::vector<std::string_view> columns = split_columns(line.bytes);
+    if (columns.empty()) continue;
     if (columns.size() != 5) return false;
-    const std::string shares =
-        fmt::format("{}", fmt::join(columns.begin() + 1, columns.end(), " "));
-    return parse_whole(columns[0]).value_or(-1) >= 0 || is_yolo_text("0 " + shares).value_or(false);
-  });
+    for (std::string_view& column : columns) {  // one mistake makes it no other text
+      const std::string_view given = std::exchange(column, "0");
+      if (is_yolo_text(fmt::format("{}", fmt::join(columns, " "))).value_or(false)) return true;
+      column = given;
+    }
+    return false;
+  }
+  return false;
 }
 
 WindowLabels::Names& WindowLabels::names_of(const std::filesystem::path& file) {

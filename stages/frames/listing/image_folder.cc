@@ -165,10 +165,14 @@ ImageFolder list_image_folder(const fs::path& folder) {
 namespace {
 
 bool is_label_folder(const std::string& name) {
-  constexpr std::array<std::string_view, 13> kNames{
-      "masks",    "instances",  "annotations", "labels",     "flow_occ",   "flow_noc", "disp_occ",
-      "disp_noc", "disp_occ_0", "disp_occ_1",  "disp_noc_0", "disp_noc_1", "obj_map"};
-  return std::ranges::find(kNames, in_small_letters(name)) != kNames.end();
+  constexpr std::array<std::string_view, 4> kNames{"masks", "instances", "annotations", "labels"};
+  // KITTI's flow and stereo: flow_occ, disp_noc_0, viz_flow_occ_dilate_1
+  constexpr std::array<std::string_view, 7> kBeginnings{
+      "flow_occ", "flow_noc", "disp_occ", "disp_noc", "disp_refl", "viz_flow", "obj_map"};
+  const std::string small = in_small_letters(name);
+  return std::ranges::find(kNames, small) != kNames.end() ||
+         std::ranges::any_of(kBeginnings,
+                             [&](std::string_view word) { return small.starts_with(word); });
 }
 
 bool has_images_or_videos(const fs::path& folder, int levels) {

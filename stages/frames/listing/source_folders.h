@@ -21,7 +21,7 @@ struct FolderListing {
   std::vector<std::string> passed_over;
 };
 
-/// What a note says of some files: "2 labels without an image in clip: a.json, b.json". After
+/// What a note says of some files: "2 files left out in clip: a.json, b.json". After
 /// twenty names "..." stands for the others. `noun` and `rest` as in count_text.
 std::string counted(const std::vector<std::string>& names, const std::string& noun,
                     const std::string& rest);

@@ -306,8 +306,8 @@ std::vector<FoundSource> find_sources(const fs::path& path, std::optional<Datase
                        deeper_data(root));
     }
     throw InputError(fmt::format(
-        "expected {} ({}), got {}, in {} (manifests/guides/datasets.md shows what it "
-        "holds{})",
+        "expected {} ({}), got {}, in {} (manifests/guides/datasets.md shows what such a "
+        "folder holds{})",
         dataset_row(*dataset).title, to_string(*dataset),
         other ? fmt::format("{} ({})", other->title(), other->word()) : "none", path.string(),
         other ? fmt::format("; eventgan init \"{}\" takes what is there", root.string()) : ""));

@@ -263,8 +263,8 @@ def test_detect_cuts_boxes_to_the_sensor_and_ends_with_its_reader(tmp_path):
     boxes, _, scores = detect.Detector(tmp_path / "detector.pt")(events, (96, 96))
     assert boxes.tolist() == [[0, 0, 24, 96], [84, 20, 12, 40]] and scores == pytest.approx([0.8, 0.7])
     np.save(tmp_path / "events.npy", events)
-    done = subprocess.run(f"{sys.executable} {tmp_path / 'detect.py'} {tmp_path / 'events.npy'} | head -n 2", shell=True,
-                          capture_output=True, text=True)
+    line = f"{sys.executable} {tmp_path / 'detect.py'} {tmp_path / 'events.npy'} | head -n 2"
+    done = subprocess.run(line, shell=True, capture_output=True, text=True)
     assert done.stderr == "" and done.stdout.startswith("t_us,x,y,w,h,class,score\n")
 
 

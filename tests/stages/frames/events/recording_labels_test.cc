@@ -288,7 +288,11 @@ TEST_F(WindowLabelsTest, OtherTextsAreNone) {
                                  {"0 0.5 0.5 0.1 1.2\n", true},  // with a mistake, as below
                                  {"0 0.5 0.5 x 0.2\n", true},
                                  {"person 0.5 0.5 0.1 0.2\n", true},
-                                 {"0 0.5 0.5 0.1\n0 0.5 0.5 0.1 0.2\n", true},
+                                 {"0 0.5 0.5 0.1\n0 0.5 0.5 0.1 0.2\n", false},
+                                 {"2. walk in the park\n", false},
+                                 {"3 persons walk past here\n", false},
+                                 {"1 2 3 4 5\n", false},
+                                 {"# x y w h\n0.1 0.2 0.3 0.4 0.5 0.6\n", false},
                                  {"0 0.5 0.5 0.1\n", false},
                                  {"recorded on a Monday\n", false},
                                  {"it was a sunny day\n", false},

@@ -62,7 +62,8 @@ TEST(CsvLabels, ARowThatIsThereAlreadyIsLeftOut) {
 TEST(CsvLabels, RowsOfOneHashAreTwoBoxes) {
   const std::string first = "aa.png,1,1,9,99,Ik2zwEQHfwcepYyN";
   const std::string second = "aa.png,1,1,9,99,gA3HLHx23cvE3cyp";
-  ASSERT_EQ(std::hash<std::string>()(first), std::hash<std::string>()(second));
+  // Found for libstdc++'s std::hash, by which rows were told apart once.
+  EXPECT_EQ(std::hash<std::string>()(first), std::hash<std::string>()(second));
   const auto images = parse_csv_labels(
       "image,left,top,right,bottom,class\n" + first + "\n" + second + "\n", "labels.csv");
   ASSERT_THAT(images.at("aa.png")->boxes, SizeIs(2));

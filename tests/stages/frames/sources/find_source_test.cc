@@ -295,7 +295,8 @@ TEST_F(FindSource, FoldersOfSequencesMayBeTwoDeep) {
   EXPECT_THROWS(find("sets"), InputError,
                 "expected one dataset, got 2: one (frames), two (frames), in ");
   // KITTI's flow: the labels are no images.
-  touch({"flow/image_2/1.png", "flow/image_3/1.png", "flow/flow_occ/1.png"});
+  touch({"flow/image_2/1.png", "flow/image_3/1.png", "flow/flow_occ/1.png",
+         "flow/viz_flow_occ_dilate_1/1.png", "flow/disp_refl_noc/1.png"});
   EXPECT_THROWS(find("flow"), InputError,
                 "expected one dataset, got 2: image_2 (frames), image_3 (frames), in ");
 }
