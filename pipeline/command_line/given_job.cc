@@ -60,7 +60,7 @@ void require_kept(const DraftWishes& wishes, const JobManifest& manifest, const 
   };
   if (wishes.camera && std::ranges::none_of(manifest.sources, has_rests)) refuse("--camera");
   if (wishes.camera == CameraMotion::kMoves && manifest.generator.weights != "shipped:16") {
-    refuse("--camera");  // what is written where the folders' names alone tell that it moves
+    refuse("--camera");  // the folders' names alone made it so: other weights are written then
   }
   const auto has_classes = [&](const SourceSpec& source) {
     return source.classes == wishes.classes;

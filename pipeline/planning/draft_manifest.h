@@ -50,11 +50,11 @@ std::string draft_name(const std::vector<FoundSource>& sources);
 /// frame left out. Where images are no sequence, since some that are looked at have several sizes,
 /// or neighbours that do not show the same scene, or where no labelled frame has a paired frame,
 /// each image makes a pair with itself ("from": "stills"). Of sources that want different sizes, it
-/// is one that fits all. Photographs of driving scenes, as their folders' names tell, are for a
-/// camera that moves unless `wishes` says otherwise. What it reads is what `convert` would read by
-/// the manifest. Generated volumes are of the cheapest weights and precision that teach a detector
-/// no less: int8 where this processor has instructions for it, else "auto"; and of what moves alone
-/// where that leaves out a third of the tiles or more (SeenMotion).
+/// is one that fits all. Photographs of driving scenes, as their folders' names tell, never
+/// rest and are the network's, by its narrow weights, unless `wishes` names a camera. What it reads
+/// is what `convert` would read by the manifest. Generated volumes are of the cheapest weights and
+/// precision that teach a detector no less: int8 where this processor has instructions for it, else
+/// "auto"; and of what moves alone where that leaves out a third of the tiles or more (SeenMotion).
 ///
 /// Throws as open_dataset does, and UsageError for a path that is not UTF-8, which no manifest can
 /// name, for a source that is given twice, and for recordings of events beside frames, which make

@@ -8,7 +8,6 @@
 #include <new>
 #include <stdexcept>
 
-#include "pipeline/conversion/pair_volume.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/codec/volume_codec.h"
@@ -537,24 +536,6 @@ TEST_F(SampleStagesTest, OfTheSameImageTwiceAsksNoGeneratorThatSeesMotionAlone) 
     const SampleMessage other = run();
     EXPECT_FALSE(other.same_image);
     EXPECT_EQ(generator_.calls() - before, asks + 1);
-  }
-}
-
-TEST_F(SampleStagesTest, OfAStillThatRestsAsksNoGenerator) {
-  GeneratorSpec esim;
-  esim.kind = GeneratorKind::kEsim;
-  PreparedPair pair;
-  pair.content = {4, 6};
-  pair.input.assign(2 * 24, 0.5f);
-  pair.between.at = [](double) { return GreyImage{{4, 6}, std::vector<std::uint8_t>(24)}; };
-  std::vector<float> volume(18 * 24, 1.0f);
-  for (const double moved_px : {0.0, 0.1}) {  // of stripes the ends may be one image all the same
-    pair.between.displacement_px = moved_px;
-    const int before = generator_.calls();
-    const auto part = generate_volume(generator_, esim, {}, pair, {}, volume);
-    EXPECT_EQ(part.same_image, moved_px == 0);
-    EXPECT_EQ(generator_.calls() - before, moved_px != 0);
-    EXPECT_THAT(volume, ::testing::Each(0));
   }
 }
 
