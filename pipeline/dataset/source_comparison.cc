@@ -87,24 +87,6 @@ Element no_value() {
   return Element();
 }
 
-/// What the stored numbers of classes and joints mean by today's source, which may have gained
-/// classes.
-std::vector<std::string> schema_faults(const LabelSchema& stored, const LabelSchema& source) {
-  using Names = std::vector<std::string>;
-  std::vector<std::string> faults;
-  const auto expect = [&](const char* what, const Names& expected, const Names& got) {
-    if (expected == got) return;
-    faults.push_back(fmt::format("expected the {} of the source, {}, got {}", what,
-                                 fmt::join(expected, ", "), fmt::join(got, ", ")));
-  };
-  Names classes = source.class_names;
-  classes.resize(std::min(classes.size(), stored.class_names.size()));
-  expect("class_names", classes, stored.class_names);
-  expect("joint_names", source.joint_names, stored.joint_names);
-  expect("joint_aliases", source.joint_aliases, stored.joint_aliases);
-  return faults;
-}
-
 /// The annotation, or what is wrong with it.
 Outcome<Annotation> read_annotation(const Dataset& dataset, const std::string& label_key) {
   try {
@@ -273,6 +255,22 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   ShardHeader header = reader.header();
   header.dataset = to_string(kind);
   return row_differences(header, reader.tables(), slot, expected, place);
+}
+
+std::vector<std::string> schema_faults(const LabelSchema& stored, const LabelSchema& source) {
+  using Names = std::vector<std::string>;
+  std::vector<std::string> faults;
+  const auto expect = [&](const char* what, const Names& expected, const Names& got) {
+    if (expected == got) return;
+    faults.push_back(fmt::format("expected the {} of the source, {}, got {}", what,
+                                 fmt::join(expected, ", "), fmt::join(got, ", ")));
+  };
+  Names classes = source.class_names;
+  classes.resize(std::min(classes.size(), stored.class_names.size()));
+  expect("class_names", classes, stored.class_names);
+  expect("joint_names", source.joint_names, stored.joint_names);
+  expect("joint_aliases", source.joint_aliases, stored.joint_aliases);
+  return faults;
 }
 
 std::vector<std::string> row_differences(const ShardHeader& header, const ShardTables& stored,

@@ -4,6 +4,7 @@ import io
 import json
 import tarfile
 
+import cv2
 import h5py
 import numpy as np
 
@@ -105,6 +106,19 @@ class EventsOfACamera(Export):
             begin, end = (np.round(1e6 * time + side * 16666.5) for side in (-1, 1))
             inside = (found[0] > begin + 1) & (found[0] < end - 1)
             np.testing.assert_array_equal(found[:, inside], self.expected(begin + 1, end - 2))
+
+    def test_the_surface_at_a_label_has_the_events_up_to_its_time(self):
+        """hpe's: an event at the label's own time is on it, one a microsecond later is not."""
+        label = self.FRAMES[1]
+        write_mvsec(self.job / "walk.hdf5", np.array([[8, 8, label, 1], [24, 16, label + 1e-6, 1]]), self.FRAMES)
+        (self.job / "walk.csv").unlink()
+        (self.job / "walk.json").write_text(json.dumps(
+            {"format": "eventgan-labels", "version": 1, "joint_names": ["head"],
+             "samples": [{"time_s": label, "persons": [{"joints": [[10, 10]]}]}]}))
+        self.export("hpe", source=self.convert())
+        surface = cv2.imread(str(next(self.out.glob("hpe/train/eros/*.png"))), cv2.IMREAD_GRAYSCALE)
+        self.assertEqual(np.unravel_index(surface.argmax(), surface.shape), (2 * 8 + 1, 2 * 8 + 1))
+        self.assertEqual(surface[:, 40:].max(), 0)
 
     def test_windows_of_so_many_events(self):
         self.export("dsec", source=self.convert(source={"window_events": 100}))

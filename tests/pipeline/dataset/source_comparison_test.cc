@@ -1,5 +1,6 @@
 #include "pipeline/dataset/source_comparison.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <hdf5.h>
@@ -157,6 +158,29 @@ TEST_F(RowDifferences, AreFoundInEveryColumnThatTheGeneratorDoesNotMake) {
       EXPECT_THAT(found(expected_), texts_with({" in " + path})) << path;
     }
   }
+}
+
+TEST(SchemaFaults, NameTheListThatIsAnother) {
+  const LabelSchema source{.class_names = {"Car", "Van"},
+                           .joint_names = {"neck", "wrist"},
+                           .joint_aliases = {"Neck", "Hand"}};
+  EXPECT_THAT(schema_faults(source, source), IsEmpty());
+  LabelSchema stored = source;
+  stored.class_names.pop_back();  // the source has gained one
+  EXPECT_THAT(schema_faults(stored, source), IsEmpty());
+  for (auto list :
+       {&LabelSchema::class_names, &LabelSchema::joint_names, &LabelSchema::joint_aliases}) {
+    stored = source;
+    std::swap((stored.*list)[0], (stored.*list)[1]);
+    EXPECT_THAT(schema_faults(stored, source),
+                ElementsAre(AllOf(HasSubstr(fmt::format(" of the source, {}, got {}",
+                                                        fmt::join(source.*list, ", "),
+                                                        fmt::join(stored.*list, ", "))))));
+  }
+  stored = source;
+  stored.class_names.emplace_back("Tram");  // the source has it no more
+  EXPECT_THAT(schema_faults(stored, source),
+              ElementsAre("expected the class_names of the source, Car, Van, got Car, Van, Tram"));
 }
 
 /// Three KITTI images with a car each, converted into one shard; the image of sample 2 was
