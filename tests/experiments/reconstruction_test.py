@@ -139,7 +139,7 @@ def test_a_checkpoint_is_read_and_nothing_of_it_is_run(tmp_path, monkeypatch, zi
 
 def test_what_is_no_checkpoint_of_firenet_is_named(tmp_path):
     path = tmp_path / "model.pth"
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(FileNotFoundError, match="model.pth"):
         load_firenet(path)
     for content in (b"", b"no checkpoint", b"PK\x05\x06" + bytes(18)):
         path.write_bytes(content)

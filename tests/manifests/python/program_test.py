@@ -251,10 +251,10 @@ def test_a_bar_where_tqdm_is(job, monkeypatch, in_the_programs_place):
     assert [(bar.n, bar.total, bar.made_with, bar.closed) for bar in bars] == [
         (2, 9, ("planning", " files", False), 1), (4, 6, (None, " pairs", True), 1)]
     bars.clear()
-    with pytest.raises(eventgan.ProgramError):
+    with pytest.raises(eventgan.ProgramError, match="exit code 1"):
         eventgan.convert(job, progress=False)
     monkeypatch.setitem(sys.modules, "tqdm.auto", None)  # not installed
-    with pytest.raises(eventgan.ProgramError):
+    with pytest.raises(eventgan.ProgramError, match="exit code 1"):
         eventgan.convert(job)
     assert not bars
 
@@ -268,7 +268,7 @@ def test_warnings_and_what_is_no_json(job, in_the_programs_place):
         eventgan.convert(job)
     assert warned[0].filename == __file__ and caught.value.exit_code == -9
     events = []
-    with pytest.raises(eventgan.ProgramError):
+    with pytest.raises(eventgan.ProgramError, match="exit code -9"):
         eventgan.convert(job, progress=events.append)
     assert events == [{"event": "note", "text": "a library says so"}, {"event": "warning", "text": "beware"},
                       {"event": "note", "text": "[1, 2]"}]
