@@ -194,7 +194,7 @@ enum class Scope {
 /// A tile is generated if one of its pixels is wanted.
 struct ScopeSpec {
   Scope scope = Scope::kWhole;
-  double motion_threshold = 8;  ///< of the difference of a pixel's two values, grey levels, 0..255
+  double motion_threshold = 6;  ///< of the smoothed difference of two frames, grey levels, 0..255
   int motion_margin_px = 4;     ///< wanted around a pixel that differs by more, 0..64
   int label_margin_px = 16;     ///< wanted around a box or a person's crop, 0..1024
   int tile_px = 16;             ///< side of a tile, 8..128

@@ -19,6 +19,7 @@
 #include "stages/base/processor/processor.h"
 #include "stages/base/videos/video_file.h"
 #include "stages/frames/decoding/cut_out.h"
+#include "stages/generator/wanted_tiles.h"
 
 namespace eventgan {
 namespace {
@@ -214,6 +215,8 @@ std::map<std::string, std::string> make_fingerprint(
   if (std::ranges::any_of(manifest.sources, moves_objects)) {
     fingerprint["cut_out"] = kCutOutMethod;
   }
+  const Scope scope = manifest.generator.scope.scope;
+  if (scope == Scope::kMotion || scope == Scope::kLabels) fingerprint["motion"] = kMotionRule;
   for (const auto& [path, value] : manifest_fields(manifest.text))
     fingerprint["manifest " + path] = value;
   return fingerprint;

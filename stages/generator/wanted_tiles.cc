@@ -22,27 +22,49 @@ void want(TileMask& mask, TileMask::Pixels part) {
   }
 }
 
+/// Marks the pixels that move, [y, x], as wanted_tiles says.
+std::vector<std::uint8_t> moving_pixels(std::span<const float> frames, ImageSize size,
+                                        double threshold) {
+  const std::size_t pixels = size.pixel_count();
+  const auto width = static_cast<std::size_t>(size.width);
+  const auto least = static_cast<float>(16 * threshold / 127.5);  // the kernel's sum is 16
+  const auto row_at = [&](int y) {
+    return frames.data() + static_cast<std::size_t>(std::clamp(y, 0, size.height - 1)) * width;
+  };
+  std::vector<std::uint8_t> moves(pixels);
+  std::vector<float> down(width + 2);  // smoothed along y, with a column more at each side
+  for (int y = 0; y < size.height; ++y) {
+    const float *above = row_at(y - 1), *here = row_at(y), *below = row_at(y + 1);
+    for (std::size_t x = 0; x < width; ++x) {
+      down[x + 1] = (above[x + pixels] - above[x]) + 2 * (here[x + pixels] - here[x]) +
+                    (below[x + pixels] - below[x]);
+    }
+    down.front() = down[1];
+    down.back() = down[width];
+    std::uint8_t* const row = moves.data() + static_cast<std::size_t>(y) * width;
+    for (std::size_t x = 0; x < width; ++x) {
+      row[x] = !(std::abs(down[x] + 2 * down[x + 1] + down[x + 2]) <= least);  // NaN moves, too
+    }
+  }
+  return moves;
+}
+
 /// A tile is wanted if a pixel that moves lies in it or near it: so each is asked for itself, until
 /// one is found, which in a scene that moves is soon.
 void want_motion(TileMask& mask, std::span<const float> frames, double threshold, int margin) {
-  const std::size_t pixels = mask.size.pixel_count();
-  const auto least = static_cast<float>(threshold / 127.5);
+  const std::vector<std::uint8_t> moves = moving_pixels(frames, mask.size, threshold);
   for (int row = 0; row < mask.rows(); ++row) {
     for (int column = 0; column < mask.columns(); ++column) {
       const TileMask::Pixels tile = mask.pixels(row, column);
       const int left = std::max(tile.left - margin, 0);
-      const int width = std::min(tile.right + margin, mask.size.width) - left;
+      const int right = std::min(tile.right + margin, mask.size.width);
       const int bottom = std::min(tile.bottom + margin, mask.size.height);
-      bool moves = false;
-      for (int y = std::max(tile.top - margin, 0); y < bottom && !moves; ++y) {
-        const float* previous =
-            frames.data() + static_cast<std::size_t>(y) * mask.size.width + left;
-        const float* next = previous + pixels;
-        int still = 0;
-        for (int x = 0; x < width; ++x) still += std::abs(next[x] - previous[x]) <= least ? 1 : 0;
-        moves = still < width;
+      for (int y = std::max(tile.top - margin, 0); y < bottom; ++y) {
+        const auto begin = moves.begin() + static_cast<std::ptrdiff_t>(y) * mask.size.width;
+        if (std::find(begin + left, begin + right, 1) == begin + right) continue;
+        mask.wanted[static_cast<std::size_t>(row) * mask.columns() + column] = 1;
+        break;
       }
-      if (moves) mask.wanted[static_cast<std::size_t>(row) * mask.columns() + column] = 1;
     }
   }
 }

@@ -25,8 +25,8 @@ class Settings:
 
 SETTINGS = {
     "full": Settings("shipped:16", 6, 5, [4, 6, 8, 12], [8, 16, 32], None),
-    "quick": Settings("shipped:16", 4, 3, [4, 8, 12], [16], None),
-    "trial": Settings("untrained:2", 1, 1, [8], [16], (32, 32)),
+    "quick": Settings("shipped:16", 4, 3, [4, 6, 8], [16], None),
+    "trial": Settings("untrained:2", 1, 1, [6], [16], (32, 32)),
 }
 
 

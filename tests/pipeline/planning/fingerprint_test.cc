@@ -87,6 +87,15 @@ TEST_F(Fingerprint, HasHowObjectsAreCutOutWhereTheyMove) {
   EXPECT_TRUE(make().contains("cut_out"));
 }
 
+TEST_F(Fingerprint, HasWhatCountsAsMotionWhereTheScopeAsksForIt) {
+  for (const auto& [scope, is_there] :
+       {std::pair(Scope::kWhole, false), std::pair(Scope::kMotion, true),
+        std::pair(Scope::kLabels, true), std::pair(Scope::kLabelsOnly, false)}) {
+    manifest_.generator.scope.scope = scope;
+    EXPECT_EQ(make().contains("motion"), is_there) << to_string(scope);
+  }
+}
+
 // Labels may name frames beyond a video's end, and be corrected.
 TEST_F(Fingerprint, HasNoOrientationOfVideosWhateverTheirLabelsName) {
   manifest_.sources[0].dataset = DatasetKind::kFrames;

@@ -41,16 +41,54 @@ std::vector<std::uint8_t> moving(const std::vector<float>& frames) {
 
 TEST(WantedTiles, AreThoseThatAPixelThatMovesIsInOrNear) {
   EXPECT_THAT(moving(still_frames()), Each(0));
-  EXPECT_THAT(moving(one_pixel(8, 8, 8.01)), ElementsAre(1, 0, 0, 0, 0, 0));
-  EXPECT_THAT(moving(one_pixel(8, 8, -8.01)), ElementsAre(1, 0, 0, 0, 0, 0));
-  EXPECT_THAT(moving(one_pixel(8, 8, 7.99)), Each(0));
-  // 4 px around: column 12 reaches to 16, column 11 to 15.
-  EXPECT_THAT(moving(one_pixel(8, 12, 9)), ElementsAre(1, 1, 0, 0, 0, 0));
-  EXPECT_THAT(moving(one_pixel(8, 11, 9)), ElementsAre(1, 0, 0, 0, 0, 0));
-  EXPECT_THAT(moving(one_pixel(19, 28, 9)), ElementsAre(0, 1, 1, 0, 1, 1));
+  // A pixel alone keeps 4/16 of its difference, and gives its neighbours 2/16.
+  EXPECT_THAT(moving(one_pixel(8, 8, 24.04)), ElementsAre(1, 0, 0, 0, 0, 0));
+  EXPECT_THAT(moving(one_pixel(8, 8, -24.04)), ElementsAre(1, 0, 0, 0, 0, 0));
+  EXPECT_THAT(moving(one_pixel(8, 8, 23.96)), Each(0));
+  // 4 px around: column 12 reaches to 16, column 11 to 15 and, where its neighbour moves, to 16.
+  EXPECT_THAT(moving(one_pixel(8, 12, 27)), ElementsAre(1, 1, 0, 0, 0, 0));
+  EXPECT_THAT(moving(one_pixel(8, 11, 27)), ElementsAre(1, 0, 0, 0, 0, 0));
+  EXPECT_THAT(moving(one_pixel(8, 11, 49)), ElementsAre(1, 1, 0, 0, 0, 0));
+  EXPECT_THAT(moving(one_pixel(19, 28, 27)), ElementsAre(0, 1, 1, 0, 1, 1));
+  // The border is repeated: a corner keeps 9/16.
+  EXPECT_THAT(moving(one_pixel(0, 0, 10.7)), ElementsAre(1, 0, 0, 0, 0, 0));
+  EXPECT_THAT(moving(one_pixel(31, 47, 10.7)), ElementsAre(0, 0, 0, 0, 0, 1));
+  EXPECT_THAT(moving(one_pixel(0, 0, 10.6)), Each(0));
   std::vector<float> frames = still_frames();
   frames[8 * 48 + 40] = std::numeric_limits<float>::quiet_NaN();
   EXPECT_THAT(moving(frames), ElementsAre(0, 0, 1, 0, 0, 0));
+}
+
+/// Of a camera at rest noise and JPEG change many pixels by more than an object's edge asks for.
+TEST(WantedTiles, AreNotThoseOfNoise) {
+  std::mt19937 random(7);
+  std::normal_distribution<float> noise(0, 4 / 127.5f);
+  std::vector<float> frames = still_frames();
+  for (float& value : frames) value += noise(random);
+  const std::size_t pixels = kTiledSize.pixel_count();
+  int differing = 0;
+  for (std::size_t i = 0; i < pixels; ++i) {
+    differing += std::abs(frames[pixels + i] - frames[i]) > 8 / 127.5f ? 1 : 0;
+  }
+  EXPECT_GT(differing, 200) << "in every tile";
+  // Standard deviation 4 sqrt(2) 3/8 = 2.1: 6 grey levels are 2.8 of it, 10 are 4.7.
+  ScopeSpec scope = scope_of(Scope::kMotion);
+  scope.motion_threshold = 10;
+  EXPECT_THAT(wanted_tiles(scope, frames, kTiledSize, 0, 0, {}).wanted, Each(0));
+  for (int y = 4; y < 12; ++y) frames[pixels + static_cast<std::size_t>(y) * 48 + 40] += 0.4f;
+  EXPECT_THAT(wanted_tiles(scope, frames, kTiledSize, 0, 0, {}).wanted,
+              ElementsAre(0, 0, 1, 0, 0, 0))
+      << "an edge of 51 grey levels";
+}
+
+TEST(WantedTiles, AreAllOfAnImageOfOnePixelThatMoves) {
+  constexpr ImageSize kOne{1, 1};
+  EXPECT_THAT(
+      wanted_tiles(scope_of(Scope::kMotion), one_pixel(0, 0, 6.1, kOne), kOne, 0, 0, {}).wanted,
+      ElementsAre(1));
+  EXPECT_THAT(
+      wanted_tiles(scope_of(Scope::kMotion), one_pixel(0, 0, 5.9, kOne), kOne, 0, 0, {}).wanted,
+      ElementsAre(0));
 }
 
 TEST(WantedTiles, LieOnTheVolumesGrid) {
@@ -58,7 +96,7 @@ TEST(WantedTiles, LieOnTheVolumesGrid) {
   // it.
   const ImageSize content{32, 40};
   const TileMask mask =
-      wanted_tiles(scope_of(Scope::kMotion), one_pixel(20, 5, 20, content), content, 10, 20, {});
+      wanted_tiles(scope_of(Scope::kMotion), one_pixel(20, 5, 40, content), content, 10, 20, {});
   EXPECT_EQ(mask.rows(), 3);
   EXPECT_EQ(mask.columns(), 3);
   // Row 20 is the volume's 30, which reaches from 26 to 34; column 5 its 25, 21 to 29.
