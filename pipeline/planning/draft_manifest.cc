@@ -148,9 +148,8 @@ class Draft {
                       precision(), int8.instruction_set));
     }
     if (const SeenMotion seen = motion_of(sources); seen.pairs > 0) {
-      lines.push_back(
-          (rests(seen) ? "\"scope\": \"motion\", since " : "all tiles are generated: ") +
-          motion_text(seen));
+      lines.push_back((pays(seen) ? "\"scope\": \"motion\", since " : "all tiles are generated: ") +
+                      motion_text(seen, " "));
     }
     return lines;
   }
@@ -185,40 +184,46 @@ class Draft {
   /// Of the sources together, by their numbers of frames.
   static SeenMotion motion_of(const std::vector<SourceDraft>& sources) {
     SeenMotion seen;
-    double frames = 0, moving = 0;
+    double frames = 0, moving = 0, work = 0;
     for (const SourceDraft& source : sources) {
       const auto count = static_cast<double>(source.labelled_frames);
       frames += count;
       moving += count * source.motion.tiles;
+      work += count * source.motion.work;
       seen.pairs += source.motion.pairs;
       seen.resting += source.motion.resting;
     }
-    if (frames > 0) seen.tiles = moving / frames;
+    if (frames > 0) {
+      seen.tiles = moving / frames;
+      seen.work = work / frames;
+    }
     return seen;
   }
 
-  /// Whether what moves is enough: at least a third of the tiles rests.
-  static bool rests(const SeenMotion& seen) {
-    constexpr double kLeast = 1.0 / 3;
-    return seen.pairs > 0 && 1 - seen.tiles >= kLeast;
+  /// Whether it is worth losing what is too faint to count as motion.
+  static bool pays(const SeenMotion& seen) {
+    constexpr double kMostWork = 0.9;
+    return seen.pairs > 0 && seen.work <= kMostWork;
   }
 
-  static std::string motion_text(const SeenMotion& seen) {
-    return fmt::format("the image rests in {} of {} pairs: {:.0f} % of the tiles move",
-                       seen.resting, seen.pairs, 100 * seen.tiles);
+  static std::string motion_text(const SeenMotion& seen, std::string_view between) {
+    return fmt::format(
+        "the image rests in {} of {} pairs: {:.0f} % of the tiles move{}and take {:.0f} % of the "
+        "network's work",
+        seen.resting, seen.pairs, 100 * seen.tiles, between, 100 * seen.work);
   }
 
   const char* precision() const { return has_int8_ ? "int8" : "auto"; }
 
   std::string generator_text(const std::vector<SourceDraft>& sources) const {
     const SeenMotion seen = motion_of(sources);
-    const std::string scope = rests(seen) ? R"(, "scope": "motion")" : "";
-    const std::string scope_comment =
-        rests(seen) ? fmt::format(
-                          "  // Only what moves is generated (\"scope\"), since {}\n  // "
-                          "(manifests/guides/speed.md).\n",
-                          motion_text(seen))
-                    : "";
+    const std::string scope = pays(seen) ? R"(, "scope": "motion")" : "";
+    const std::string scope_comment = pays(seen)
+                                          ? fmt::format(
+                                                "  // Only what moves is generated (\"scope\"): {} "
+                                                "(manifests/guides/speed.md).\n",
+                                                motion_text(seen, "\n  // "))
+                                          : "";
     if (moves()) {
       return fmt::format(
           R"(  // Before a moving camera detectors of persons learn most from the wide weights (manifests/guides/choose.md).
@@ -415,7 +420,7 @@ class Draft {
         (place_.is_relative ? path.lexically_proximate(place_.folder) : path).generic_string());
   }
 
-  static constexpr int kNarrowWeights = 8, kWideWeights = 16;
+  static constexpr int kWideWeights = 16;
 
   DraftPlace place_;
   std::string name_;

@@ -54,7 +54,8 @@ std::string draft_name(const std::vector<FoundSource>& sources);
 /// rest and are the network's, by its narrow weights, unless `wishes` names a camera. What it reads
 /// is what `convert` would read by the manifest. Generated volumes are of the cheapest weights and
 /// precision that teach a detector no less: int8 where this processor has instructions for it, else
-/// "auto"; and of what moves alone where that leaves out a third of the tiles or more (SeenMotion).
+/// "auto"; and of what moves alone where that saves a tenth of the network's work or more
+/// (SeenMotion).
 ///
 /// Throws as open_dataset does, and UsageError for a path that is not UTF-8, which no manifest can
 /// name, for a source that is given twice, and for recordings of events beside frames, which make

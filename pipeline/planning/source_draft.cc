@@ -24,6 +24,7 @@
 #include "stages/frames/sources/class_numbers.h"
 #include "stages/frames/sources/dataset_kinds.h"
 #include "stages/frames/sources/open_dataset.h"
+#include "stages/generator/onednn/onednn_generator.h"
 #include "stages/generator/wanted_tiles.h"
 
 namespace eventgan {
@@ -215,7 +216,9 @@ void look_at_motion(const Dataset& dataset, SourceSpec spec, ImageSpec image,
     if (frame.frame.video_frame < kVideoFrames) frames.push_back(&frame);
   }
   SeenMotion seen;
-  double moving = 0;
+  double moving = 0, work = 0;
+  const Precision precision =
+      onednn_support(Precision::kInt8).native ? Precision::kInt8 : Precision::kFloat32;
   const std::vector<std::size_t> places = spread(kPairs * kTurns, frames.size());
   for (std::size_t turn = 0; turn < kTurns; ++turn) {
     for (std::size_t i = turn; i < places.size() && seen.pairs < int{kPairs}; i += kTurns) {
@@ -224,12 +227,12 @@ void look_at_motion(const Dataset& dataset, SourceSpec spec, ImageSpec image,
         if (!sample.fault.empty()) continue;
         const auto pair = reader.read(sample.pair, orientation_of(spec.dataset));
         if (is_fault(pair)) continue;
-        const std::vector<std::uint8_t> tiles =
-            wanted_tiles(scope, pair->input, pair->content, pair->content_y, pair->content_x, {})
-                .wanted;
-        const double share =
-            static_cast<double>(std::ranges::count(tiles, 1)) / static_cast<double>(tiles.size());
+        const TileMask tiles =
+            wanted_tiles(scope, pair->input, pair->content, pair->content_y, pair->content_x, {});
+        const double share = static_cast<double>(std::ranges::count(tiles.wanted, 1)) /
+                             static_cast<double>(tiles.wanted.size());
         moving += share;
+        work += tiles_work(tiles, kNarrowWeights, precision);
         ++seen.pairs;
         seen.resting += share <= 0.5 ? 1 : 0;
       }
@@ -237,6 +240,7 @@ void look_at_motion(const Dataset& dataset, SourceSpec spec, ImageSpec image,
   }
   if (seen.pairs == 0) return;
   seen.tiles = moving / seen.pairs;
+  seen.work = work / seen.pairs;
   draft.motion = seen;
 }
 

@@ -17,12 +17,16 @@ struct SensorGuess {
   int x = 0, y = 0;  ///< the largest of an event
 };
 
+/// Base width of the weights that are as good for detectors and poses as wide ones.
+inline constexpr int kNarrowWeights = 8;
+
 /// What moves in some pairs of a source, spread over its sequences, as Scope::kMotion sees it.
 struct SeenMotion {
   int pairs = 0;    ///< that were looked at
   int resting = 0;  ///< of them those of whose tiles at most half move: the image rests
-  double tiles =
-      1;  ///< share of the tiles that move, mean of the pairs; of none, and of stills, all
+  // Means of the pairs; 1 of none, and of stills:
+  double tiles = 1;  ///< share of the tiles that move
+  double work = 1;   ///< share of the narrow network's work that these take (tiles_work)
 };
 
 /// What is known of a source when its part of a manifest is written.

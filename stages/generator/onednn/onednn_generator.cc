@@ -76,6 +76,32 @@ std::size_t stored_bytes(Precision precision) {
   throw std::logic_error("unknown precision");
 }
 
+/// What is computed of an image whose tiles are wanted.
+struct PartialWork {
+  TiledWork tiled;  ///< or:
+  WinogradWork winograd;
+  double share = 1;  ///< of the whole image's work; 0: nothing, 1: all, with neither of the two
+};
+
+PartialWork partial_work(const TileMask& wanted, bool by_winograd) {
+  // Above it, computing all is not slower; what tiles depend on is more than they are.
+  constexpr double kLargestShare = 0.9;
+  constexpr double kManyTiles = 0.6;
+  const auto tiles = static_cast<double>(std::ranges::count(wanted.wanted, 1));
+  PartialWork work;
+  if (tiles == 0) return {.tiled = {}, .winograd = {}, .share = 0};
+  if (tiles >= kManyTiles * static_cast<double>(wanted.wanted.size())) return work;
+  if (by_winograd) {
+    work.winograd = winograd_work(wanted);
+  } else {
+    work.tiled = tiled_work(wanted);
+  }
+  const double share = by_winograd ? work.winograd.share : work.tiled.share;
+  if (share > kLargestShare) return {};
+  work.share = share;
+  return work;
+}
+
 class OnednnGenerator final : public Generator {
  public:
   OnednnGenerator(const Weights& weights, Precision precision)
@@ -117,22 +143,10 @@ class OnednnGenerator final : public Generator {
   GenerationNotes generate_tiles(const GeneratorInput& pair, const TileMask& wanted,
                                  std::span<float> volume) const override {
     check_generator_spans({pair.frames, wanted.size}, volume, bins_);
-    // Above it, computing all is not slower; what tiles depend on is more than they are.
-    constexpr double kLargestShare = 0.9;
-    constexpr double kManyTiles = 0.6;
-    const auto tiles = static_cast<double>(std::ranges::count(wanted.wanted, 1));
-    TiledWork work;
-    WinogradWork winograd;
-    if (tiles > 0 && tiles < kManyTiles * static_cast<double>(wanted.wanted.size()) &&
-        (precision_ != Precision::kInt8 || all_finite(pair.frames))) {
-      if (layers_.winograd()) {
-        winograd = winograd_work(wanted);
-      } else {
-        work = tiled_work(wanted);
-      }
-    }
-    const double share = layers_.winograd() ? winograd.share : work.share;
-    if (share == 0 || share > kLargestShare) {
+    const bool is_sound = precision_ != Precision::kInt8 || all_finite(pair.frames);
+    const PartialWork work =
+        is_sound ? partial_work(wanted, layers_.winograd().has_value()) : PartialWork();
+    if (work.share == 0 || work.share == 1) {
       return Generator::generate_tiles(pair, wanted, volume);
     }
     std::vector<float> kept;
@@ -142,13 +156,13 @@ class OnednnGenerator final : public Generator {
       const auto plan = plans_.plan(wanted.size);
       if (plan->winograd()) {
         const BlockPool::Lease block = blocks_.take(plan->block_bytes());
-        return plan->winograd()->run_tiles(winograd, wanted, planes.data(), volume.data(),
+        return plan->winograd()->run_tiles(work.winograd, wanted, planes.data(), volume.data(),
                                            block.data());
       }
       const TiledLayers& layers = tiled_layers();
       const std::size_t plan_bytes = BufferLayout::aligned(plan->block_bytes());
       const BlockPool::Lease block = blocks_.take(plan_bytes + layers.layout.total_bytes());
-      return plan->run_tiles(layers, work, wanted, planes.data(), volume.data(), block.data(),
+      return plan->run_tiles(layers, work.tiled, wanted, planes.data(), volume.data(), block.data(),
                              block.data() + plan_bytes);
     });
   }
@@ -228,6 +242,10 @@ double measured_int8_speedup(const Weights& weights) {
 }
 
 }  // namespace
+
+double tiles_work(const TileMask& wanted, int base_channels, Precision precision) {
+  return partial_work(wanted, winograd_fits(base_channels, precision)).share;
+}
 
 double int8_speedup(const Weights& weights) {
   const OnednnSupport support = onednn_support(Precision::kInt8);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "manifests/values/job.h"
+#include "manifests/values/tiles.h"
 #include "stages/generator/generator.h"
 #include "stages/generator/weights.h"
 
@@ -41,6 +42,11 @@ void require_onednn(const Weights& weights, Precision precision);
 /// weights.calibration, or for numbers that 8 bits cannot serve); std::runtime_error if oneDNN
 /// fails.
 std::unique_ptr<Generator> make_onednn_generator(const Weights& weights, Precision precision);
+
+/// Which share of a whole image's work generate_tiles takes for these tiles, about: 0 where none is
+/// wanted, 1 where all is computed. It is more than the tiles' own share, since what is exact in a
+/// tile takes far surroundings on the coarse levels. 1 in a build without oneDNN. Pure.
+double tiles_work(const TileMask& wanted, int base_channels, Precision precision);
 
 /// How many times as fast as float32 int8 is on this processor: infinity where it has instructions
 /// for it, 0 where int8 is not able, else measured, by processor time, on a small image with these

@@ -35,12 +35,12 @@ class DraftManifest : public ::testing::Test {
   /// Frames of 128x32, 8 x 2 tiles, whose `wide` left columns become brighter and darker by turns.
   FoundSource blinking(const fs::path& name, int frames, int wide) {
     for (int i = 0; i < frames; ++i) {
-      std::vector<int> pixels(32 * 128, 90);
+      std::vector<int> pixels(256 * 512, 90);
       for (int at = 0; at < std::ssize(pixels); ++at) {
-        if (at % 128 < wide) pixels[at] += i % 2 * 9;  // more than the threshold, 8
+        if (at % 512 < wide) pixels[at] += i % 2 * 9;  // more than the threshold
       }
       testing::write_index_image(folder_.path() / name / (std::to_string(100 + i) + ".png"),
-                                 {32, 128}, pixels);
+                                 {256, 512}, pixels);
     }
     return found(DatasetKind::kFrames, name);
   }
@@ -112,36 +112,36 @@ TEST_F(DraftManifest, OfASequenceTakesPairsOfNeighboursAsTheyAre) {
   EXPECT_THAT(made.findings, ::testing::ElementsAreArray(findings));
 }
 
-TEST_F(DraftManifest, GeneratesWhatMovesWhereAThirdOfTheTilesRests) {
+TEST_F(DraftManifest, GeneratesWhatMovesWhereThatSavesATenthOfTheWork) {
   struct Case {
-    int wide;            // columns that change; 4 more are wanted
-    const char* motion;  // empty: everything is generated
+    int wide;  // columns of 32 tiles of 16 that change; 4 more are wanted
+    bool motion;
+    const char* why;
   };
   int number = 0;
   for (const Case& one :
-       {Case{0, "rests in 20 of 20 pairs: 0 % of the tiles move"},
-        Case{1, "rests in 20 of 20 pairs: 12 % of"}, Case{60, "rests in 20 of 20 pairs: 50 % of"},
-        Case{61, "rests in 0 of 20 pairs: 62 % of"}, Case{77, ""}, Case{128, ""}}) {
+       {Case{0, true, "rests in 20 of 20 pairs: 0 % of the tiles move and take 0 % of the"},
+        Case{1, true, "rests in 20 of 20 pairs: 3 % of the tiles move and take "},
+        Case{256, true, "rests in 0 of 20 pairs: 53 % of the tiles move and take "},
+        Case{512, false, "rests in 0 of 20 pairs: 100 % of the tiles move and take 100 %"}}) {
     const ManifestDraft made = draft({blinking("blink" + std::to_string(number++), 30, one.wide)});
     const JobManifest job = read(made);
-    EXPECT_EQ(job.generator.scope.scope == Scope::kMotion, one.motion != std::string()) << one.wide;
+    EXPECT_EQ(job.generator.scope.scope == Scope::kMotion, one.motion) << one.wide;
     EXPECT_EQ(job.generator.weights, "shipped:8");
-    if (job.generator.scope.scope == Scope::kMotion) {
-      EXPECT_THAT(made.text, HasSubstr(one.motion));
-      EXPECT_THAT(made.findings.back(), HasSubstr(one.motion));
-    }
+    EXPECT_THAT(made.findings.back(),
+                AllOf(HasSubstr(one.motion ? "\"scope\": \"motion\", since " : "all tiles are "),
+                      HasSubstr(one.why)));
   }
   // Of several sources each counts as often as it has frames.
   const auto both = [&](int resting, int moving) {
     const std::string name = std::to_string(number++);
-    return draft({blinking("rests" + name, resting, 0), blinking("moves" + name, moving, 128)});
+    return draft({blinking("rests" + name, resting, 0), blinking("moves" + name, moving, 512)});
   };
-  EXPECT_EQ(read(both(16, 24)).generator.scope.scope, Scope::kMotion);
-  const ManifestDraft whole = both(12, 28);
-  EXPECT_EQ(read(whole).generator.scope.scope, Scope::kWhole);
-  EXPECT_THAT(whole.findings.back(),
-              AllOf(HasSubstr("all tiles are generated: the image rests in "),
-                    HasSubstr("70 % of the tiles move")));
+  const ManifestDraft motion = both(12, 28);
+  EXPECT_EQ(read(motion).generator.scope.scope, Scope::kMotion);
+  EXPECT_THAT(motion.text, HasSubstr(": the image rests in 11 of 31 pairs: 70 % of the tiles "
+                                     "move\n  // and take 70 % of the network's work ("));
+  EXPECT_EQ(read(both(3, 37)).generator.scope.scope, Scope::kWhole);
 }
 
 TEST_F(DraftManifest, PassesOverImagesThatCannotBeRead) {
@@ -149,7 +149,7 @@ TEST_F(DraftManifest, PassesOverImagesThatCannotBeRead) {
   for (const char* name : {"100.png", "103.png", "104.png", "107.png"}) {
     testing::write_file(folder_ / "some" / name, "no image");
   }
-  EXPECT_THAT(draft({source}).findings.back(), HasSubstr("rests in 5 of 5 pairs: 12 % of"));
+  EXPECT_THAT(draft({source}).findings.back(), HasSubstr("rests in 5 of 5 pairs: 3 % of"));
   for (int i = 100; i < 112; ++i) {
     testing::write_file(folder_ / "some" / (std::to_string(i) + ".png"), "no image");
   }

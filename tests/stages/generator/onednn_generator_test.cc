@@ -194,6 +194,29 @@ INSTANTIATE_TEST_SUITE_P(All, NetworkPlans,
                            return std::string(to_string(precision.param));
                          });
 
+TEST(TilesWork, IsWhatGenerateTilesComputes) {
+  TileMask mask{{480, 640}, 16, 0, 0, std::vector<std::uint8_t>(30 * 40)};
+  for (const Precision precision : kPrecisions) {
+    for (const int width : {8, 16}) {
+      std::ranges::fill(mask.wanted, 0);
+      EXPECT_EQ(tiles_work(mask, width, precision), 0);
+      mask.wanted[10 * 40 + 20] = 1;
+      const double one = tiles_work(mask, width, precision);
+      EXPECT_GT(one, 1.0 / (30 * 40));
+      EXPECT_LT(one, 0.15);
+      // Another far away takes as much; its neighbour shares nearly all on the coarse levels.
+      mask.wanted[10 * 40 + 21] = 1;
+      const double neighbours = tiles_work(mask, width, precision);
+      mask.wanted[10 * 40 + 21] = 0;
+      mask.wanted[25 * 40 + 2] = 1;
+      EXPECT_GT(tiles_work(mask, width, precision), neighbours);
+      // Six tenths of them are computed as all.
+      std::fill_n(mask.wanted.begin(), 18 * 40, std::uint8_t{1});
+      EXPECT_EQ(tiles_work(mask, width, precision), 1);
+    }
+  }
+}
+
 using Plan = std::shared_ptr<const NetworkPlan>;
 
 NetworkLayers layers_of(const Weights& weights) {
