@@ -39,6 +39,9 @@ class EventAugmentation:
         is missing is filled with 0 (no events).
     shift : float, default 0
         The scaled image is moved by at most this share of width and height.
+    turn : float, default 0
+        The image is turned around its middle by at most so many degrees either way. A box becomes that around the
+        turned one.
     reverse_all : bool, default False
         True: `reverse` applies to all samples.
     invert : float, default 0
@@ -64,6 +67,7 @@ class EventAugmentation:
     drop: float = 0.0
     scale: tuple[float, float] = (1.0, 1.0)
     shift: float = 0.0
+    turn: float = 0.0
     reverse_all: bool = False
     invert: float = 0.0
     threshold: tuple[float, float] = (0.0, 0.0)
@@ -78,6 +82,8 @@ class EventAugmentation:
             least, most = getattr(self, name)
             if not 0 <= least <= most <= 1:
                 raise ValueError(f"expected {name} to be a range of shares from 0 to 1, got {least}, {most}")
+        if not 0 <= self.turn <= 180:
+            raise ValueError(f"expected turn to be 0 to 180 degrees, got {self.turn}")
         if not 0 < self.scale[0] <= self.scale[1] < math.inf or not 0 <= self.shift < math.inf:
             raise ValueError("expected factors above 0, the smaller one first, and a shift of at least 0, got "
                              f"{self.scale}, {self.shift}")
@@ -108,6 +114,9 @@ class EventAugmentation:
         middle = np.array([(width - 1) / 2, (height - 1) / 2])
         moved = middle + (2 * np.array([dx, dy]) - 1) * self.shift * np.array([width, height])
         linear = np.diag([-s if flip < self.flip else s, s])
+        if self.turn:
+            angle = math.radians(self.turn) * (2 * float(torch.rand(())) - 1)
+            linear = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]) @ linear
         return np.column_stack([linear, moved - linear @ middle])
 
     def events(self, volume: torch.Tensor, label_position: float = 0.5) -> torch.Tensor:
@@ -203,8 +212,9 @@ def move_points(points: np.ndarray, affine: np.ndarray) -> np.ndarray:
 
 
 def move_boxes(boxes: np.ndarray, affine: np.ndarray) -> np.ndarray:
-    """Boxes [n, 4] (left, top, right, bottom, by edges) moved by a map of points [2, 3] that does not rotate."""
-    corners = move_points(np.asarray(boxes, float).reshape(-1, 2, 2) - 0.5, affine) + 0.5
+    """Boxes [n, 4] (left, top, right, bottom, by edges) moved by a map of points [2, 3]; of turned ones the bounds."""
+    corners = np.asarray(boxes, float).reshape(-1, 4)[:, [0, 1, 2, 1, 0, 3, 2, 3]].reshape(-1, 4, 2)
+    corners = move_points(corners - 0.5, affine) + 0.5
     return np.concatenate([corners.min(1), corners.max(1)], 1)
 
 

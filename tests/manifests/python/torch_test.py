@@ -12,6 +12,7 @@ torch = pytest.importorskip("torch")
 from torch.utils.data import DataLoader
 
 from eventgan import Shards
+from eventgan.augmentation import move_flow
 from eventgan.torch import (DetectionDataset, EventAugmentation, FlowDataset, HalfVolumes, KeypointDataset,
                             PoseAugmentation, PoseDataset, collate_torchvision, collate_yolo,
                             exchange_first_convolution, fitted, flip_pairs, heatmaps, inverse, mixture, move_boxes,
@@ -65,6 +66,26 @@ def test_boxes_are_of_edges_points_of_centres():
     assert move_boxes([[1, 2, 4, 6]], double).tolist() == [[2, 4, 8, 12]]
 
 
+def test_a_turn_moves_volume_boxes_and_flow_around_the_middle():
+    torch.manual_seed(2)
+    maps = [EventAugmentation(flip=0, turn=30).affine(24, 32) for _ in range(50)]
+    angles = [np.rad2deg(np.arctan2(affine[1, 0], affine[0, 0])) for affine in maps]
+    assert -30 <= min(angles) < -25 and 25 < max(angles) <= 30
+    np.testing.assert_allclose([affine @ [15.5, 11.5, 1] for affine in maps], [[15.5, 11.5]] * 50)
+    np.testing.assert_allclose([np.linalg.det(affine[:, :2]) for affine in maps], 1)
+    quarter = np.array([[0, -1, 27.0], [1, 0, -4.0]])  # of 24 x 32
+    assert move_boxes([[10, 8, 20, 12]], quarter).tolist() == [[16, 6, 20, 16]]
+    half = np.sqrt(0.5)
+    np.testing.assert_allclose(move_boxes([[0, 0, 2, 2]], np.array([[half, -half, 0.5], [half, half, 0.5]])),
+                               [[1 - 2 * half, 1 - half, 1 + 2 * half, 1 + 3 * half]])
+    flow, valid = move_flow(np.tile(np.float32([[[2]], [[1]]]), (1, 24, 32)), np.ones((24, 32), bool), quarter, 24, 32,
+                            1)
+    assert (flow[:, valid] == [[-1], [2]]).all()
+    expected = np.zeros((24, 32), bool)
+    expected[2:, 4:28] = True  # the image's 24 rows are columns now; the flow leads back by two rows
+    assert (valid == expected).all()
+
+
 def test_an_augmentation_s_events():
     volume = torch.arange(1.0, 7).reshape(6, 1, 1)
     assert EventAugmentation(reverse=1).events(volume).flatten().tolist() == [6, 5, 4, 3, 2, 1]
@@ -95,7 +116,7 @@ def test_time_runs_backwards_only_where_labels_stay_in_place(shards, folder):
 
 @pytest.mark.parametrize("wrong", [{"flip": 1.5}, {"drop": -0.1}, {"reverse": 2}, {"scale": (0, 1)},
                                    {"scale": (1.2, 0.8)}, {"shift": -1}, {"invert": 2}, {"threshold": (0.2, 0.1)},
-                                   {"lost": (0, 1.1)}, {"isolated": (-0.1, 0)}, {"lost": (float("nan"), 1)}])
+                                   {"turn": -1}, {"turn": 181}, {"turn": float("nan")}, {"lost": (0, 1.1)}, {"isolated": (-0.1, 0)}, {"lost": (float("nan"), 1)}])
 def test_augmentations_that_cannot_be(wrong):
     with pytest.raises(ValueError, match="expected "):
         EventAugmentation(**wrong)
