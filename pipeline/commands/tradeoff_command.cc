@@ -167,8 +167,8 @@ void add_axes(CLI::App& command, TradeoffArguments& arguments) {
       ->option_text("WEIGHTS,...");
   command
       .add_option("--precisions", arguments.precisions,
-                  "Precisions to compare: float32,bfloat16,int8; default: those that this "
-                  "processor has instructions for")
+                  "Precisions to compare: float32,bfloat16,int8; default: float32, the manifest's, "
+                  "and those that this processor has instructions for")
       ->delimiter(',')
       ->option_text("PRECISION,...");
   command

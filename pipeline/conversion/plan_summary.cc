@@ -4,15 +4,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <utility>
+#include <vector>
 
 #include "manifests/documents/report.h"
 #include "manifests/values/text.h"
 #include "pipeline/conversion/sample_stages.h"
 #include "pipeline/runtime/progress.h"
+#include "stages/shards/codec/chunk_filters.h"
+#include "stages/shards/codec/quantization.h"
 
 namespace eventgan {
 namespace {
@@ -56,6 +61,19 @@ struct Cost {
   double pixels = 0;
 };
 
+/// What flow takes in a shard, about: HDF5 shuffles and compresses it. The mask is little beside
+/// it.
+double stored_bytes(const PixelFlow& flow, int deflate_level) {
+  std::vector<std::uint16_t> halves;
+  halves.reserve(flow.px.size());
+  for (const float px : flow.px) halves.push_back(half_of(px).bits);
+  std::vector<std::byte> planes(2 * halves.size());
+  split_into_planes(halves, planes.data(), halves.size());
+  if (deflate_level == 0) return static_cast<double>(planes.size());
+  // Level 1 here codes runs of zeros alone, HDF5's does not.
+  return static_cast<double>(Deflater(std::max(deflate_level, 2)).deflate(planes).size());
+}
+
 SampleMessage run(const SampleStages& stages, const Place& place) {
   SampleMessage message;
   message.shard = place.shard;
@@ -82,7 +100,8 @@ TrialEstimate measure_trial(const JobManifest& manifest, const PlannedJob& job,
     Cost& cost = (is_first ? first_costs : costs)[source];
     ++cost.pairs;
     cost.seconds += std::accumulate(message.seconds.begin(), message.seconds.end(), 0.0);
-    cost.bytes += static_cast<double>(message.chunk.size());
+    cost.bytes += static_cast<double>(message.chunk.size()) +
+                  stored_bytes(message.sample.flow, manifest.output.deflate_level);
     cost.pixels += static_cast<double>(place.shard->volume_size.pixel_count());
   }
   costs.merge(first_costs);  // of sources no other pair of which could be tried

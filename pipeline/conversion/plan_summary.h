@@ -14,7 +14,7 @@ struct TrialEstimate {
   int pairs_measured = 0;
   double seconds_per_pair = 0;  ///< on one thread, mean over the plan
   double seconds = 0;           ///< wall time with the given threads
-  double stored_bytes = 0;      ///< compressed volumes
+  double stored_bytes = 0;      ///< compressed volumes and flow
 };
 
 /// Runs pairs of each source through reading, generating and encoding on the calling thread: of

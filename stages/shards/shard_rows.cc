@@ -88,13 +88,6 @@ void put(std::vector<double>& column, const std::optional<ImageMotion>& motion, 
       row);
 }
 
-/// The nearest float16 of a number that has one.
-Half half_of(float value) {
-  constexpr std::uint16_t kSign = 0x8000;
-  const std::uint16_t size = to_half(std::abs(value));
-  return {static_cast<std::uint16_t>(value < 0 ? size | kSign : size)};
-}
-
 void append_flow(const PixelFlow& flow, ImageSize size, std::size_t row, ShardTables& to) {
   if (flow.empty() && to.flow.empty()) return;
   std::vector<Half> px;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -78,6 +79,12 @@ const bool kHasConversion = __builtin_cpu_supports("avx") && has_f16c();
 }  // namespace
 
 std::uint16_t to_half(float value) { return rounded_half(value); }
+
+Half half_of(float value) {
+  constexpr std::uint16_t kSign = 0x8000;
+  const std::uint16_t size = to_half(std::abs(value));
+  return {static_cast<std::uint16_t>(value < 0 ? size | kSign : size)};
+}
 
 void to_halves(std::span<const float> values, std::uint16_t* halves) {
 #if defined(__x86_64__)

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "manifests/values/half.h"
 #include "manifests/values/job.h"
 
 namespace eventgan {
@@ -14,6 +15,9 @@ inline constexpr float kLargestHalf = 65504;
 /// The IEEE 754 half (binary16) nearest to `value`, ties to even, also among subnormals. `value`
 /// must be in [0, 65504]. The same on every machine, whatever its instructions.
 std::uint16_t to_half(float value);
+
+/// The same of a number of either sign, |value| <= 65504.
+Half half_of(float value);
 
 /// halves[i] = to_half(min(values[i], 65504)) for finite values >= 0, with the processor's own
 /// conversion where it has one. The same bits everywhere.

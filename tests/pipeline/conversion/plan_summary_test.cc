@@ -136,6 +136,25 @@ TEST(MeasureTrial, OfStillsItTriesSomeSpreadOverTheSource) {
   EXPECT_EQ(measure_trial(manifest, job, testing::FakeGenerator(), 1, 1).pairs_measured, 1);
 }
 
+TEST(MeasureTrial, CountsFlow) {
+  const testing::TemporaryFolder folder;
+  JobManifest manifest = testing::make_small_job(folder, 5);
+  manifest.sources[0].pairs.stills.emplace();
+  const auto bytes = [&](int deflate_level) {
+    manifest.output.deflate_level = deflate_level;
+    return measure_trial(manifest, make_plan(manifest, "w", "e"), testing::FakeGenerator(), 1)
+        .stored_bytes;
+  };
+  const double volumes = bytes(0), small_volumes = bytes(1);
+  manifest.sources[0].flow = true;
+  const PlannedJob job = make_plan(manifest, "w", "e");
+  const auto pixels = static_cast<double>(job.plan.shards[0].volume_size.pixel_count());
+  const auto samples = static_cast<double>(job.plan.sample_count());
+  EXPECT_EQ(bytes(0) - volumes, 2 * 2 * pixels * samples) << "x and y in 16 bits";
+  EXPECT_GT(bytes(1), small_volumes);
+  EXPECT_LT(bytes(1) - small_volumes, 2 * 2 * pixels * samples);
+}
+
 TEST(MeasureTrial, LeavesOutPairsThatFail) {
   const testing::TemporaryFolder folder;
   const JobManifest manifest = testing::make_small_job(folder, 3);
