@@ -198,7 +198,7 @@ void tell_note(const std::string& text) { tell("note", "note: ", text); }
 void tell(const std::string& text) { tell("note", "", text); }
 
 std::string stopping_line(const std::string& what) {
-  return line_of("note", "", "stopping: " + what + "; press Ctrl-C again to quit at once");
+  return line_of("note", "", "stopping: " + what + "; press Ctrl-C again to quit immediately");
 }
 
 ProgressDisplay::Columns terminal_columns() {

@@ -157,14 +157,15 @@ class Terminal(program.InFolder):
         manifest = self.job / "one_shard.json"
         manifest.write_text(program.json.dumps(one_shard))
         command = ["convert", manifest, "--output", self.folder / "out", "--overwrite", "--threads", 1, "--grace", 3600]
-        told = "stopping: finishing the current shard if it takes at most 3600 s; press Ctrl-C again to quit at once"
+        told = ("stopping: finishing the current shard if it takes at most 3600 s; press Ctrl-C again to quit "
+                "immediately")
         begun = (r"\] [1-9]\d*/24 pairs", b"\x03")
         text = on_terminal(*command, typed=[begun])  # that shard is all there is
         before, _, after = text.partition(f"{WIPE}{told}\r\n")
         self.assertNotIn("24/24 pairs", before)
         self.assertGreater(len([row for row in bars(after) if "/24 pairs" in row]), 1, "the bar goes on below")
         self.assertIn("24 of 24 pairs written", after)
-        text = on_terminal(*command, typed=[begun, ("again to quit at once", b"\x03")], expect=-signal.SIGINT)
+        text = on_terminal(*command, typed=[begun, ("again to quit immediately", b"\x03")], expect=-signal.SIGINT)
         self.assertEqual(text.count(told), 1)
         self.assertNotIn("pairs written", text)
 

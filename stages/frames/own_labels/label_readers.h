@@ -28,6 +28,7 @@ struct LabelReader {
   std::optional<std::filesystem::path> (*find)(const FoundFrames& frames,
                                                std::vector<std::string>& remarks);
   std::string_view image_folder = {};  ///< in which a sequence's images may lie, in its own folder
+  std::string_view extension = {};     ///< of its texts, where it has one an image or a sequence
 };
 
 /// MOT's gt.txt (parse_mot_labels): `path` is the file of the only sequence, or a folder that has

@@ -472,6 +472,6 @@ std::optional<std::filesystem::path> find_mot(const FoundFrames& frames,
 }  // namespace
 
 constinit const LabelReader kMotReader{LabelFormat::kMot, open_labels<MotLabels>, find_mot,
-                                       /*image_folder=*/"img1"};
+                                       /*image_folder=*/"img1", /*extension=*/".txt"};
 
 }  // namespace eventgan

@@ -19,6 +19,7 @@
 #include "stages/frames/listing/source_folders.h"
 #include "stages/frames/own_labels/detail/label_file.h"
 #include "stages/frames/own_labels/find_labels.h"
+#include "stages/frames/own_labels/label_readers.h"
 
 namespace eventgan {
 namespace {
@@ -70,13 +71,10 @@ class UnreadFinder {
  public:
   UnreadFinder(const std::vector<FoundFrames>& places, const std::vector<FoundSource>& sources)
       : files_(*places.front().files), images_(places), sources_(sources) {
-    static const std::map<LabelFormat, std::string_view> kOfFormat = {
-        {LabelFormat::kYolo, ".txt"}, {LabelFormat::kMot, ".txt"}, {LabelFormat::kVoc, ".xml"}};
     for (const FoundSource& source : sources) {
       if (!source.labels) continue;
       has_labels_ = true;
-      const auto own = kOfFormat.find(source.labels->format);
-      if (own != kOfFormat.end()) own_extensions_.emplace(own->second);
+      own_extensions_.emplace(label_reader(source.labels->format).extension);
     }
     for (const FoundFrames& frames : places) {
       if (!frames.stems.empty()) image_folders_.insert(frames.root);

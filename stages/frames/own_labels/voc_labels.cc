@@ -264,6 +264,7 @@ std::optional<std::filesystem::path> find_voc(const FoundFrames& frames,
 
 }  // namespace
 
-constinit const LabelReader kVocReader{LabelFormat::kVoc, open_labels<VocLabels>, find_voc};
+constinit const LabelReader kVocReader{LabelFormat::kVoc, open_labels<VocLabels>, find_voc,
+                                       /*image_folder=*/{}, /*extension=*/".xml"};
 
 }  // namespace eventgan

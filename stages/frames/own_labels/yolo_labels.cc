@@ -160,6 +160,7 @@ std::optional<std::filesystem::path> find_yolo(const FoundFrames& frames,
 
 }  // namespace
 
-constinit const LabelReader kYoloReader{LabelFormat::kYolo, open_labels<YoloLabels>, find_yolo};
+constinit const LabelReader kYoloReader{LabelFormat::kYolo, open_labels<YoloLabels>, find_yolo,
+                                        /*image_folder=*/{}, /*extension=*/".txt"};
 
 }  // namespace eventgan

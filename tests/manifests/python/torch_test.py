@@ -116,7 +116,8 @@ def test_time_runs_backwards_only_where_labels_stay_in_place(shards, folder):
 
 @pytest.mark.parametrize("wrong", [{"flip": 1.5}, {"drop": -0.1}, {"reverse": 2}, {"scale": (0, 1)},
                                    {"scale": (1.2, 0.8)}, {"shift": -1}, {"invert": 2}, {"threshold": (0.2, 0.1)},
-                                   {"turn": -1}, {"turn": 181}, {"turn": float("nan")}, {"lost": (0, 1.1)}, {"isolated": (-0.1, 0)}, {"lost": (float("nan"), 1)}])
+                                   {"turn": -1}, {"turn": 181}, {"turn": float("nan")}, {"lost": (0, 1.1)},
+                                   {"isolated": (-0.1, 0)}, {"lost": (float("nan"), 1)}])
 def test_augmentations_that_cannot_be(wrong):
     with pytest.raises(ValueError, match="expected "):
         EventAugmentation(**wrong)
