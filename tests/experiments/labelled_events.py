@@ -58,9 +58,8 @@ class Source:
 
 # of an object, on top of the image's motion
 OBJECTS = {"translation_px": [0, MOTION_PX], "rotation_deg": 3, "scale": 0.04}
-# from frame to frame of a clip
-CLIP, CLIP_MOTION = 11, {"translation_px": [0, 3], "rotation_deg": 1, "scale": 0.01,
-                         "objects": {"translation_px": [0, 3], "rotation_deg": 2, "scale": 0.02}}
+# from frame to frame of a clip, before a camera at rest
+CLIP, CLIP_MOTION = 11, {"objects": {"translation_px": [1, 4], "rotation_deg": 2, "scale": 0.02}}
 # DHP19's kernel of 10 px where persons are half as high, and its blur; isolated events to a pixel and clip, at most
 EROS, BLUR, ISOLATED = "eros:6", (3, 3), 0.1
 
@@ -159,7 +158,7 @@ LAYERS = {
     "EventGAN 16, layers, rests 0": Source(SHIPPED[16], layers=True, rests=0),
     "ESIM, layers, rests 0": Source({"kind": "esim"}, layers=True, rests=0),
 }
-CLIPS = {f"{name}, clips": Source(generator, layers=True, clips=True)
+CLIPS = {f"{name}, clips": Source(generator, layers=True, rests=1, clips=True)
          for name, generator in (("EventGAN 16", SHIPPED[16]), ("EventGAN 8", SHIPPED[8]), ("ESIM", {"kind": "esim"}),
                                  ("difference", {"kind": "difference"}))}
 OF_TASKS = {  # but persons
