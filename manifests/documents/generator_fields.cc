@@ -154,7 +154,7 @@ void list_generator(Fields& fields, GeneratorSpec& spec) {
             "around labelled boxes and persons. labels_only: around these alone.");
   some.find("motion_threshold", spec.scope.motion_threshold, numbers(0, 255),
             "with scope, a pixel moves if the difference of the two frames, smoothed over 3x3 "
-            "pixels, has more grey levels than this.");
+            "pixels, exceeds this many grey levels.");
   some.find("motion_margin_px", spec.scope.motion_margin_px, integers(0, 64),
             "with scope, rows and columns around a pixel that moves which are generated too.");
   some.find("label_margin_px", spec.scope.label_margin_px, integers(0, 1024),

@@ -9,6 +9,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -61,17 +62,18 @@ struct Cost {
   double pixels = 0;
 };
 
-/// What flow takes in a shard, about: HDF5 shuffles and compresses it. The mask is little beside
-/// it.
+/// What flow and its mask take in a shard, about: HDF5 shuffles and compresses them.
 double stored_bytes(const PixelFlow& flow, int deflate_level) {
   std::vector<std::uint16_t> halves;
   halves.reserve(flow.px.size());
   for (const float px : flow.px) halves.push_back(half_of(px).bits);
   std::vector<std::byte> planes(2 * halves.size());
   split_into_planes(halves, planes.data(), halves.size());
-  if (deflate_level == 0) return static_cast<double>(planes.size());
-  // Level 1 here codes runs of zeros alone, HDF5's does not.
-  return static_cast<double>(Deflater(std::max(deflate_level, 2)).deflate(planes).size());
+  const auto mask = std::as_bytes(std::span(flow.valid));
+  if (deflate_level == 0) return static_cast<double>(planes.size() + mask.size());
+  Deflater deflater(std::max(deflate_level, 2));  // 1 codes runs of zeros alone, HDF5's does not
+  const std::size_t of_px = deflater.deflate(planes).size();
+  return static_cast<double>(of_px + deflater.deflate(mask).size());
 }
 
 SampleMessage run(const SampleStages& stages, const Place& place) {

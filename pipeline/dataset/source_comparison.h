@@ -57,8 +57,8 @@ class SourceComparison {
   long long compared_ = 0;
 };
 
-/// What the stored numbers of classes and joints mean that they would not by today's source, which
-/// may have gained classes: texts "expected the LIST of the source, X, got Y".
+/// Where the stored numbers of classes and joints mean something else by today's source, which may
+/// have gained classes: texts "expected the LIST of the source, X, got Y".
 std::vector<std::string> schema_faults(const LabelSchema& stored, const LabelSchema& source);
 
 /// What slot `slot` of `stored` holds that `expected`, the sample made again from its source (its

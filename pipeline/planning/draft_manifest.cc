@@ -129,11 +129,7 @@ class Draft {
   std::vector<std::string> decide(const std::vector<SourceDraft>& sources) {
     std::vector<std::string> lines;
     if (has_events(sources.front().found.dataset)) return lines;
-    // Less is not worth float32's exactness, and `convert`, which measures anew and warns where
-    // int8 is the slower one, could see it the other way round.
-    constexpr double kLeastSpeedup = 1.3;
-    has_int8_ = int8_speedup(read_shipped_weights(moves() ? kWideWeights : kNarrowWeights)) >=
-                kLeastSpeedup;
+    has_int8_ = int8_pays(moves() ? kWideWeights : kNarrowWeights);
     if (!wishes_.camera) {
       for (const SourceDraft& source : sources) {
         const std::string why = camera_text(source);
@@ -208,9 +204,9 @@ class Draft {
 
   static std::string motion_text(const SeenMotion& seen, std::string_view between) {
     return fmt::format(
-        "the image rests in {} of {} pairs: {:.0f} % of the tiles move{}and take {:.0f} % of the "
-        "network's work",
-        seen.resting, seen.pairs, 100 * seen.tiles, between, 100 * seen.work);
+        "{:.0f} % of the tiles move and take {:.0f} % of the network's work{}(the image rests in "
+        "{} of {} pairs)",
+        100 * seen.tiles, 100 * seen.work, between, seen.resting, seen.pairs);
   }
 
   const char* precision() const { return has_int8_ ? "int8" : "auto"; }

@@ -25,6 +25,7 @@
 #include "stages/frames/sources/dataset_kinds.h"
 #include "stages/frames/sources/open_dataset.h"
 #include "stages/generator/onednn/onednn_generator.h"
+#include "stages/generator/shipped_weights.h"
 #include "stages/generator/wanted_tiles.h"
 
 namespace eventgan {
@@ -217,8 +218,7 @@ void look_at_motion(const Dataset& dataset, SourceSpec spec, ImageSpec image,
   }
   SeenMotion seen;
   double moving = 0, work = 0;
-  const Precision precision =
-      onednn_support(Precision::kInt8).native ? Precision::kInt8 : Precision::kFloat32;
+  const Precision precision = int8_pays(kNarrowWeights) ? Precision::kInt8 : Precision::kFloat32;
   const std::vector<std::size_t> places = spread(kPairs * kTurns, frames.size());
   for (std::size_t turn = 0; turn < kTurns; ++turn) {
     for (std::size_t i = turn; i < places.size() && seen.pairs < int{kPairs}; i += kTurns) {
@@ -399,6 +399,11 @@ void look_at_source(const SourceSpec& spec, const ImageSpec& image, const fs::pa
   }
   draft.findings = findings_of(draft, counted);
   draft.notes = dataset->notes();
+}
+
+bool int8_pays(int base_width) {
+  constexpr double kLeastSpeedup = 1.3;
+  return int8_speedup(read_shipped_weights(base_width)) >= kLeastSpeedup;
 }
 
 }  // namespace eventgan

@@ -20,6 +20,11 @@ struct SensorGuess {
 /// Base width of the weights that are as good for detectors and poses as wide ones.
 inline constexpr int kNarrowWeights = 8;
 
+/// Whether int8 is worth its error here, with shipped weights of this base width: less than 1.3
+/// times float32's speed is not, and `convert`, which measures anew and warns where int8 is the
+/// slower one, could see it the other way round. As int8_speedup otherwise.
+bool int8_pays(int base_width);
+
 /// What moves in some pairs of a source, spread over its sequences, as Scope::kMotion sees it.
 struct SeenMotion {
   int pairs = 0;    ///< that were looked at

@@ -28,12 +28,12 @@ inline constexpr const char* kMotionRule = "difference, smoothed over 3x3 pixels
 /// `content` of a volume, whose first pixel is at (content_y, content_x); the tiles lie on the
 /// volume's grid, `labels` are in its pixels.
 ///
-/// Motion: pixels at which the frames' difference, smoothed by the binomial kernel [1 2 1]^T [1 2
-/// 1] / 16 with the border repeated, has more than `motion_threshold` grey levels (127.5 |x_1 -
+/// Motion: pixels at which the frames' difference, smoothed by the binomial kernel (1 2 1) / 4
+/// along both axes with the border repeated, exceeds `motion_threshold` grey levels (127.5 |x_1 -
 /// x_0|) or is not finite, and what lies within `motion_margin_px` rows and columns of them.
-/// Smoothing leaves 3/8 of the noise of sensors and codecs, and most of an edge. Labels: boxes that
-/// are not to be ignored, and of persons all that pose trainers may cut out (pose_crop); each with
-/// `label_margin_px` around it. Pure.
+/// Smoothing leaves 3/8 of noise that is independent from pixel to pixel, more of a codec's, and
+/// most of an edge. Labels: boxes that are not to be ignored, and of persons all that pose trainers
+/// may cut out (pose_crop); each with `label_margin_px` around it. Pure.
 TileMask wanted_tiles(const ScopeSpec& scope, std::span<const float> frames, ImageSize content,
                       int content_y, int content_x, const VolumeLabels& labels);
 

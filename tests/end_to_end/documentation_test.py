@@ -18,7 +18,7 @@ from program import PACKAGE, SOURCE, run
 MOST_WORDS = {
     "README.md": 1300,
     "CONTRIBUTING.md": 1300,
-    "CHANGELOG.md": 2400,
+    "CHANGELOG.md": 2450,
     "docker/running.md": 1150,
     "manifests/weights/README.md": 1150,
     "manifests/guides/choose.md": 900,

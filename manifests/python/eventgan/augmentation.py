@@ -39,9 +39,6 @@ class EventAugmentation:
         is missing is filled with 0 (no events).
     shift : float, default 0
         The scaled image is moved by at most this share of width and height.
-    turn : float, default 0
-        The image is turned around its middle by at most so many degrees either way. A box becomes that around the
-        turned one.
     reverse_all : bool, default False
         True: `reverse` applies to all samples.
     invert : float, default 0
@@ -55,6 +52,9 @@ class EventAugmentation:
     isolated : (float, float)
         The share of all pixels that get an event of their own, as from noise, drawn uniformly from this range: in a
         random channel (one channel: of random sign), 0.3 to 1 times as strong as the strongest ones.
+    turn : float, default 0
+        The image is turned around its middle by at most so many degrees either way. A box becomes the bounds of the
+        turned one, of which what lies outside is cut: an object that left over a corner may keep a box.
 
     Raises
     ------
@@ -67,12 +67,12 @@ class EventAugmentation:
     drop: float = 0.0
     scale: tuple[float, float] = (1.0, 1.0)
     shift: float = 0.0
-    turn: float = 0.0
     reverse_all: bool = False
     invert: float = 0.0
     threshold: tuple[float, float] = (0.0, 0.0)
     lost: tuple[float, float] = (0.0, 0.0)
     isolated: tuple[float, float] = (0.0, 0.0)
+    turn: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("flip", "reverse", "drop", "invert"):

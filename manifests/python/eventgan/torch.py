@@ -346,7 +346,7 @@ class KeypointDataset(Dataset):
         height, width = volume.shape[1:]
         if affine is not None:
             joints = move_points(joints, affine)
-            if affine[0, 0] < 0:
+            if np.linalg.det(affine[:, :2]) < 0:
                 joints = self._joints.mirrored(joints)
                 annotated, hidden = (self._joints.mirrored(each[..., None])[..., 0] for each in (annotated, hidden))
         annotated = annotated & np.all((joints > -0.5) & (joints < [width - 0.5, height - 0.5]), axis=-1)

@@ -143,10 +143,9 @@ class OnednnGenerator final : public Generator {
   GenerationNotes generate_tiles(const GeneratorInput& pair, const TileMask& wanted,
                                  std::span<float> volume) const override {
     check_generator_spans({pair.frames, wanted.size}, volume, bins_);
-    const bool is_sound = precision_ != Precision::kInt8 || all_finite(pair.frames);
-    const PartialWork work =
-        is_sound ? partial_work(wanted, layers_.winograd().has_value()) : PartialWork();
-    if (work.share == 0 || work.share == 1) {
+    const PartialWork work = partial_work(wanted, layers_.winograd().has_value());
+    if (work.share == 0 || work.share == 1 ||
+        (precision_ == Precision::kInt8 && !all_finite(pair.frames))) {
       return Generator::generate_tiles(pair, wanted, volume);
     }
     std::vector<float> kept;

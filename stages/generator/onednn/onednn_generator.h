@@ -44,8 +44,8 @@ void require_onednn(const Weights& weights, Precision precision);
 std::unique_ptr<Generator> make_onednn_generator(const Weights& weights, Precision precision);
 
 /// Which share of a whole image's work generate_tiles takes for these tiles, about: 0 where none is
-/// wanted, 1 where all is computed. It is more than the tiles' own share, since what is exact in a
-/// tile takes far surroundings on the coarse levels. 1 in a build without oneDNN. Pure.
+/// wanted, 1 where all is computed, as in a build without oneDNN. It is more than the tiles' own
+/// share, since what is exact in a tile takes far surroundings on the coarse levels. Pure.
 double tiles_work(const TileMask& wanted, int base_channels, Precision precision);
 
 /// How many times as fast as float32 int8 is on this processor: infinity where it has instructions

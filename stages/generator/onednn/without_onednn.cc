@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <stdexcept>
 
 #include "stages/generator/onednn/calibrator.h"
@@ -16,7 +17,9 @@ std::unique_ptr<Generator> make_onednn_generator(const Weights& weights, Precisi
   return nullptr;
 }
 
-double tiles_work(const TileMask&, int, Precision) { return 1; }
+double tiles_work(const TileMask& wanted, int, Precision) {
+  return std::ranges::count(wanted.wanted, 1) == 0 ? 0 : 1;
+}
 
 double int8_speedup(const Weights&) { return 0; }
 

@@ -75,6 +75,11 @@ def test_a_turn_moves_volume_boxes_and_flow_around_the_middle():
     np.testing.assert_allclose([np.linalg.det(affine[:, :2]) for affine in maps], 1)
     quarter = np.array([[0, -1, 27.0], [1, 0, -4.0]])  # of 24 x 32
     assert move_boxes([[10, 8, 20, 12]], quarter).tolist() == [[16, 6, 20, 16]]
+    volume = torch.zeros(1, 24, 32)
+    volume[:, 8:12, 10:20] = 1
+    turned = warp(volume, quarter, 24, 32)[0] > 0.5
+    rows, columns = (np.flatnonzero(turned.any(axis)) for axis in (1, 0))
+    assert [columns[0], rows[0], columns[-1] + 1, rows[-1] + 1] == [16, 6, 20, 16]
     half = np.sqrt(0.5)
     np.testing.assert_allclose(move_boxes([[0, 0, 2, 2]], np.array([[half, -half, 0.5], [half, half, 0.5]])),
                                [[1 - 2 * half, 1 - half, 1 + 2 * half, 1 + 3 * half]])
@@ -84,6 +89,26 @@ def test_a_turn_moves_volume_boxes_and_flow_around_the_middle():
     expected = np.zeros((24, 32), bool)
     expected[2:, 4:28] = True  # the image's 24 rows are columns now; the flow leads back by two rows
     assert (valid == expected).all()
+
+
+@pytest.mark.parametrize("flip", [0, 1])
+def test_left_and_right_are_exchanged_where_it_mirrors_however_far_it_turns(shards, flip):
+    """Of JOINTS only the nose has no other side."""
+    names = ["nose", "left hand", "right hand"]
+    plain = KeypointDataset(shards, names)[0]["keypoints"]
+    for seed in range(8):
+        torch.manual_seed(seed)
+        augmentation = EventAugmentation(flip=flip, turn=180, scale=(0.2, 0.2))
+        found = KeypointDataset(shards, names, augmentation=augmentation)[0]["keypoints"]
+        torch.manual_seed(seed)
+        moved = KeypointDataset(shards, names)[0]
+        volume = moved["volume"]
+        augmentation.events(volume, 1.0)
+        affine = augmentation.affine(*volume.shape[1:])
+        expected = move_points(plain[..., :2].numpy(), affine)[:, [0, 2, 1] if flip else [0, 1, 2]]
+        there = found[..., 2] > 0
+        np.testing.assert_allclose(found[there][:, :2], expected[there.numpy()], atol=1e-4)
+        assert there.any()
 
 
 def test_an_augmentation_s_events():

@@ -150,9 +150,9 @@ TEST(MeasureTrial, CountsFlow) {
   const PlannedJob job = make_plan(manifest, "w", "e");
   const auto pixels = static_cast<double>(job.plan.shards[0].volume_size.pixel_count());
   const auto samples = static_cast<double>(job.plan.sample_count());
-  EXPECT_EQ(bytes(0) - volumes, 2 * 2 * pixels * samples) << "x and y in 16 bits";
+  EXPECT_EQ(bytes(0) - volumes, 5 * pixels * samples) << "x and y in 16 bits, the mask in 8";
   EXPECT_GT(bytes(1), small_volumes);
-  EXPECT_LT(bytes(1) - small_volumes, 2 * 2 * pixels * samples);
+  EXPECT_LT(bytes(1) - small_volumes, 5 * pixels * samples);
 }
 
 TEST(MeasureTrial, LeavesOutPairsThatFail) {

@@ -194,7 +194,7 @@ INSTANTIATE_TEST_SUITE_P(All, NetworkPlans,
                            return std::string(to_string(precision.param));
                          });
 
-TEST(TilesWork, IsWhatGenerateTilesComputes) {
+TEST(TilesWork, GrowsWithTilesThatLieApartUntilAllIsComputed) {
   TileMask mask{{480, 640}, 16, 0, 0, std::vector<std::uint8_t>(30 * 40)};
   for (const Precision precision : kPrecisions) {
     for (const int width : {8, 16}) {
@@ -204,12 +204,21 @@ TEST(TilesWork, IsWhatGenerateTilesComputes) {
       const double one = tiles_work(mask, width, precision);
       EXPECT_GT(one, 1.0 / (30 * 40));
       EXPECT_LT(one, 0.15);
-      // Another far away takes as much; its neighbour shares nearly all on the coarse levels.
+      // Another far away takes about as much; its neighbour shares nearly all on the coarse levels.
       mask.wanted[10 * 40 + 21] = 1;
       const double neighbours = tiles_work(mask, width, precision);
       mask.wanted[10 * 40 + 21] = 0;
       mask.wanted[25 * 40 + 2] = 1;
-      EXPECT_GT(tiles_work(mask, width, precision), neighbours);
+      const double apart = tiles_work(mask, width, precision);
+      EXPECT_GT(apart, neighbours);
+      EXPECT_GT(apart, 1.3 * one);
+      EXPECT_LT(apart, 2 * one);
+      // A quarter of the tiles, scattered: each layer's tiles with their surroundings are nearly
+      // all.
+      for (int tile = 0; tile < 30 * 40; ++tile) {
+        mask.wanted[static_cast<std::size_t>(tile)] = tile / 40 % 2 == 0 && tile % 2 == 0;
+      }
+      EXPECT_GT(tiles_work(mask, width, precision), 0.5);
       // Six tenths of them are computed as all.
       std::fill_n(mask.wanted.begin(), 18 * 40, std::uint8_t{1});
       EXPECT_EQ(tiles_work(mask, width, precision), 1);
