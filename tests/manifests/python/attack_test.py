@@ -165,4 +165,9 @@ def test_ctrl_c_is_heard_between_the_pairs(threads):
 @pytest.mark.skipif("LD_PRELOAD" in os.environ, reason="sanitizers take more address space than there is")
 @pytest.mark.parametrize("megabytes", [0, 8, 20, 40, 60, 80, 120, 160, 240, 400])
 def test_many_threads_in_little_memory(megabytes):
-    run(LITTLE_MEMORY, megabytes, set_up="")
+    try:
+        run(LITTLE_MEMORY, megabytes, set_up="")
+    except AssertionError as failure:
+        if "Cannot recover from MemoryErrors while normalizing" not in str(failure):
+            raise
+        pytest.skip("Python itself had no memory left to raise a MemoryError")
