@@ -82,10 +82,12 @@ std::string_view driving_set(const FoundSource& found) {
   };
   for (const auto& [word, title] : kSets) {
     for (const std::string& name : names) {
-      const auto at = std::ranges::search(name, word, same_letter);
-      const bool is_longer = (at.begin() != name.begin() && std::isalpha(byte(at.begin()[-1]))) ||
-                             (at.end() != name.end() && std::isalpha(byte(*at.end())));
-      if (!at.empty() && !is_longer) return title;
+      const auto at = std::search(name.begin(), name.end(), word.begin(), word.end(), same_letter);
+      if (at == name.end()) continue;
+      const auto end = at + std::ssize(word);
+      const bool is_longer = (at != name.begin() && std::isalpha(byte(at[-1]))) ||
+                             (end != name.end() && std::isalpha(byte(*end)));
+      if (!is_longer) return title;
     }
   }
   return {};
