@@ -68,6 +68,13 @@ def folder(example, tmp_path):
 
 
 @pytest.fixture
+def shards(folder):
+    import eventgan
+
+    return eventgan.Shards(folder)
+
+
+@pytest.fixture
 def two_shards(folder):
     """The same with a second shard of the same samples."""
     shutil.copy(folder / NAME, folder / SECOND)
