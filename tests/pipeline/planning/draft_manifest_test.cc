@@ -32,8 +32,8 @@ class DraftManifest : public ::testing::Test {
     return found(DatasetKind::kFrames, name);
   }
 
-  /// Frames of 512x256, 32 x 16 tiles, of which the first `wide` columns of every `period` become
-  /// brighter and darker by turns, in rows likewise if they are `scattered`.
+  /// Frames of 512x256, 32 x 16 tiles, whose `wide` left columns become brighter and darker by
+  /// turns; `scattered`: squares of that side, one in every 96x96 pixels.
   FoundSource blinking(const fs::path& name, int frames, int wide, bool scattered = false) {
     for (int i = 0; i < frames; ++i) {
       std::vector<int> pixels(256 * 512);
