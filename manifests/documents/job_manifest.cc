@@ -181,6 +181,37 @@ void list_selection(Fields& fields, SelectionSpec& spec) {
               "sequence. Frames without a sequence count by themselves.");
 }
 
+/// Flow is that of stills, or read: from an image to the one after it.
+void list_flow(Fields& fields, SourceSpec& spec, bool has_window) {
+  const auto flow =
+      fields
+          .only_for(words_where(
+              kDatasets, [](const DatasetRow& row) { return row.value != DatasetKind::kDhp19; }))
+          .find("flow", spec.flow, booleans(),
+                "writes how each pixel moves from the one image of its pair to the other, and "
+                "where both show it: /labels/flow (manifests/guides/shard_format.md). Of stills it "
+                "is exact; of frames and recordings it is the ground truth beside them (KITTI, "
+                "DSEC, MVSEC).");
+  fields.rule(R"({"if": {"required": ["flow"]},
+                  "then": {"anyOf": [
+                      {"required": ["pairs"], "properties": {"pairs": {
+                          "required": ["from"], "properties": {"from": {"const": "stills"}}}}},
+                      {"required": ["pairs"], "properties": {
+                          "dataset": {"const": "frames"}, "pairs": {
+                              "required": ["gaps", "side"],
+                              "properties": {"gaps": {"const": [1]}, "side": {"const": "after"}}}}},
+                      {"properties": {"dataset": {"const": "recording"}, "window_s": false,
+                                      "window_events": false, "label_at": false}}]}})");
+  if (!flow || spec.pairs.stills) return;
+  if (has_events(spec.dataset)) {
+    if (has_window) flow->fault("no such key beside window_s, window_events or label_at");
+  } else if (spec.dataset != DatasetKind::kFrames || spec.pairs.side != PairSide::kAfter ||
+             spec.pairs.gaps != std::vector{1}) {
+    flow->fault(
+        R"(no such key for these pairs (only from "stills", or of frames with gaps [1] and side "after"))");
+  }
+}
+
 void list_source(Fields& fields, SourceSpec& spec) {
   fields.kind_at("dataset", spec.dataset, words(kDatasetWords),
                  "What kind of dataset it is, and so how its files lie.");
@@ -231,28 +262,21 @@ void list_source(Fields& fields, SourceSpec& spec) {
               "others are left out and counted; KITTI's DontCare stays.");
   list_recording(some, spec.recording);
   list_selection(fields, spec.selection);
-  some.find("window_s", spec.window.duration_s, numbers(1e-6, 1e3),
-            "the events of so many seconds make a volume. Default: as long as the interval between "
-            "frames that the label's time lies in.");
-  some.find("window_events", spec.window.events, integers(1, kMostEvents),
-            "so many events make a volume, in place of a time. dhp19: by default 7500, one window "
-            "after the other.");
+  const auto window_s = some.find(
+      "window_s", spec.window.duration_s, numbers(1e-6, 1e3),
+      "the events of so many seconds make a volume. Default: as long as the interval between "
+      "frames that the label's time lies in.");
+  const auto window_events = some.find(
+      "window_events", spec.window.events, integers(1, kMostEvents),
+      "so many events make a volume, in place of a time. dhp19: by default 7500, one window "
+      "after the other.");
   fields.sets("window_s", {"window_events"});
-  some.find("label_at", spec.window.label, words(kLabelPlaceWords),
-            "where in its window the label's time lies.");
+  const auto label_at = some.find("label_at", spec.window.label, words(kLabelPlaceWords),
+                                  "where in its window the label's time lies.");
   of_frames.at("pairs", spec.pairs, objects(list_pairs),
                "which pairs of frames become samples. Of other datasets these are windows of "
                "events.");
-  const auto flow = of_frames.find(
-      "flow", spec.flow, booleans(),
-      "of stills, writes how each pixel moves from the one image of its pair to the other, and "
-      "where both show it: /labels/flow (manifests/guides/shard_format.md).");
-  if (flow && !spec.pairs.stills) {
-    flow->fault(R"(no such key for pairs of sequences (only where from is "stills"))");
-  }
-  fields.rule(R"({"if": {"required": ["flow"]},
-                  "then": {"properties": {"pairs": {
-                      "required": ["from"], "properties": {"from": {"const": "stills"}}}}}})");
+  list_flow(fields, spec, window_s || window_events || label_at);
 }
 
 // Below 16 pixels a side the network's four halvings leave less than one pixel of the image at

@@ -156,14 +156,14 @@ struct SourceSpec {
   std::vector<std::string> classes = {};     ///< takes only boxes of these; empty: of all
   SelectionSpec selection;
   PairSpec pairs;
-  bool flow = false;           ///< with pairs of stills: samples have their ShardSample::flow
+  bool flow = false;           ///< samples have their ShardSample::flow
   RecordingOptions recording;  ///< recording
   WindowSpec window;           ///< of events: in place of `pairs`
 };
 
 /// Whether its frames have labels, as far as the manifest tells: images of one's own may have none.
 inline bool has_labels(const SourceSpec& spec) {
-  return !is_own(spec.dataset) || spec.labels.has_value();
+  return !is_own(spec.dataset) || spec.labels.has_value() || spec.flow;
 }
 
 enum class ImageFit { kStretch, kLetterbox, kCrop };

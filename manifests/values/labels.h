@@ -109,7 +109,8 @@ struct Person {
 };
 
 /// How what each pixel of a volume shows of the labelled image moves from the pair's previous image
-/// to its next one: by so many pixels of the volume, in steps of 1/128.
+/// to its next one: by so many pixels of the volume, in steps of 1/128, of a camera's ground truth
+/// in float16's.
 struct PixelFlow {
   std::vector<float> px;            ///< [2, y, x], x first; 0 where the volume shows no image
   std::vector<std::uint8_t> valid;  ///< [y, x] 1: seen in both images; else 0

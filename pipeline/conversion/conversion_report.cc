@@ -59,6 +59,7 @@ std::string labels_text(const ConversionReport& report) {
     parts.push_back(grouped(report.persons) + (report.persons == 1 ? " person" : " persons") +
                     " with joints");
   }
+  if (report.has_flow) parts.push_back("optical flow");
   if (parts.empty()) {
     parts.push_back((report.is_labelled ? "EMPTY LABELS" : "NO LABELS") +
                     std::string(": no boxes and no persons with joints"));

@@ -38,6 +38,7 @@ struct ConversionReport {
   std::int64_t unpaired = 0;
   std::int64_t unpaired_frames = 0;
   bool is_labelled = true;         ///< a source has labels, which may be empty
+  bool has_flow = false;           ///< a source has flow
   std::vector<std::string> notes;  ///< on the inputs as they are: the plan's, the part's shards'
   std::int64_t quarantined_elsewhere = 0;  ///< in other parts, when it started
   bool too_many_faults = false;  ///< the manifest's limits for quarantined samples are passed

@@ -213,6 +213,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
   report.is_labelled = false;
   for (std::size_t i = 0; i < manifest.sources.size(); ++i) {
     const LabelSchema& names = planned.datasets[i]->label_schema();
+    report.has_flow |= manifest.sources[i].flow;
     const bool has_names = !names.class_names.empty() || !names.joint_names.empty();
     report.is_labelled |=
         has_events(manifest.sources[i].dataset) ? has_names : has_labels(manifest.sources[i]);

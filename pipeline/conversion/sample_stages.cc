@@ -13,6 +13,7 @@
 #include "stages/events/event_volume.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/decoding/source_flow.h"
 #include "stages/frames/sources/open_dataset.h"
 #include "stages/labels/label_mapping.h"
 
@@ -113,6 +114,16 @@ void SampleStages::read(SampleMessage& message) const try {
   } else {
     read_frames(message, boxes);
     if (!message.failed()) message.outlines += made->outlines;
+  }
+  const SourceSpec& spec = manifest_.sources[source];
+  if (spec.flow && !spec.pairs.stills && !message.failed()) {
+    Outcome<PixelFlow> flow =
+        true_flow(*datasets_[source], planned.label_key, message.prepared.placement);
+    if (is_fault(flow)) {
+      message.fail(flow.fault().reason);
+    } else {
+      message.sample.flow = *std::move(flow);
+    }
   }
   read_labels(message, *datasets_[source], std::move(annotation));
 } catch (const std::bad_alloc&) {

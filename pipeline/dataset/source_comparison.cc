@@ -27,6 +27,7 @@
 #include "pipeline/runtime/errors.h"
 #include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/decoding/source_flow.h"
 #include "stages/frames/sources/open_dataset.h"
 #include "stages/frames/sources/still_clips.h"
 #include "stages/labels/label_mapping.h"
@@ -237,7 +238,12 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   }
   expected.tiles = stored.tiles;
   expected.flow = stored.flow;
-  if (manifest_.sources[source].flow) {
+  const SourceSpec& spec = manifest_.sources[source];
+  if (spec.flow && !spec.pairs.stills) {
+    Outcome<PixelFlow> flow = true_flow(dataset, planned.label_key, placement);
+    if (is_fault(flow)) return {"expected its flow, got none: " + flow.fault().reason};
+    expected.flow = *std::move(flow);
+  } else if (spec.flow) {
     Outcome<MadePair> parts = dataset.made_pair(planned.label_key);
     if (is_fault(parts))
       return {"expected the flow of its still, got none: " + parts.fault().reason};
@@ -247,7 +253,7 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
       boxes = std::move(parts->boxes);
     }
     Outcome<PreparedPair> prepared =
-        reader_.read(still, orientation_of(kind), manifest_.sources[source].every, boxes, {}, true);
+        reader_.read(still, orientation_of(kind), spec.every, boxes, {}, true);
     if (!is_fault(prepared)) expected.flow = std::move(prepared->flow);
   }
   expected.annotation = std::move(annotation);

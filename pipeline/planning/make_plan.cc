@@ -147,8 +147,9 @@ PairChoiceResult choose_all(const Dataset& dataset, const LabelledFrame& frame,
 }
 
 PlannedSample window_of(const Dataset& dataset, const LabelledFrame& frame,
-                        const WindowSpec& spec) {
-  const double position = spec.label == LabelPlace::kMiddle ? 0.5 : 1;
+                        const SourceSpec& source) {
+  // Flow is that of the image at the window's start.
+  const double position = source.flow ? 0 : source.window.label == LabelPlace::kMiddle ? 0.5 : 1;
   return {frame.sample_id,
           frame.sequence,
           frame.label_key,
@@ -161,7 +162,7 @@ PlannedSample window_of(const Dataset& dataset, const LabelledFrame& frame,
 
 PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame,
                               const SourceSpec& source, std::uint64_t seed, std::string_view key) {
-  if (has_events(source.dataset)) return {{window_of(dataset, frame, source.window)}, {}};
+  if (has_events(source.dataset)) return {{window_of(dataset, frame, source)}, {}};
   return source.pairs.choose == PairChoice::kOne ? choose_one(dataset, frame, source, seed, key)
                                                  : choose_all(dataset, frame, source);
 }

@@ -317,6 +317,11 @@ void read_png_input(std::span<const std::uint8_t> input, const std::filesystem::
     if (image.indices.size() != image.size.pixel_count()) std::abort();
   } catch (const std::runtime_error&) {
   }
+  try {
+    const WideFrame image = decode_wide_image(InputFile(scratch));
+    if (image.bgr.size() != 3 * image.size.pixel_count()) std::abort();
+  } catch (const std::runtime_error&) {
+  }
 }
 
 void read_aedat3_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {

@@ -55,12 +55,6 @@ ImageSize bmp_size(std::FILE* file);
 ColourFrame decode_pnm(std::FILE* file);
 ImageSize pnm_size(std::FILE* file);
 
-/// [y, x, channel] uint16, C order, channels blue, green, red.
-struct WideFrame {
-  ImageSize size;
-  std::vector<std::uint16_t> bgr;
-};
-
 /// The same images with all of their bits, if they have 16 a channel (PNM: more than 8); none
 /// otherwise, from the header alone. As strict as above.
 std::optional<WideFrame> decode_wide_png(std::FILE* file);

@@ -151,17 +151,35 @@ ColourFrame decode_image_file(const std::filesystem::path& file, ImageOrientatio
   return decode_image(open_image_file(file), orientation, range);
 }
 
-IndexImage decode_index_image(const InputFile& file) {
+namespace {
+
+/// `what`: the kind of PNG that `decode` wants.
+template <class Decode>
+auto read_png(const InputFile& file, const char* what, Decode decode) {
   const Format* const format = format_of(file);
   if (format == nullptr || format->decode != decode_png) {
     throw std::runtime_error("expected a PNG, got a file of another kind");
   }
   const InputFile::Stream stream = file.stream(kPixelsBlock);
   try {
-    return decode_index_png(stream.get());
+    return decode(stream.get());
   } catch (const std::runtime_error& error) {
-    throw std::runtime_error(std::string("expected a whole PNG of indices, got ") + error.what());
+    throw std::runtime_error(std::string("expected a whole PNG of ") + what + ", got " +
+                             error.what());
   }
+}
+
+}  // namespace
+
+IndexImage decode_index_image(const InputFile& file) {
+  return read_png(file, "indices", decode_index_png);
+}
+
+WideFrame decode_wide_image(const InputFile& file) {
+  return read_png(file, "16 bits a channel", [](std::FILE* stream) {
+    if (auto wide = decode_wide_png(stream)) return *std::move(wide);
+    throw std::runtime_error("fewer bits");
+  });
 }
 
 bool count_wide_values(const InputFile& file, std::span<std::int64_t> histogram) {

@@ -24,6 +24,12 @@ struct ColourView {
   const std::uint8_t* bgr = nullptr;
 };
 
+/// The same of 16 bits a channel.
+struct WideFrame {
+  ImageSize size;
+  std::vector<std::uint16_t> bgr;
+};
+
 /// An image whose values are numbers, as of objects: [y, x] uint16, C order.
 struct IndexImage {
   ImageSize size;
@@ -73,6 +79,9 @@ ColourFrame decode_image_file(const std::filesystem::path& file,
 /// Decodes a PNG that is grey or has a palette, without looking up any colour. Throws as
 /// decode_image, and so of colours. Thread safe.
 IndexImage decode_index_image(const InputFile& file);
+
+/// Decodes a PNG of 16 bits a channel. Throws as decode_image, and so of fewer bits. Thread safe.
+WideFrame decode_wide_image(const InputFile& file);
 
 /// Counts the values of an image of 16 bits: `histogram` has 65,536 counts. False, and nothing is
 /// counted, if it has fewer bits. Throws as decode_image. Thread safe for different histograms.

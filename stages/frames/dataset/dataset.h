@@ -56,6 +56,14 @@ struct MadePair {
   OutlineCounts outlines = {};        ///< of `boxes`, in the first pair of a clip
 };
 
+/// The motion of each pixel of an image that somebody measured, to the image that follows it.
+struct SourceFlow {
+  ImageSize size;
+  /// As of a volume of this size, in any numbers; known pixels that the other image does not show
+  /// have their motion, unknown ones 0, and both are not valid. Empty: there is none.
+  PixelFlow flow;
+};
+
 class ImageSizes;  // stages/frames/decoding/frame_decoder.h
 
 /// A labelled frame dataset on disk: which frames are labelled, which lie beside them, and what
@@ -90,6 +98,10 @@ class Dataset {
 
   /// Of the pair of a labelled frame, what its frames are made of. A fault if it cannot be told.
   virtual Outcome<MadePair> made_pair(const std::string& /*label_key*/) const { return MadePair(); }
+
+  /// Of a labelled frame, the ground truth of optical flow to the next image of its pair, where
+  /// SourceSpec::flow asks for it. A fault if it cannot be read.
+  virtual Outcome<SourceFlow> flow(const std::string& /*label_key*/) const { return SourceFlow(); }
 
   /// The size of a labelled frame that is made; none: it is stored, and that of its file.
   virtual std::optional<ImageSize> made_size(const std::string& /*label_key*/) const {

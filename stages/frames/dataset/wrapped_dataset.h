@@ -29,6 +29,9 @@ class WrappedDataset : public Dataset {
   Outcome<MadePair> made_pair(const std::string& label_key) const override {
     return dataset_->made_pair(label_key);
   }
+  Outcome<SourceFlow> flow(const std::string& label_key) const override {
+    return dataset_->flow(label_key);
+  }
   std::optional<ImageSize> made_size(const std::string& label_key) const override {
     return dataset_->made_size(label_key);
   }

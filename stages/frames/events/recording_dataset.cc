@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
+#include "stages/frames/events/recording_flow.h"
 #include "stages/frames/events/recording_folder.h"
 #include "stages/frames/events/recording_labels.h"
 #include "stages/frames/listing/source_folders.h"
@@ -49,6 +50,7 @@ struct Recorded : FoundFile {
   std::optional<std::array<double, 2>> event_span;  ///< of an event; none: there are none
   Windows windows;                                  ///< if it has neither frames nor labels
   RecordingLabels labels;                           ///< class_id is the source's
+  std::optional<RecordingFlow> flow;                ///< whose times are its windows
 
   /// Whether it is one window, whose labels have no time.
   bool is_window() const { return is_window_label_file(label_file); }
@@ -110,7 +112,7 @@ std::string written_beside(const fs::path& beside, const fs::path& file,
 class RecordingDataset final : public Dataset {
  public:
   RecordingDataset(const SourceSpec& spec, const fs::path& base)
-      : window_(spec.window), options_(spec.recording) {
+      : window_(spec.window), options_(spec.recording), reads_flow_(spec.flow) {
     RecordingFolder found = look_into_recordings(spec, base);
     notes_ = std::move(found.notes);
     unreadable_ = std::move(found.unreadable);
@@ -119,7 +121,7 @@ class RecordingDataset final : public Dataset {
       static_cast<FoundFile&>(recordings_[name]) = std::move(file);
     }
     read_labels();
-    open_all(base);
+    open_all(base, spec.root);
     number_classes();
     for (const auto& [name, recorded] : recordings_) {
       const std::size_t first = labelled_.size();
@@ -194,6 +196,17 @@ class RecordingDataset final : public Dataset {
     return SampleFault{error.what()};
   }
 
+  Outcome<SourceFlow> flow(const std::string& label_key) const override try {
+    const auto& [recorded, time_s] = find(label_key);
+    if (!recorded.flow) return SourceFlow();
+    const std::optional<std::size_t> map = flow_map(recorded, time_s);
+    if (map) return recorded.flow->read(*map);
+    return SampleFault{"expected flow from " + std::to_string(time_s) + " s, got none, in " +
+                       recorded.path};
+  } catch (const InputError& error) {
+    return SampleFault{error.what()};
+  }
+
   Outcome<Annotation> annotation(const std::string& label_key) const override try {
     const auto& [recorded, time_s] = find(label_key);
     if (recorded.label_file.empty()) return Annotation{};
@@ -243,8 +256,21 @@ class RecordingDataset final : public Dataset {
     return {recorded->second, time_s};
   }
 
+  /// The number of the flow that begins at the time; none if it is not there any more.
+  static std::optional<std::size_t> flow_map(const Recorded& recorded, double time_s) {
+    const auto& times_s = recorded.flow->times_s;
+    const auto map = std::ranges::lower_bound(times_s, time_s - kSameTime_s, {},
+                                              [](const Span& span) { return span[0]; });
+    if (map == times_s.end() || (*map)[0] > time_s + kSameTime_s) return std::nullopt;
+    return static_cast<std::size_t>(map - times_s.begin());
+  }
+
   /// None where so many events make the window, whatever their times.
   std::optional<Span> span_of(const Recorded& recorded, double time_s) const {
+    if (recorded.flow) {
+      const std::optional<std::size_t> map = flow_map(recorded, time_s);
+      return map ? recorded.flow->times_s[*map] : Span{time_s, time_s};
+    }
     if (window_.events) return std::nullopt;
     if (!window_.duration_s && recorded.is_window()) {
       return Span{recorded.span[0] - kJustBefore_s, recorded.span[1]};
@@ -277,7 +303,8 @@ class RecordingDataset final : public Dataset {
 
   /// Of several recordings, those that do not open are told of and left out. Labels with mistakes
   /// are not.
-  void open_all(const fs::path& base) {
+  void open_all(const fs::path& base, const std::string& root) {
+    std::vector<std::string> without_flow;
     const bool is_one = recordings_.size() + unreadable_.size() == 1;
     std::exception_ptr first;
     for (auto entry = recordings_.begin(); entry != recordings_.end();) {
@@ -291,11 +318,21 @@ class RecordingDataset final : public Dataset {
         entry = recordings_.erase(entry);
         continue;
       }
+      if (reads_flow_ && !entry->second.flow) {
+        without_flow.push_back(entry->first);
+        entry = recordings_.erase(entry);
+        continue;
+      }
       if (entry->second.is_window()) read_window(entry->second);
       fit_boxes(entry->second);
       ++entry;
     }
-    if (recordings_.empty()) std::rethrow_exception(first);
+    if (recordings_.empty() && first) std::rethrow_exception(first);
+    if (without_flow.empty()) return;
+    if (recordings_.empty()) {
+      throw InputError("expected flow beside a recording of DSEC or MVSEC, got none, in " + root);
+    }
+    notes_.push_back(counted(without_flow, "recording", " without flow left out in " + root));
   }
 
   void open(Recorded& recorded, const fs::path& base) {
@@ -310,11 +347,19 @@ class RecordingDataset final : public Dataset {
       recorded.frame_times_s.push_back(recording.frame_time_s(i));
     }
     recorded.event_span = recording.event_span();
+    if (reads_flow_) {
+      recorded.flow = open_recording_flow(recording, recorded.format, own, options_);
+      if (!recorded.flow) return;
+      for (const fs::path& file : recorded.flow->files) {
+        annotation_files_.push_back(written_beside(file, own, recorded.path));
+      }
+    }
     if (recorded.frame_times_s.empty()) {
       open_without_frames(recorded);
       return;
     }
-    if (recorded.frame_times_s.size() < 2 && !window_.duration_s && !window_.events) {
+    const bool by_frames = !window_.duration_s && !window_.events && !recorded.flow;
+    if (recorded.frame_times_s.size() < 2 && by_frames) {
       throw InputError(
           "expected two frames or more, or window_s or window_events, got one frame, "
           "in " +
@@ -337,8 +382,9 @@ class RecordingDataset final : public Dataset {
   }
 
   void open_without_frames(Recorded& recorded) const {
-    const bool is_labelled = !recorded.label_file.empty();
-    if (!window_.duration_s && !(is_labelled && window_.events) && !recorded.is_window()) {
+    const bool is_labelled = !recorded.label_file.empty() || recorded.flow;
+    if (!window_.duration_s && !(is_labelled && window_.events) && !recorded.is_window() &&
+        !recorded.flow) {
       throw InputError(
           fmt::format("expected window_s{}, since the recording has no frames, got {}, in {}",
                       is_labelled ? " or window_events" : ", or labels",
@@ -455,6 +501,10 @@ class RecordingDataset final : public Dataset {
 
   void list_times(const std::string& name, const Recorded& recorded) {
     const std::vector<double>& frames = recorded.frame_times_s;
+    if (recorded.flow) {
+      for (const Span& span : recorded.flow->times_s) list_time(name, recorded, span[0]);
+      return;
+    }
     if (recorded.label_file.empty()) {
       // The first frame ends no interval.
       const bool by_frames = !window_.duration_s && !window_.events;
@@ -540,6 +590,7 @@ class RecordingDataset final : public Dataset {
 
   WindowSpec window_;
   RecordingOptions options_;
+  bool reads_flow_;
   WindowLabels window_labels_;
   std::map<std::string, Recorded> recordings_;  ///< by name
   LabelSchema schema_;

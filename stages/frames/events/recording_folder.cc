@@ -39,7 +39,11 @@ class FolderSearch {
  public:
   FolderSearch(const SourceSpec& spec, const fs::path& base) : options_(spec.recording) {
     find_recordings(spec, base);
-    find_labels(spec, base);
+    if (spec.flow) {
+      pass_labels_over(spec, base);
+    } else {
+      find_labels(spec, base);
+    }
   }
 
   RecordingFolder take() { return std::move(found_); }
@@ -211,6 +215,26 @@ class FolderSearch {
           counted(without, "recording", " without labels left out in " + spec.root));
     }
     note_names_of_windows();
+  }
+
+  /// Windows of flow have their own times, and no other labels.
+  void pass_labels_over(const SourceSpec& spec, const fs::path& base) {
+    if (spec.annotations) {
+      throw UsageError(
+          "annotations: expected none beside \"flow\", whose times are other ones, in " +
+          spec.root);
+    }
+    RecordingFolder all = found_;
+    find_labels(spec, base);
+    std::vector<std::string> labelled;
+    for (const auto& [name, recorded] : found_.recordings) {
+      if (!recorded.label_file.empty()) labelled.push_back(name);
+    }
+    found_ = std::move(all);
+    if (labelled.empty()) return;
+    found_.notes.push_back(
+        counted(labelled, "recording",
+                " whose labels are not read, since flow has other times, in " + spec.root));
   }
 
   /// DSEC-Det's boxes, in a folder of its sequences or with the events; empty if there are none, or

@@ -7,6 +7,7 @@
 #include "manifests/documents/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/frames/sources/dataset_kinds.h"
+#include "stages/frames/sources/flow_dataset.h"
 #include "stages/frames/sources/outlined_dataset.h"
 
 namespace eventgan {
@@ -26,7 +27,9 @@ std::unique_ptr<Dataset> open_dataset(const SourceSpec& spec, const std::filesys
                        "\", in " + escape_controls(dataset->label_place(frame.label_key)));
     }
   }
-  return spec.outlines ? with_outlines(std::move(dataset), spec, base) : std::move(dataset);
+  if (spec.outlines) dataset = with_outlines(std::move(dataset), spec, base);
+  const bool reads_flow = spec.flow && !spec.pairs.stills && !has_events(spec.dataset);
+  return reads_flow ? with_flow(std::move(dataset), spec, base) : std::move(dataset);
 }
 
 FrameOrigin frame_origin(DatasetKind dataset, const std::string& sequence) {

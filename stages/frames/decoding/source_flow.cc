@@ -1,0 +1,80 @@
+#include "stages/frames/decoding/source_flow.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "manifests/values/still_motion.h"
+#include "stages/base/images/image_file.h"
+#include "stages/frames/decoding/prepared_frame.h"
+
+namespace eventgan {
+
+SourceFlow read_flow_image(const std::filesystem::path& file, double steps_per_px) {
+  const WideFrame image = decode_wide_image(open_image_file(file));
+  const std::size_t pixels = image.size.pixel_count();
+  SourceFlow flow{image.size, {std::vector<float>(2 * pixels), std::vector<std::uint8_t>(pixels)}};
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const std::uint16_t* const bgr = &image.bgr[3 * i];
+    if (bgr[0] == 0) continue;
+    flow.flow.valid[i] = 1;
+    flow.flow.px[i] = static_cast<float>((bgr[2] - 32768) / steps_per_px);
+    flow.flow.px[pixels + i] = static_cast<float>((bgr[1] - 32768) / steps_per_px);
+  }
+  return flow;
+}
+
+namespace {
+
+/// Rounded to float16's eleven bits, steps of 2^-24 and 65504 at most.
+float as_half(double value) {
+  constexpr double kMost = 65504;
+  const int exponent = value == 0 ? -14 : std::max(std::ilogb(value), -14);
+  const double step = std::ldexp(1.0, exponent - 10);
+  return static_cast<float>(std::clamp(std::nearbyint(value / step) * step, -kMost, kMost) + 0.0);
+}
+
+PixelFlow placed(const SourceFlow& flow, const Placement& placement) {
+  const VisiblePart part = visible_part(placement);
+  const AffineMap to_source = inverse(placement.source_to_volume());
+  const std::size_t pixels = placement.volume.pixel_count();
+  const std::size_t source_pixels = flow.size.pixel_count();
+  PixelFlow placed{std::vector<float>(2 * pixels), std::vector<std::uint8_t>(pixels)};
+  const auto nearest = [](double place, int count) {
+    return static_cast<std::size_t>(std::clamp(place, 0.0, count - 1.0) + 0.5);
+  };
+  const int right = part.volume_x + part.size.width, bottom = part.volume_y + part.size.height;
+  for (int y = part.volume_y; y < bottom; ++y) {
+    for (int x = part.volume_x; x < right; ++x) {
+      const Point at = mapped(to_source, {double(x), double(y)});
+      const std::size_t from =
+          nearest(at.y, flow.size.height) * flow.size.width + nearest(at.x, flow.size.width);
+      const float dx = as_half(placement.scale_x() * flow.flow.px[from]);
+      const float dy = as_half(placement.scale_y() * flow.flow.px[source_pixels + from]);
+      const std::size_t pixel = static_cast<std::size_t>(y) * placement.volume.width + x;
+      placed.px[pixel] = dx;
+      placed.px[pixels + pixel] = dy;
+      placed.valid[pixel] = flow.flow.valid[from] != 0 && x + dx >= part.volume_x &&
+                            x + dx <= right - 1 && y + dy >= part.volume_y && y + dy <= bottom - 1;
+    }
+  }
+  return placed;
+}
+
+}  // namespace
+
+Outcome<PixelFlow> true_flow(const Dataset& dataset, const std::string& label_key,
+                             const Placement& placement) {
+  const Outcome<SourceFlow> flow = dataset.flow(label_key);
+  if (is_fault(flow)) return flow.fault();
+  if (flow->flow.empty()) return PixelFlow();
+  if (flow->size == placement.source) return placed(*flow, placement);
+  return SampleFault{fmt::format("expected flow of {}, as the image is, got {}, in {}",
+                                 to_string(placement.source), to_string(flow->size),
+                                 dataset.label_place(label_key))};
+}
+
+}  // namespace eventgan

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "manifests/values/job.h"
+#include "manifests/values/recording_formats.h"
+#include "stages/frames/dataset/dataset.h"
+#include "stages/recordings/readers/recording.h"
+
+namespace eventgan {
+
+/// Ground truth of optical flow of a recording: maps, each from one time to another.
+struct RecordingFlow {
+  std::vector<std::array<double, 2>> times_s;  ///< from and to of each; ascending, from before to
+  /// A map by its number, at the pixels and the time that it begins at. Throws InputError. May be
+  /// called from several threads.
+  std::function<SourceFlow(std::size_t)> read;
+  std::vector<std::filesystem::path> files;  ///< that it comes from, but the recording's own
+};
+
+/// What is known of a recording:
+///   DSEC    SEQUENCE/flow/forward/*.png and forward_timestamps.txt (from and to in µs, as many as
+///           images, in the order of their names); of the left camera, rectified;
+///   MVSEC   NAME_gt_flow_dist.npz beside NAME_data.hdf5 (timestamps [N], x_flow_dist and
+///           y_flow_dist [N, y, x]: from each time to the next one; known where it is finite and
+///           not 0), of the left camera; else what `simulate` stores with the frames.
+/// None of others. `events_file`: as event_file has it, on disk. Throws InputError "expected X, got
+/// Y, in PATH" if it is damaged, or another view's.
+std::optional<RecordingFlow> open_recording_flow(const Recording& recording, RecordingFormat format,
+                                                 const std::filesystem::path& events_file,
+                                                 const RecordingOptions& options);
+
+}  // namespace eventgan

@@ -1,0 +1,90 @@
+"""Ground truth of optical flow beside images and recordings, from its files to the shards, by stock h5py."""
+
+import cv2
+import h5py
+import numpy as np
+
+import program
+from folders import quarantined
+from program import manifest, run
+from small_job import LENIENT
+
+SIZE = 64, 96  # height, width
+
+
+def texture(height, width):
+    image = np.random.default_rng(4).uniform(0, 255, (height, width)).astype(np.float32)
+    image = cv2.GaussianBlur(image, (0, 0), 1.5)
+    return cv2.normalize(image, None, 0, 255, cv2.NORM_MINMAX).astype(np.uint8)
+
+
+class Flow(program.InFolder):
+    def convert(self, job, *options):
+        """The one shard, open."""
+        path = self.write_manifest(job)
+        run("convert", path, "--progress", "none", *options)
+        run("verify", "--deep", self.folder / job["output"]["directory"])
+        (shard,) = (self.folder / job["output"]["directory"]).glob("*-of-*.h5")
+        return h5py.File(shard)
+
+    def write_flow(self, name, flow, known):
+        """As KITTI's development kit writes it: cv2 stores blue, green, red."""
+        path = self.folder / "training" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        cv2.imwrite(str(path), np.dstack([known, 64 * flow[1] + 2**15, 64 * flow[0] + 2**15]).astype(np.uint16))
+
+    def test_of_kitti_lies_beside_the_images(self):
+        wide, move = texture(SIZE[0], SIZE[1] + 16), 6  # what is seen moves to the right
+        for scene in range(2):
+            for frame, left in ((10, 8), (11, 8 - move)):
+                path = self.folder / f"training/image_2/{scene:06}_{frame}.png"
+                path.parent.mkdir(parents=True, exist_ok=True)
+                cv2.imwrite(str(path), wide[:, left:left + SIZE[1]])
+            flow, known = np.zeros((2, *SIZE)), np.ones(SIZE)
+            flow[0], known[:10] = move, 0  # nothing is known of the sky
+            self.write_flow(f"flow_occ/{scene:06}_10.png", flow, known)
+            self.write_flow(f"flow_noc/{scene:06}_10.png", flow, known * (np.arange(SIZE[1]) < 50))
+        source = {"dataset": "frames", "root": "training/image_2", "flow": True,
+                  "pairs": {"gaps": [1], "side": "after"}}
+        half = {"height": SIZE[0] // 2, "width": SIZE[1] // 2, "preset": "mpii"}
+        with self.convert(manifest([source], image=half)) as shard:
+            self.assertEqual(shard["pairs/sample_id"].asstr()[:].tolist(), ["000000_10", "000001_10"])
+            self.assertEqual(shard["pairs/label_position"][:].tolist(), [0, 0])
+            flow, valid = shard["labels/flow"][:], shard["labels/flow_valid"][:].astype(bool)
+        self.assertTrue((flow[:, 0, 5:] == move / 2).all() and not flow[:, 0, :5].any() and not flow[:, 1].any())
+        self.assertTrue(valid[:, 5:, :25].all() and not valid[:, :5].any() and not valid[:, :, 25:].any())
+
+        (self.folder / "training/flow_occ/000001_10.png").write_bytes(b"half of a PNG")
+        job = manifest([source], image=half, errors=LENIENT)
+        job["output"]["directory"] = "damaged"
+        self.convert(job).close()
+        ((sample, reason),) = quarantined(self.folder / "damaged").items()
+        self.assertEqual(sample, "000001_10")
+        self.assertIn("in training/flow_occ/000001_10.png", reason)
+
+    def test_of_an_export_to_dsec_is_read_again(self):
+        (self.folder / "photos").mkdir()
+        for i in range(3):
+            cv2.imwrite(str(self.folder / f"photos/{'abc'[i]}.png"), texture(SIZE[0] + i, SIZE[1]))
+        moving = {"from": "stills", "side": "after", "motion": {"translation_px": [2, 6], "rotation_deg": 3}}
+        job = manifest([{"dataset": "frames", "root": "photos", "flow": True, "pairs": moving}],
+                       image={"height": SIZE[0], "width": SIZE[1], "fit": "crop", "preset": "mpii"},
+                       generator={"kind": "esim"})
+        with self.convert(job) as shard:
+            written = shard["labels/flow"][:], shard["labels/flow_valid"][:]
+        run("export", self.folder / "out", "--to", "dsec", "--out", self.folder / "dsec")
+        job = manifest([{"dataset": "recording", "root": "dsec/dsec/train", "flow": True}], image={},
+                       generator={"kind": "events"})
+        job["output"]["directory"] = "again"
+        with self.convert(job) as shard:
+            self.assertEqual([name.split("/")[0] for name in shard["pairs/sample_id"].asstr()], ["a", "b", "c"])
+            self.assertEqual(shard["pairs/label_position"][:].tolist(), [0, 0, 0])
+            read = shard["labels/flow"][:], shard["labels/flow_valid"][:]
+        np.testing.assert_array_equal(read[1], written[1])
+        valid = written[1].astype(bool)[:, None].repeat(2, 1)
+        self.assertGreater(valid.mean(), 0.8)
+        np.testing.assert_array_equal(read[0][valid], written[0][valid])
+
+
+if __name__ == "__main__":
+    program.main()

@@ -1,0 +1,179 @@
+#include "stages/frames/events/recording_flow.h"
+
+#include <cstdint>
+#include <tuple>
+#include <vector>
+
+#include "stages/base/images/image_file.h"
+#include "stages/frames/events/recording_dataset.h"
+#include "tests/stages/frames/frames_fixture.h"
+#include "tests/stages/recordings/small_recording.h"
+
+namespace eventgan {
+namespace {
+
+/// A source of the recording `seq`, opened as a dataset.
+class RecordingFlowTest : public FolderTest {
+ protected:
+  RecordingFlowTest() {
+    spec_.dataset = DatasetKind::kRecording;
+    spec_.flow = true;
+  }
+
+  std::unique_ptr<Dataset> open() const { return open_recording_dataset(spec_, folder_.path()); }
+  static SourceFlow flow_of(const Dataset& dataset, std::size_t frame = 0) {
+    const auto flow = dataset.flow(dataset.labelled_frames().at(frame).label_key);
+    EXPECT_EQ(fault_of(flow), "no fault");
+    return is_fault(flow) ? SourceFlow() : *flow;
+  }
+  /// Begin and end of a sample's window.
+  static std::array<double, 2> window(const Dataset& dataset, std::size_t sample) {
+    const LabelledFrame& frame = dataset.labelled_frames().at(sample);
+    return {dataset.paired_frame(frame, -1).frame.time_s,
+            dataset.paired_frame(frame, 1).frame.time_s};
+  }
+
+  SourceSpec spec_;
+};
+
+/// 4 x 3 pixels, five events at 0, 1, 1, 2.5 and 3 ms after 10 s; flow from 10 s to 10.001 s and
+/// from 10.002 s to 10.004 s.
+class DsecFlow : public RecordingFlowTest {
+ protected:
+  DsecFlow() {
+    using Numbers = std::vector<std::int64_t>;
+    testing::write_hdf5(at("seq/events/left/events.h5"),
+                        {{"events/x", {{5}, Numbers{0, 1, 2, 3, 0}}},
+                         {"events/y", {{5}, Numbers{0, 1, 2, 0, 1}}},
+                         {"events/t", {{5}, Numbers{0, 1000, 1000, 2500, 3000}}},
+                         {"events/p", {{5}, Numbers{0, 1, 1, 0, 1}}},
+                         {"t_offset", {{}, Numbers{10'000'000}}}});
+    spec_.root = "seq";
+    spec_.recording.sensor = kSensor;
+    write("seq/flow/forward_timestamps.txt", kTimes);
+    map("000002.png", 1, 1);
+    map("000004.png", 2, 0);
+  }
+
+  /// x = `px` everywhere.
+  void map(const std::string& name, int px, std::uint16_t known, ImageSize size = kSensor) const {
+    std::vector<std::uint16_t> rgb;
+    for (std::size_t i = 0; i < size.pixel_count(); ++i) {
+      rgb.insert(rgb.end(), {static_cast<std::uint16_t>(32768 + 128 * px), 32768, known});
+    }
+    write("seq/flow/forward/" + name, encode_wide_png(size, rgb));
+  }
+  void refused(const std::string& why, const std::string& where) const {
+    EXPECT_THROWS(open(), InputError, why, where);
+  }
+
+  static constexpr ImageSize kSensor{3, 4};
+  static constexpr char kTimes[] =
+      "# from_timestamp_us, to_timestamp_us\n10000000, 10001000\r\n10002000, 10004000\n\n";
+};
+
+TEST_F(DsecFlow, ItsTimesAreTheWindows) {
+  const auto dataset = open();
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("seq/0000000010.000000", "seq/0000000010.002000"));
+  EXPECT_EQ(window(*dataset, 0), (std::array{10.0, 10.001}));
+  EXPECT_EQ(window(*dataset, 1), (std::array{10.002, 10.004}));
+  const auto events = dataset->events(dataset->labelled_frames()[1].label_key);
+  ASSERT_EQ(fault_of(events), "no fault");
+  EXPECT_THAT(events->events, SizeIs(2));
+  EXPECT_EQ(flow_of(*dataset).size, kSensor);
+  EXPECT_THAT(flow_of(*dataset).flow.valid, Each(1));
+  EXPECT_EQ(flow_of(*dataset).flow.px[11], 1);
+  EXPECT_EQ(flow_of(*dataset).flow.px[12], 0);
+  EXPECT_THAT(flow_of(*dataset, 1).flow.valid, Each(0));
+  EXPECT_THAT(flow_of(*dataset, 1).flow.px, Each(0));
+  EXPECT_THAT(dataset->annotation_files(),
+              ElementsAre("seq/flow/forward/000002.png", "seq/flow/forward/000004.png",
+                          "seq/flow/forward_timestamps.txt"));
+  EXPECT_EQ(annotation_of(*dataset), Annotation{});
+}
+
+TEST_F(DsecFlow, IsOfTheRectifiedLeftView) {
+  spec_.recording.camera = "right";
+  fs::rename(at("seq/events/left"), at("seq/events/right"));
+  refused("expected the left camera, which DSEC's flow is of, got \"camera\": \"right\"",
+          "seq/flow");
+  fs::rename(at("seq/events/right"), at("seq/events/left"));
+  spec_.recording.camera = "left";
+  std::vector<float> places;  // a column to the right
+  for (int y = 0; y < 3; ++y) {
+    for (int x = 0; x < 4; ++x) places.insert(places.end(), {x + 1.f, float(y)});
+  }
+  testing::write_hdf5(at("seq/events/left/rectify_map.h5"), {{"rectify_map", {{3, 4, 2}, places}}});
+  refused("expected \"rectify\": true, since DSEC's flow is of the rectified view, got false",
+          "seq/flow");
+  spec_.recording.rectify = true;
+  EXPECT_THAT(ids_of(*open()), SizeIs(2));
+}
+
+TEST_F(DsecFlow, NamesWhatIsWrong) {
+  write("seq/flow/forward/000002.png", "no PNG");
+  const auto dataset = open();
+  EXPECT_THAT(fault_of(dataset->flow(dataset->labelled_frames()[0].label_key)),
+              AllOf(StartsWith("expected a PNG, got"), EndsWith("seq/flow/forward/000002.png")));
+  EXPECT_THAT(fault_of(dataset->flow("seq/10.5")), HasSubstr("expected flow from 10.5"));
+
+  write("seq/flow/forward/000006.png", "one too many");
+  refused("expected an image for each of 2 times, got 3", "seq/flow/forward");
+  const std::pair<const char*, const char*> faults[] = {
+      {"10000000\n", "expected two times in whole us, got another line"},
+      {"10000000, 10001000, 1\n", "(line 1)"},
+      {"#\n1e7, 10001000\n", "(line 2)"},
+      {"9007199254740993, 9007199254740994\n", "(line 1)"},
+      {"10001000, 10000000\n", "expected flow from ascending times, each to a later one, got"},
+      {"10000000, 10001000\n10000000, 10002000\n", "got 10 s to 10.002 s after 10 s"},
+      {"", "expected an image for each of 0 times, got 3"}};
+  for (const auto& [times, fault] : faults) {
+    write("seq/flow/forward_timestamps.txt", times);
+    refused(fault, "seq/flow/forward");
+  }
+  fs::remove(at("seq/flow/forward_timestamps.txt"));
+  refused("expected the times of DSEC's flow, got no readable file", "forward_timestamps.txt");
+}
+
+TEST_F(DsecFlow, OtherLabelsAreNotLostWithoutAWord) {
+  write("seq.csv", "time_s,left,top,right,bottom,class\n10.001,0,0,1,1,car\n");
+  const auto dataset = open();
+  EXPECT_THAT(dataset->label_schema().class_names, IsEmpty());
+  EXPECT_THAT(dataset->notes(),
+              Contains("1 recording whose labels are not read, since flow has other times, in "
+                       "seq: seq"));
+  spec_.annotations = "seq.csv";
+  EXPECT_THROWS(open(), UsageError,
+                "annotations: expected none beside \"flow\", whose times are other ones, in seq");
+}
+
+TEST_F(RecordingFlowTest, OfSimulateIsThatBetweenItsFrames) {
+  testing::write_hdf5(at("drive.h5"), testing::small_mvsec());
+  spec_.root = "drive.h5";
+  const auto dataset = open();
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("drive/0000000001.000000", "drive/0000000001.500000"));
+  EXPECT_EQ(window(*dataset, 1), (std::array{1.5, 2.0}));
+  const SourceFlow flow = flow_of(*dataset, 1);
+  EXPECT_EQ(flow.size, (ImageSize{3, 4}));
+  EXPECT_THAT(std::vector(flow.flow.px.begin(), flow.flow.px.begin() + 12), Each(2));
+  EXPECT_THAT(std::vector(flow.flow.px.begin() + 12, flow.flow.px.end()), Each(-2));
+  EXPECT_THAT(flow.flow.valid, Each(1));
+}
+
+TEST_F(RecordingFlowTest, ThoseWithoutAreLeftOut) {
+  auto datasets = testing::small_mvsec();
+  testing::write_hdf5(at("all/a.h5"), datasets);
+  datasets.erase("davis/left/flow_dist");
+  testing::write_hdf5(at("all/b.h5"), datasets);
+  spec_.root = "all";
+  const auto dataset = open();
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("a/0000000001.000000", "a/0000000001.500000"));
+  EXPECT_THAT(dataset->notes(), Contains("1 recording without flow left out in all: b"));
+  EXPECT_THAT(dataset->unreadable().reasons, IsEmpty());
+  fs::remove(at("all/a.h5"));
+  EXPECT_THROWS(open(), InputError, "expected flow beside a recording of DSEC or MVSEC, got none",
+                "all");
+}
+
+}  // namespace
+}  // namespace eventgan
