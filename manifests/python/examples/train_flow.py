@@ -318,6 +318,12 @@ def in_units(sample: Sample) -> np.ndarray:
     return normalized(sample["volume"])
 
 
+def in_voxels(sample: Sample) -> np.ndarray:
+    """What a voxel grid tells: of each bin which polarity has more events, and by how much, [2B, H, W]."""
+    positive, negative = np.split(in_units(sample), 2)
+    return np.maximum(np.concatenate([positive - negative, negative - positive]), 0)
+
+
 def frames_of(sample: Sample) -> list[torch.Tensor]:
     """The previous and the next frame of a sample of a recording (MVSEC's layout, or images), as they lie in the
     volume, [1, 1, H, W], 0 to 255; none of other samples."""
@@ -378,9 +384,12 @@ def main() -> None:
     parser = training.options(__doc__.splitlines()[0], batch=4, lr=2e-3, steps=STEPS)
     parser.add_argument("--bfloat16", action="store_true", help="compute convolutions in bfloat16, faster where the "
                         "processor has AVX512-BF16 or AMX")
+    parser.add_argument("--channels", choices=["volume", "voxel"], default="volume",
+                        help="what the network sees: each polarity's events, or their difference, as of a voxel grid")
     args = training.begin(parser)
-    train_shards, validation_shards = (part.changed(in_units) for part in training.divided(args, with_flow))
-    test_shards = training.tested(args, train_shards, validation_shards, with_events).changed(in_units)
+    seen = in_voxels if args.channels == "voxel" else in_units
+    train_shards, validation_shards = (part.changed(seen) for part in training.divided(args, with_flow))
+    test_shards = training.tested(args, train_shards, validation_shards, with_events).changed(seen)
     if not any(map(has_truth, (test_shards.sample(i, {"volume", "pair", "flow"}) for i in range(len(test_shards))))):
         raise SystemExit(f"expected samples with flow, or of recordings whose frames are still there, got none, in "
                          f"{args.test}")
@@ -390,8 +399,13 @@ def main() -> None:
     if len(positions) > 1:
         raise SystemExit(f"expected flow at the pixels of the next image, or of the previous one (side), got both, in "
                          f"{args.data}")
-    training.require_own_ids(args, test_shards[[*with_flow(test_shards)]])
     position = positions.pop()
+    tested = test_shards[[*with_flow(test_shards)]]
+    if any(tested.sample(i, {"pair"})["pair"]["label_position"] != position for i in range(len(tested))):
+        image, side = ("next", "before") if position == 1 else ("previous", "after")
+        raise SystemExit(f"expected flow at the pixels of the {image} image (side {side}), as in {args.data}, got "
+                         f"other flow, in {args.test}")
+    training.require_own_ids(args, tested)
     network = FlowNetwork(len(items[0]["volume"]), position)
     training.load_fitting(network, args.pretrained)
     network = network.to(args.device).to(memory_format=torch.channels_last)

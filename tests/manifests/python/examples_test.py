@@ -225,8 +225,21 @@ def test_flow_network_learns_and_goes_on(tmp_path):
     assert "untrained" not in said
     after = convert(tmp_path, sources=[source, {**source, "pairs": {**source["pairs"], "side": "after"}}],
                     **{**options, "name": "both"})
+    said = train("train_flow", data, tmp_path / "none", "--channels", "voxel", "--test", after, expect=1)
+    assert "expected flow at the pixels of the next image (side before), as in" in said and "got other flow" in said
     said = train("train_flow", after, tmp_path / "of both", "--steps", "1", expect=1)
     assert f"expected flow at the pixels of the next image, or of the previous one (side), got both, in {after}" in said
+
+
+def test_a_voxel_grid_tells_by_how_much_one_polarity_has_more_events(monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import train_flow
+
+    volume = np.array([3, 0, 1, 4, 0, 1, 3, 2], np.float32).reshape(4, 1, 2)  # [2 bins, 1, 2] of each polarity
+    percentile = np.percentile([3, 1, 4, 1, 3, 2], 98)
+    shares = np.minimum(volume / percentile, 1)
+    expected = np.maximum([*(shares[:2] - shares[2:]), *(shares[2:] - shares[:2])], 0)
+    np.testing.assert_allclose(train_flow.in_voxels({"volume": volume}), expected)
 
 
 @pytest.mark.parametrize("axis, sign", [(2, 1), (2, -1), (1, 1), (1, -1)])
