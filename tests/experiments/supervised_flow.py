@@ -6,10 +6,11 @@ events of cameras.
     --recordings recordings slider_depth_mvsec_layout.hdf5 --out flows
 
 Each photograph is a clip, in which image and labelled objects move on their own; each way of making its events has a
-row, of the same motions. The network and its training are those of train_flow.py; networks see no recording. Scored is
-how far the previous frame, moved by the flow, is from the next one at pixels with events, as a share of that without
-flow. The controls have learnt nothing: among them is what the network has at first, the flow by least squares, and the
-best constant flow, which is chosen on the test. The same command resumes.
+row, of the same motions, and of ESIM's there are some with other motions or fewer photographs. The network and its
+training are those of train_flow.py; networks see no recording. Scored is how far the previous frame, moved by the flow,
+is from the next one at pixels with events, as a share of that without flow. The controls have learnt nothing: among
+them is what the network has at first, the flow by least squares, and the best constant flow, which is chosen on the
+test. The same command resumes.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import pathlib
 import subprocess
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import recordings
@@ -35,15 +36,33 @@ from self_supervised import CONTROLS, REAL, Pair
 
 TRAINER = pathlib.Path(train_flow.__file__)
 SOURCES = [TRAINER, pathlib.Path(training.__file__)]  # of what a network is and how it learns
-ROWS: dict[str, dict[str, Any]] = {"EventGAN 8": {"weights": "shipped:8"}, "EventGAN 16": {"weights": "shipped:16"},
-                                   "esim": {"kind": "esim"}, "difference": {"kind": "difference"}}
 UNTAUGHT = "least squares"  # the network that has learnt nothing
 SIDE, CLIP = 160, 5  # pixels of the volumes; frames of each photograph
-# In pixels of the photographs, which are two to three times as large as the volumes: half of all pixels move by less
-# than 2 px there, a hundredth by more than 7.
-MOTION = {"translation_px": [0, 7], "rotation_deg": 1, "scale": 0.02, "rests": 0,
-          "objects": {"translation_px": [0, 7], "rotation_deg": 2, "scale": 0.03, "rests": 0.25}}
 
+
+def motion(times: float = 1) -> dict[str, Any]:
+    """In pixels of the photographs, which are two to three times as large as the volumes: half of all pixels move by
+    less than 2 px there, a hundredth by more than 7."""
+    return {"translation_px": [0, 7 * times], "rotation_deg": times, "scale": 0.02 * times, "rests": 0,
+            "objects": {"translation_px": [0, 7 * times], "rotation_deg": 2 * times, "scale": 0.03 * times,
+                        "rests": 0.25}}
+
+
+class Row(NamedTuple):
+    """What makes the events, how the photographs move, and which share of them is taken."""
+
+    generator: dict[str, Any]
+    motion: dict[str, Any] = motion()
+    share: float = 1
+
+
+ESIM = {"kind": "esim"}
+WHOLE = {key: value for key, value in motion().items() if key != "objects"}
+ROWS = {"EventGAN 8": Row({"weights": "shipped:8"}), "EventGAN 16": Row({"weights": "shipped:16"}), "esim": Row(ESIM),
+        "difference": Row({"kind": "difference"}), "esim, image and objects as one": Row(ESIM, WHOLE),
+        "esim, half as far": Row(ESIM, motion(0.5)), "esim, twice as far": Row(ESIM, motion(2)),
+        "esim, a tenth of the photographs": Row(ESIM, share=0.1),
+        "esim, a third of the photographs": Row(ESIM, share=0.33)}
 
 
 def read_args() -> argparse.Namespace:
@@ -68,19 +87,21 @@ def read_args() -> argparse.Namespace:
 
 def photographs(args: argparse.Namespace, row: str) -> pathlib.Path:
     """The folder of the row's shards, made if it is not there yet."""
-    folder = args.out / "photographs" / row.replace(" ", "-")
+    folder = args.out / "photographs" / row.replace(",", "").replace(" ", "-")
+    generator, motion_of_row, share = ROWS[row]
     if not (folder / "dataset.json").exists():
         sources = []
         for frames in map(pathlib.Path.resolve, args.frames):
             sources.append({"dataset": "frames", "root": str(frames / "images"), "flow": True,
-                            "pairs": {"from": "stills", "frames": CLIP, "motion": MOTION}})
+                            "fraction": [0, share],
+                            "pairs": {"from": "stills", "frames": CLIP, "motion": motion_of_row}})
             if (frames / "boxes.csv").exists():
                 sources[-1]["labels"] = {"path": str(frames / "boxes.csv"), "format": "csv"}
             if (frames / "masks").is_dir():
                 sources[-1]["outlines"] = str(frames / "masks")
         manifest = {"format": "eventgan-manifest", "version": 1, "name": folder.name, "sources": sources,
                     "image": {"width": SIDE, "height": SIDE, "fit": "crop", "preset": "kitti"},
-                    "generator": ROWS[row], "output": {"directory": folder.name}}
+                    "generator": generator, "output": {"directory": folder.name}}
         folder.parent.mkdir(parents=True, exist_ok=True)
         file = folder.with_name(f"{folder.name}.json")
         file.write_text(json.dumps(manifest, indent=1), encoding="utf-8")
