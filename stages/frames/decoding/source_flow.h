@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "manifests/values/faults.h"
 #include "manifests/values/labels.h"
@@ -9,6 +11,12 @@
 #include "stages/frames/dataset/dataset.h"
 
 namespace eventgan {
+
+/// KITTI's ground truth: of all pixels, of those that both images show; beside the folders of its
+/// left camera, of whose images it is.
+inline constexpr std::array<std::string_view, 2> kKittiFlow{"flow_occ", "flow_noc"};
+inline constexpr std::array<std::string_view, 3> kKittiLeftCamera{"image_2", "image_0",
+                                                                  "colored_0"};
 
 /// What a pixel of motion counts in the numbers of a benchmark's image of flow.
 inline constexpr double kKittiFlowSteps = 64;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
+#include "stages/frames/decoding/source_flow.h"
 #include "stages/frames/listing/image_folder.h"
 #include "stages/frames/listing/source_folders.h"
 #include "stages/frames/own_labels/find_labels.h"
@@ -57,8 +58,24 @@ bool has_sequences(const std::filesystem::path& folder) {
   });
 }
 
+std::vector<FoundSource> find_labels_and_flow(FoundSource found) {
+  std::vector<FoundSource> sources = find_own_labels(std::move(found));
+  for (FoundSource& source : sources) {
+    const std::string name = source.root.filename().string();
+    const bool is_left = std::ranges::find(kKittiLeftCamera, name) != kKittiLeftCamera.end();
+    const bool has_flow = std::ranges::any_of(kKittiFlow, [&](std::string_view folder) {
+      return has_folder(source.root.parent_path() / folder);
+    });
+    if (!is_left || !has_flow) continue;
+    source.remarks.push_back(
+        "KITTI's flow lies beside the images: \"flow\": true, with \"gaps\": [1] "
+        "and \"side\": \"after\", reads it");
+  }
+  return sources;
+}
+
 constexpr std::array kFramesLayouts{
-    DatasetLayout{.fits = is_frames_root, .complete = find_own_labels}};
+    DatasetLayout{.fits = is_frames_root, .complete = find_labels_and_flow}};
 
 }  // namespace
 

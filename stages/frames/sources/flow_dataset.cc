@@ -9,7 +9,6 @@
 #include <set>
 #include <stdexcept>
 #include <string>
-#include <string_view>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -29,13 +28,12 @@ class FlowDataset final : public WrappedDataset {
  public:
   FlowDataset(std::unique_ptr<Dataset> dataset, const SourceSpec& spec, const fs::path& base)
       : WrappedDataset(std::move(dataset)), beside_(SourceRoot(spec.root, base).above()) {
-    constexpr std::array<std::string_view, 3> kLeft{"image_2", "image_0", "colored_0"};
     const SourceRoot root(spec.root, base);
-    if (std::ranges::find(kLeft, root.name()) == kLeft.end()) {
+    if (std::ranges::find(kKittiLeftCamera, root.name()) == kKittiLeftCamera.end()) {
       throw UsageError(fmt::format(
           "expected images of KITTI's left camera ({}), which flow_occ and flow_noc beside them "
           "are of, got \"flow\" of others, in {}",
-          fmt::join(kLeft, ", "), root.written("")));
+          fmt::join(kKittiLeftCamera, ", "), root.written("")));
     }
     find_flow(root, spec.labels.has_value());
   }
@@ -79,9 +77,8 @@ class FlowDataset final : public WrappedDataset {
  private:
   void find_flow(const SourceRoot& root, bool keeps_others) {
     std::array<std::set<std::string>, 2> maps;  // of all known pixels; of those that both show
-    constexpr std::array kFolders{"flow_occ", "flow_noc"};
     for (std::size_t i = 0; i < maps.size(); ++i) {
-      for (const std::string& name : beside_.files_in(kFolders[i])) maps[i].insert(name);
+      for (const std::string& name : beside_.files_in(kKittiFlow[i])) maps[i].insert(name);
     }
     std::vector<std::string> without;
     for (const LabelledFrame& labelled : dataset_->labelled_frames()) {
@@ -90,7 +87,7 @@ class FlowDataset final : public WrappedDataset {
       const std::string name = image.stem().string() + ".png";
       std::vector<std::string> files;
       for (std::size_t i = 0; is_in_root && i < maps.size(); ++i) {
-        if (maps[i].contains(name)) files.push_back(std::string(kFolders[i]) + "/" + name);
+        if (maps[i].contains(name)) files.push_back(std::string(kKittiFlow[i]) + "/" + name);
       }
       if (files.empty()) without.push_back(labelled.sample_id);
       if (!files.empty() || keeps_others) labelled_.push_back(labelled);
@@ -105,8 +102,8 @@ class FlowDataset final : public WrappedDataset {
     }
     if (maps[0].empty() || maps[1].empty()) {
       notes_.push_back(fmt::format("no {} in {}: flow_valid is 1 where {} tells flow",
-                                   kFolders[maps[0].empty() ? 0 : 1], beside_.written(""),
-                                   kFolders[maps[0].empty() ? 1 : 0]));
+                                   kKittiFlow[maps[0].empty() ? 0 : 1], beside_.written(""),
+                                   kKittiFlow[maps[0].empty() ? 1 : 0]));
     }
     if (without.empty()) return;
     notes_.push_back(fmt::format(

@@ -121,6 +121,15 @@ TEST_F(FindSource, SaysOfWhichDatasetTheFramesAreAPart) {
   EXPECT_THAT(find("mini/other").remarks, Not(Contains(HasSubstr("a part of"))));
 }
 
+TEST_F(FindSource, SaysHowKittisFlowIsRead) {
+  touch({"flow/image_2/000000_10.png", "flow/image_3/000000_10.png"});
+  EXPECT_THAT(find("flow/image_2").remarks, IsEmpty());
+  touch({"flow/flow_noc/000000_10.png"});
+  EXPECT_THAT(find("flow/image_2").remarks,
+              ElementsAre(HasSubstr("\"flow\": true, with \"gaps\": [1] and \"side\": \"after\"")));
+  EXPECT_THAT(find("flow/image_3").remarks, IsEmpty());
+}
+
 TEST_F(FindSource, SaysWhatThereIsInstead) {
   touch({"testing/image_2/000000.png", "notes/readme.txt", "images/1.png"});
   const struct {
