@@ -133,8 +133,11 @@ void refuse_numpy(const std::string& expected, std::string got, const std::strin
   throw std::runtime_error("expected " + expected + ", got " + got + ", in " + name);
 }
 
-TypedArray decode_numpy_elements(const NumpyLayout& layout, std::span<const std::byte> data,
-                                 const std::string& name) {
+std::size_t require_numpy_size(const NumpyLayout& layout, std::uint64_t size_bytes,
+                               const std::string& name) {
+  if (!layout.fields.empty()) {
+    refuse_numpy("an array of numbers or text", "one of fields (a structured dtype)", name);
+  }
   const std::string& descr = layout.descr;
   if (descr.find('O') != std::string::npos) {
     refuse_numpy("an array of numbers or text", "Python objects (dtype '" + descr + "')", name);
@@ -143,25 +146,31 @@ TypedArray decode_numpy_elements(const NumpyLayout& layout, std::span<const std:
   if (!item_size) {
     refuse_numpy("dtype <f4, <f8, <i, <u, |b1, <U or |S", "'" + descr + "'", name);
   }
-  TypedArray array{.shape = layout.shape, .values = {}};
-  if (array.shape.size() > kMostDimensions) {
-    refuse_numpy("at most 32 dimensions", std::to_string(array.shape.size()), name);
+  if (layout.shape.size() > kMostDimensions) {
+    refuse_numpy("at most 32 dimensions", std::to_string(layout.shape.size()), name);
   }
-  std::optional<std::size_t> size_bytes = item_size;
-  for (const std::size_t size : array.shape) {
-    if (size_bytes) size_bytes = product(*size_bytes, size);
+  std::optional<std::size_t> needed = item_size;
+  for (const std::size_t size : layout.shape) {
+    if (needed) needed = product(*needed, size);
   }
-  if (size_bytes != data.size()) {
-    refuse_numpy((size_bytes ? std::to_string(*size_bytes) : "countless") + " bytes for shape " +
-                     array.shape_text() + " of " + descr,
-                 std::to_string(data.size()), name);
+  if (needed != size_bytes) {
+    refuse_numpy((needed ? std::to_string(*needed) : "countless") + " bytes for shape " +
+                     TypedArray{.shape = layout.shape, .values = {}}.shape_text() + " of " + descr,
+                 std::to_string(size_bytes), name);
   }
   if (*item_size == 0) {
     // Elements without bytes: their number could not be checked against the input.
-    const bool empty = std::ranges::find(array.shape, 0u) != array.shape.end();
+    const bool empty = std::ranges::find(layout.shape, 0u) != layout.shape.end();
     if (!empty) refuse_numpy("text of at least one character", "'" + descr + "'", name);
   }
+  return *item_size;
+}
 
+TypedArray decode_numpy_elements(const NumpyLayout& layout, std::span<const std::byte> data,
+                                 const std::string& name) {
+  const std::size_t item_size = require_numpy_size(layout, data.size(), name);
+  const std::string& descr = layout.descr;
+  TypedArray array{.shape = layout.shape, .values = {}};
   if (descr == "<f8") {
     array.values = copy_numbers<double>(data);
   } else if (descr == "<f4") {
@@ -187,7 +196,7 @@ TypedArray decode_numpy_elements(const NumpyLayout& layout, std::span<const std:
     for (std::size_t i = 0; i < data.size(); ++i) values[i] = data[i] != std::byte{0};
     array.values = std::move(values);
   } else {
-    array.values = copy_text(data, *item_size, descr[1] == 'U', name);
+    array.values = copy_text(data, item_size, descr[1] == 'U', name);
   }
 
   if (layout.fortran_order && array.shape.size() > 1) {
@@ -361,9 +370,6 @@ NumpyLayout parse_npy_header(std::span<const std::byte> bytes, const std::string
 TypedArray parse_npy(std::span<const std::byte> bytes, const std::string& name) {
   std::size_t begin = 0;
   const NumpyLayout layout = parse_npy_header(bytes, name, begin);
-  if (!layout.fields.empty()) {
-    refuse_numpy("an array of numbers or text", "one of fields (a structured dtype)", name);
-  }
   return decode_numpy_elements(layout, bytes.subspan(begin), name);
 }
 

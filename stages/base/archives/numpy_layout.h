@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -28,6 +29,11 @@ struct NumpyLayout {
 /// Throws std::runtime_error "expected X, got Y, in NAME".
 TypedArray decode_numpy_elements(const NumpyLayout& layout, std::span<const std::byte> data,
                                  const std::string& name);
+
+/// Throws as above unless the array is one of numbers or text that parse_npy takes, and has exactly
+/// `size_bytes`. Gives the size of an element.
+std::size_t require_numpy_size(const NumpyLayout& layout, std::uint64_t size_bytes,
+                               const std::string& name);
 
 /// What the header of a .npy file says, of which `bytes` may be the beginning alone; `data_begin`
 /// is where the array's bytes start. Throws as above.
