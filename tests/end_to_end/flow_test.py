@@ -62,6 +62,36 @@ class Flow(program.InFolder):
         self.assertEqual(sample, "000001_10")
         self.assertIn("in training/flow_occ/000001_10.png", reason)
 
+    def test_of_mvsec_is_numpys(self):
+        random = np.random.default_rng(2)
+        flow = random.normal(0, 2, (2, 3, *SIZE))
+        flow[:, :, :20] = 0  # no depth
+        flow[0, 1, 30] = np.nan
+        times = np.array([1.0, 1.05, 1.1])
+        events = np.column_stack([random.integers(0, SIZE[1], 300), random.integers(0, SIZE[0], 300),
+                                  np.linspace(0.99, 1.11, 300), random.choice([-1, 1], 300)])
+        with h5py.File(self.folder / "drive_data.hdf5", "w") as file:
+            file["davis/left/events"] = events
+            file["davis/left/image_raw"] = np.zeros((2, *SIZE), np.uint8)
+            file["davis/left/image_raw_ts"] = [1.0, 1.1]
+            file["davis/left/image_raw_event_inds"] = np.searchsorted(events[:, 2], [1.0, 1.1], "right") - 1
+        for save in (np.savez, np.savez_compressed):
+            save(self.folder / "drive_gt_flow_dist.npz", timestamps=times, x_flow_dist=flow[0], y_flow_dist=flow[1])
+            job = manifest([{"dataset": "recording", "root": "drive_data.hdf5", "flow": True}], image={},
+                           generator={"kind": "events"})
+            job["output"]["directory"] = save.__name__
+            with self.convert(job) as shard:
+                begins, ends = (shard[f"pairs/{side}_time_s"][:] for side in ("prev", "next"))
+                read, valid = shard["labels/flow"][:], shard["labels/flow_valid"][:].astype(bool)
+            np.testing.assert_allclose([begins, ends], [times[:-1], times[1:]])
+            known = np.isfinite(flow).all(0) & flow.any(0)
+            expected = np.where(known, flow, 0)[:, :2]
+            np.testing.assert_allclose(read, expected.swapaxes(0, 1), rtol=2**-11, atol=2**-25)
+            y, x = np.mgrid[:SIZE[0], :SIZE[1]]
+            inside = [(0 <= x + read[i, 0]) & (x + read[i, 0] < SIZE[1] - 0.999) & (0 <= y + read[i, 1])
+                      & (y + read[i, 1] < SIZE[0] - 0.999) for i in range(2)]
+            np.testing.assert_array_equal(valid, known[:2] & inside)
+
     def test_of_an_export_to_dsec_is_read_again(self):
         (self.folder / "photos").mkdir()
         for i in range(3):

@@ -5,13 +5,17 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
 #include "manifests/files/input_file.h"
 #include "manifests/values/faults.h"
+#include "stages/base/archives/npz_array.h"
+#include "stages/base/archives/numpy_arrays.h"
 #include "stages/frames/decoding/source_flow.h"
 #include "stages/frames/listing/source_folders.h"
 
@@ -33,6 +37,13 @@ void check_times(const std::vector<std::array<double, 2>>& times_s, const std::s
                     "to {} s after {} s, in {}",
                     from_s, to_s, before_s, place));
   }
+}
+
+void require_left(const RecordingOptions& options, const char* dataset, const fs::path& place) {
+  if (options.camera == "left") return;
+  throw InputError(
+      fmt::format("expected the left camera, which {}'s flow is of, got \"camera\": \"{}\", in {}",
+                  dataset, options.camera, place.string()));
 }
 
 /// Lines of two times in µs, and comments.
@@ -77,10 +88,7 @@ std::optional<RecordingFlow> open_dsec_flow(const fs::path& events_file,
   const fs::path side = events_file.parent_path();
   const fs::path flow = side.parent_path().parent_path() / "flow";
   if (!has_folder(flow)) return std::nullopt;
-  if (options.camera != "left") {
-    throw InputError("expected the left camera, which DSEC's flow is of, got \"camera\": \"" +
-                     options.camera + "\", in " + flow.string());
-  }
+  require_left(options, "DSEC", flow);
   if (!options.rectify && has_file(side / "rectify_map.h5")) {
     throw InputError(
         "expected \"rectify\": true, since DSEC's flow is of the rectified view, got "
@@ -108,15 +116,17 @@ std::optional<RecordingFlow> open_dsec_flow(const fs::path& events_file,
   return found;
 }
 
-/// Where the field is finite and not 0, it is known.
-SourceFlow flow_of(ImageSize size, std::vector<float> x_px, const std::vector<float>& y_px) {
+/// Where the field is finite, and not 0 if that stands for nothing, it is known.
+SourceFlow flow_of(ImageSize size, std::vector<float> x_px, const std::vector<float>& y_px,
+                   bool is_zero_known) {
   SourceFlow flow{size, {std::move(x_px), std::vector<std::uint8_t>(size.pixel_count())}};
   std::vector<float>& px = flow.flow.px;
   px.insert(px.end(), y_px.begin(), y_px.end());
   const std::size_t pixels = size.pixel_count();
   for (std::size_t i = 0; i < pixels; ++i) {
     float &x = px[i], &y = px[pixels + i];
-    const bool is_known = std::isfinite(x) && std::isfinite(y);
+    const bool is_known =
+        std::isfinite(x) && std::isfinite(y) && (is_zero_known || x != 0 || y != 0);
     flow.flow.valid[i] = is_known;
     if (!is_known) x = y = 0;
   }
@@ -132,9 +142,75 @@ std::optional<RecordingFlow> simulated_flow(const Recording& recording) {
   }
   found.read = [&recording](std::size_t i) {
     FlowField field = *recording.flow(static_cast<std::int64_t>(i));
-    return flow_of(field.size, std::move(field.x_px), field.y_px);
+    return flow_of(field.size, std::move(field.x_px), field.y_px, /*is_zero_known=*/true);
   };
   return found;
+}
+
+/// The arrays of NAME_gt_flow_dist.npz, which are larger than memory.
+class MvsecFlow {
+ public:
+  MvsecFlow(fs::path file, ImageSize size)
+      : file_(std::move(file)), size_(size), x_(file_, "x_flow_dist"), y_(file_, "y_flow_dist") {}
+
+  std::vector<std::array<double, 2>> times_s() const {
+    const TypedArray times = parse_npy(ZipArchive(file_).read("timestamps.npy"), file_.string());
+    const std::vector<std::size_t> shape{times.size(), static_cast<std::size_t>(size_.height),
+                                         static_cast<std::size_t>(size_.width)};
+    const bool are_fields = x_.shape() == shape && y_.shape() == shape;
+    if (times.shape.size() != 1 || times.is_text() || !are_fields) {
+      throw InputError(fmt::format(
+          "expected timestamps [N], x_flow_dist and y_flow_dist [N, {}, {}], got {}, [{}] and "
+          "[{}], in {}",
+          size_.height, size_.width, times.shape_text(), fmt::join(x_.shape(), ", "),
+          fmt::join(y_.shape(), ", "), file_.string()));
+    }
+    std::vector<std::array<double, 2>> times_s;
+    for (std::size_t i = 1; i < times.size(); ++i) {
+      times_s.push_back({times.number(i - 1), times.number(i)});
+    }
+    check_times(times_s, file_.string());
+    return times_s;
+  }
+
+  /// Pixels of no depth are 0, not a number or infinite.
+  SourceFlow read(std::size_t index) const try {
+    return flow_of(size_, values(x_, index), values(y_, index), /*is_zero_known=*/false);
+  } catch (const std::runtime_error& error) {
+    throw InputError(error.what());
+  }
+
+ private:
+  std::vector<float> values(const NpzArray& array, std::size_t index) const {
+    const TypedArray slice = array.slice(index);
+    if (slice.is_text()) throw InputError("expected numbers, got text, in " + file_.string());
+    std::vector<float> values(slice.size());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = static_cast<float>(slice.number(i));
+    }
+    return values;
+  }
+
+  fs::path file_;
+  ImageSize size_;
+  NpzArray x_, y_;
+};
+
+std::optional<RecordingFlow> open_mvsec_flow(const fs::path& events_file, ImageSize size,
+                                             const RecordingOptions& options) {
+  std::string name = events_file.stem().string();
+  constexpr std::string_view kData = "_data";
+  if (name.ends_with(kData)) name.resize(name.size() - kData.size());
+  const fs::path file = events_file.parent_path() / (name + "_gt_flow_dist.npz");
+  if (!has_file(file)) return std::nullopt;
+  require_left(options, "MVSEC", file);
+  try {
+    const auto flow = std::make_shared<const MvsecFlow>(file, size);
+    return RecordingFlow{
+        flow->times_s(), [flow](std::size_t index) { return flow->read(index); }, {file}};
+  } catch (const std::runtime_error& error) {
+    throw InputError(error.what());
+  }
 }
 
 }  // namespace
@@ -143,7 +219,10 @@ std::optional<RecordingFlow> open_recording_flow(const Recording& recording, Rec
                                                  const fs::path& events_file,
                                                  const RecordingOptions& options) {
   if (format == RecordingFormat::kDsec) return open_dsec_flow(events_file, options);
-  if (format == RecordingFormat::kMvsec) return simulated_flow(recording);
+  if (format == RecordingFormat::kMvsec) {
+    if (auto found = open_mvsec_flow(events_file, recording.size(), options)) return found;
+    return simulated_flow(recording);
+  }
   return std::nullopt;
 }
 

@@ -1,6 +1,7 @@
 #include "stages/frames/events/recording_flow.h"
 
 #include <cstdint>
+#include <limits>
 #include <tuple>
 #include <vector>
 
@@ -8,6 +9,8 @@
 #include "stages/frames/events/recording_dataset.h"
 #include "tests/stages/frames/frames_fixture.h"
 #include "tests/stages/recordings/small_recording.h"
+#include "tests/testing/npy_bytes.h"
+#include "tests/testing/zip_file.h"
 
 namespace eventgan {
 namespace {
@@ -145,6 +148,74 @@ TEST_F(DsecFlow, OtherLabelsAreNotLostWithoutAWord) {
   spec_.annotations = "seq.csv";
   EXPECT_THROWS(open(), UsageError,
                 "annotations: expected none beside \"flow\", whose times are other ones, in seq");
+}
+
+/// drive_data.h5, 4 x 3 pixels, and flow from 1 s to 1.25 s and on to 1.75 s.
+class MvsecFlow : public RecordingFlowTest {
+ protected:
+  MvsecFlow() {
+    testing::write_hdf5(at("drive_data.h5"), testing::small_mvsec());
+    spec_.root = "drive_data.h5";
+    for (int i = 0; i < 36; ++i) {  // of the third map no end is known
+      x_.push_back(i);
+      y_.push_back(-0.5 * i);
+    }
+  }
+
+  void write_flow(const std::vector<double>& times_s, std::size_t width = 4) const {
+    testing::write_zip(at("drive_gt_flow_dist.npz"),
+                       {{"timestamps.npy", testing::npy_doubles({times_s.size()}, times_s)},
+                        {"x_flow_dist.npy", testing::npy_doubles({3, 3, width}, x_), true},
+                        {"y_flow_dist.npy", testing::npy_doubles({3, 3, width}, y_)}});
+  }
+
+  std::vector<double> x_, y_;
+};
+
+TEST_F(MvsecFlow, LastsFromEachTimeToTheNext) {
+  x_[13] = std::numeric_limits<double>::infinity();
+  y_[14] = std::numeric_limits<double>::quiet_NaN();
+  x_[15] = 0;  // y is not
+  write_flow({1, 1.25, 1.75});
+  const auto dataset = open();
+  EXPECT_THAT(ids_of(*dataset),
+              ElementsAre("drive_data/0000000001.000000", "drive_data/0000000001.250000"));
+  EXPECT_EQ(window(*dataset, 1), (std::array{1.25, 1.75}));
+  const PixelFlow flow = flow_of(*dataset, 1).flow;
+  EXPECT_EQ(flow.px,
+            (std::vector<float>{12, 0, 0, 0,    16, 17,   18, 19,   20,  21,    22,  23,
+                                -6, 0, 0, -7.5, -8, -8.5, -9, -9.5, -10, -10.5, -11, -11.5}));
+  EXPECT_EQ(flow.valid, (std::vector<std::uint8_t>{1, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1}));
+  EXPECT_EQ(flow_of(*dataset).flow.valid[0], 0) << "0, 0 is nothing";
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("drive_gt_flow_dist.npz"));
+}
+
+TEST_F(MvsecFlow, NamesWhatIsWrong) {
+  const auto refused = [&](const char* why) {
+    EXPECT_THROWS(open(), InputError, why, "drive_gt_flow_dist.npz");
+  };
+  write_flow({1, 1.25});
+  refused("expected timestamps [N], x_flow_dist and y_flow_dist [N, 3, 4], got [2], [3, 3, 4]");
+  write_flow({1, 1.25, 1.25});
+  refused(
+      "expected flow from ascending times, each to a later one, got 1.25 s to 1.25 s after 1 s");
+  x_.resize(27);
+  y_.resize(27);
+  write_flow({1, 1.25, 1.75}, 3);
+  refused("[3, 3, 3]");
+  write("drive_gt_flow_dist.npz", "no zip");
+  refused("expected a zip file, got");
+  testing::write_zip(at("drive_gt_flow_dist.npz"), {{"x_flow_dist.npy", "no array"}});
+  refused("x_flow_dist.npy");
+}
+
+TEST_F(MvsecFlow, OfOneTimeHasNoEnd) {
+  testing::write_zip(at("drive_gt_flow_dist.npz"),
+                     {{"timestamps.npy", testing::npy_doubles({1}, {1})},
+                      {"x_flow_dist.npy", testing::npy_doubles({1, 3, 4}, std::vector(12, 1.0))},
+                      {"y_flow_dist.npy", testing::npy_doubles({1, 3, 4}, std::vector(12, 1.0))}});
+  EXPECT_THROWS(open(), InputError, "expected labels or frames to make samples of, got none",
+                "drive_data.h5");
 }
 
 TEST_F(RecordingFlowTest, OfSimulateIsThatBetweenItsFrames) {
