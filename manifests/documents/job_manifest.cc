@@ -182,7 +182,7 @@ void list_selection(Fields& fields, SelectionSpec& spec) {
 }
 
 /// Flow is that of stills, or read: from an image to the one after it.
-void list_flow(Fields& fields, SourceSpec& spec, bool has_window) {
+void list_flow(Fields& fields, SourceSpec& spec, bool has_others) {
   const auto flow =
       fields
           .only_for(words_where(
@@ -200,11 +200,14 @@ void list_flow(Fields& fields, SourceSpec& spec, bool has_window) {
                           "dataset": {"const": "frames"}, "pairs": {
                               "required": ["gaps", "side"],
                               "properties": {"gaps": {"const": [1]}, "side": {"const": "after"}}}}},
-                      {"properties": {"dataset": {"const": "recording"}, "window_s": false,
-                                      "window_events": false, "label_at": false}}]}})");
+                      {"properties": {"dataset": {"const": "recording"}, "annotations": false,
+                                      "window_s": false, "window_events": false,
+                                      "label_at": false}}]}})");
   if (!flow || spec.pairs.stills) return;
   if (has_events(spec.dataset)) {
-    if (has_window) flow->fault("no such key beside window_s, window_events or label_at");
+    if (has_others) {
+      flow->fault("no such key beside annotations, window_s, window_events or label_at");
+    }
   } else if (spec.dataset != DatasetKind::kFrames || spec.pairs.side != PairSide::kAfter ||
              spec.pairs.gaps != std::vector{1}) {
     flow->fault(
@@ -228,10 +231,11 @@ void list_source(Fields& fields, SourceSpec& spec) {
             "the object development kit, whose mapping says which raw frame an image is. Alone it "
             "names the drives.");
   fields.needs("raw_root", "devkit");
-  some.find("annotations", spec.annotations, paths(),
-            "the annotation file or folder, if not in its usual place. mpii_list: the JSON list or "
-            "HDF5 table. recording: the file of labels, or the folder of NAME.csv and "
-            "NAME.json, if not beside the recording.");
+  const auto annotations = some.find(
+      "annotations", spec.annotations, paths(),
+      "the annotation file or folder, if not in its usual place. mpii_list: the JSON list or "
+      "HDF5 table. recording: the file of labels, or the folder of NAME.csv and "
+      "NAME.json, if not beside the recording.");
   some.find("sequences", spec.sequences, paths(),
             "the folder of video frames around the annotated images.");
   some.find("layout", spec.layout, words(kLayoutWords),
@@ -276,7 +280,7 @@ void list_source(Fields& fields, SourceSpec& spec) {
   of_frames.at("pairs", spec.pairs, objects(list_pairs),
                "which pairs of frames become samples. Of other datasets these are windows of "
                "events.");
-  list_flow(fields, spec, window_s || window_events || label_at);
+  list_flow(fields, spec, annotations || window_s || window_events || label_at);
 }
 
 // Below 16 pixels a side the network's four halvings leave less than one pixel of the image at

@@ -109,10 +109,9 @@ struct Person {
 };
 
 /// How what each pixel of a volume shows of the labelled image moves from the pair's previous image
-/// to its next one: by so many pixels of the volume, in steps of 1/128, of a camera's ground truth
-/// in float16's.
+/// to its next one: by so many pixels of the volume, of stills in steps of 1/128.
 struct PixelFlow {
-  std::vector<float> px;            ///< [2, y, x], x first; 0 where the volume shows no image
+  std::vector<float> px;            ///< [2, y, x], x first; 0 beyond the image or unknown
   std::vector<std::uint8_t> valid;  ///< [y, x] 1: seen in both images; else 0
 
   bool empty() const { return px.empty(); }  ///< there is no flow

@@ -323,8 +323,8 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   visit(
       ColumnSpec{
           "/labels/flow",
-          "x, y: motion, previous to next, of what the labelled image shows there; 0 beyond it; "
-          "NaN: none",
+          "x, y: motion, previous to next, of what the labelled image shows there; 0 beyond it "
+          "or unknown; NaN: none",
           kSamples,
           {2, height, width},
           kAny,

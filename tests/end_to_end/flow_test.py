@@ -1,5 +1,7 @@
 """Ground truth of optical flow beside images and recordings, from its files to the shards, by stock h5py."""
 
+import shutil
+
 import cv2
 import h5py
 import numpy as np
@@ -34,14 +36,14 @@ class Flow(program.InFolder):
         cv2.imwrite(str(path), np.dstack([known, 64 * flow[1] + 2**15, 64 * flow[0] + 2**15]).astype(np.uint16))
 
     def test_of_kitti_lies_beside_the_images(self):
-        wide, move = texture(SIZE[0], SIZE[1] + 16), 6  # what is seen moves to the right
+        wide, (x, y) = texture(SIZE[0] + 16, SIZE[1] + 16), (6, -2)  # what is seen moves to the right and up
         for scene in range(2):
-            for frame, left in ((10, 8), (11, 8 - move)):
+            for frame, left, top in ((10, 8, 8), (11, 8 - x, 8 - y)):
                 path = self.folder / f"training/image_2/{scene:06}_{frame}.png"
                 path.parent.mkdir(parents=True, exist_ok=True)
-                cv2.imwrite(str(path), wide[:, left:left + SIZE[1]])
-            flow, known = np.zeros((2, *SIZE)), np.ones(SIZE)
-            flow[0], known[:10] = move, 0  # nothing is known of the sky
+                cv2.imwrite(str(path), wide[top:top + SIZE[0], left:left + SIZE[1]])
+            flow, known = np.empty((2, *SIZE)), np.ones(SIZE)
+            flow[0], flow[1], known[:10] = x, y, 0  # nothing is known of the sky
             self.write_flow(f"flow_occ/{scene:06}_10.png", flow, known)
             self.write_flow(f"flow_noc/{scene:06}_10.png", flow, known * (np.arange(SIZE[1]) < 50))
         source = {"dataset": "frames", "root": "training/image_2", "flow": True,
@@ -51,9 +53,15 @@ class Flow(program.InFolder):
             self.assertEqual(shard["pairs/sample_id"].asstr()[:].tolist(), ["000000_10", "000001_10"])
             self.assertEqual(shard["pairs/label_position"][:].tolist(), [0, 0])
             flow, valid = shard["labels/flow"][:], shard["labels/flow_valid"][:].astype(bool)
-        self.assertTrue((flow[:, 0, 5:] == move / 2).all() and not flow[:, 0, :5].any() and not flow[:, 1].any())
+        self.assertTrue((flow[:, 0, 5:] == x / 2).all() and (flow[:, 1, 5:] == y / 2).all())
+        self.assertFalse(flow[:, :, :5].any())
         self.assertTrue(valid[:, 5:, :25].all() and not valid[:, :5].any() and not valid[:, :, 25:].any())
 
+        flow, known = np.ones((2, *SIZE)), np.ones(SIZE)
+        self.write_flow("flow_occ/000001_10.png", flow, known)
+        said = "".join(run("verify", "--deep", self.folder / "out", expect=1))
+        self.assertIn("000001_10", said)
+        self.assertNotIn("000000_10", said)
         (self.folder / "training/flow_occ/000001_10.png").write_bytes(b"half of a PNG")
         job = manifest([source], image=half, errors=LENIENT)
         job["output"]["directory"] = "damaged"
@@ -93,6 +101,7 @@ class Flow(program.InFolder):
             np.testing.assert_array_equal(valid, known[:2] & inside)
 
     def test_of_an_export_to_dsec_is_read_again(self):
+        """Without its photographs, whose times say how long a recording lasts, too."""
         (self.folder / "photos").mkdir()
         for i in range(3):
             cv2.imwrite(str(self.folder / f"photos/{'abc'[i]}.png"), texture(SIZE[0] + i, SIZE[1]))
@@ -103,6 +112,8 @@ class Flow(program.InFolder):
         with self.convert(job) as shard:
             written = shard["labels/flow"][:], shard["labels/flow_valid"][:]
         run("export", self.folder / "out", "--to", "dsec", "--out", self.folder / "dsec")
+        for images in self.folder.glob("dsec/dsec/train/*/images"):
+            shutil.rmtree(images)
         job = manifest([{"dataset": "recording", "root": "dsec/dsec/train", "flow": True}], image={},
                        generator={"kind": "events"})
         job["output"]["directory"] = "again"

@@ -305,9 +305,12 @@ def predict(network: nn.Module, volume: torch.Tensor) -> torch.Tensor:
     return network(volume[None].float().to(next(network.parameters()).device))[-1][0].cpu()
 
 
+def has_flow(sample: Sample) -> bool:
+    return "flow" in sample and bool(sample["flow_valid"].any())
+
+
 def with_flow(shards: Shards) -> list[int]:
-    samples = ((i, shards.sample(i, {"flow"})) for i in range(len(shards)))
-    return [i for i, sample in samples if "flow" in sample and sample["flow_valid"].any()]
+    return [i for i in range(len(shards)) if has_flow(shards.sample(i, {"flow"}))]
 
 
 def with_events(shards: Shards) -> Sequence[int]:
@@ -333,7 +336,7 @@ def frames_of(sample: Sample) -> list[torch.Tensor]:
         with h5py.File(path) as file:
             return file["davis/left/image_raw"][index] if "davis/left/image_raw" in file else None
 
-    if sample["pair"]["dataset"] != "recording":
+    if sample["pair"]["dataset"] != "recording" or has_flow(sample):  # whose windows may begin between frames
         return []
     images = [read(training.frame_path(sample, side), sample["pair"][f"{side}_video_frame"])
               for side in ("prev", "next")]
@@ -352,8 +355,7 @@ def errors_of_frames(flow: torch.Tensor, position: float, previous: torch.Tensor
 
 def has_truth(sample: Sample) -> bool:
     """Whether `scores_of` scores it."""
-    has_flow = "flow" in sample and sample["flow_valid"].any()
-    return bool(has_flow or sample["volume"].any() and frames_of(sample))
+    return bool(has_flow(sample) or sample["volume"].any() and frames_of(sample))
 
 
 def scores_of(network: nn.Module, position: float, shards: Shards) -> dict[str, Any]:
@@ -364,7 +366,7 @@ def scores_of(network: nn.Module, position: float, shards: Shards) -> dict[str, 
     for i in range(len(shards)):
         sample = shards.sample(i, {"volume", "pair", "flow"})
         found, events = predict(network, torch.from_numpy(sample["volume"])), sample["volume"].any(0)
-        if "flow" in sample and sample["flow_valid"].any():
+        if has_flow(sample):
             flows.append((found.numpy(), sample["flow"], sample["flow_valid"] != 0, events))
         frames = frames_of(sample)
         if frames and events.any():
@@ -401,10 +403,11 @@ def main() -> None:
                          f"{args.data}")
     position = positions.pop()
     tested = test_shards[[*with_flow(test_shards)]]
-    if any(tested.sample(i, {"pair"})["pair"]["label_position"] != position for i in range(len(tested))):
-        image, side = ("next", "before") if position == 1 else ("previous", "after")
-        raise SystemExit(f"expected flow at the pixels of the {image} image (side {side}), as in {args.data}, got "
-                         f"other flow, in {args.test}")
+    for part, folder in ((validation_shards, args.data), (tested, args.test)):
+        if any(part.sample(i, {"pair"})["pair"]["label_position"] != position for i in range(len(part))):
+            image, side = ("next", "before") if position == 1 else ("previous", "after")
+            raise SystemExit(f"expected flow at the pixels of the {image} image (side {side}), as it is learnt, got "
+                             f"other flow, in {folder}")
     training.require_own_ids(args, tested)
     network = FlowNetwork(len(items[0]["volume"]), position)
     training.load_fitting(network, args.pretrained)

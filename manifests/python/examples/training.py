@@ -437,8 +437,8 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
     if (out / "checkpoint.pt").exists():
         state = _checkpoint(out / "checkpoint.pt")
         for name, value in settings.items():
-            if state["settings"].get(name) != value:
-                sys.exit(f"expected --{name} {state['settings'].get(name)}, as when this run started, got {value}, in "
+            if state["settings"].get(name, value) != value:  # of an option that there was not, any goes on
+                sys.exit(f"expected --{name} {state['settings'][name]}, as when this run started, got {value}, in "
                          f"{out / 'checkpoint.pt'}")
         model.load_state_dict(state["model"])
         optimizer.load_state_dict(state["optimizer"])

@@ -176,9 +176,13 @@ IndexImage decode_index_image(const InputFile& file) {
 }
 
 WideFrame decode_wide_image(const InputFile& file) {
-  return read_png(file, "16 bits a channel", [](std::FILE* stream) {
-    if (auto wide = decode_wide_png(stream)) return *std::move(wide);
-    throw std::runtime_error("fewer bits");
+  return read_png(file, "16 bits of red, green and blue", [&](std::FILE* stream) {
+    constexpr std::uint64_t kKind = 25;  // in the header, after size and bits
+    constexpr char kColours = 2;         // neither grey nor transparent
+    const bool are_colours = file.size_bytes() > kKind && file.read(kKind, 1)[0] == kColours;
+    auto wide = decode_wide_png(stream);
+    if (wide && are_colours) return *std::move(wide);
+    throw std::runtime_error(wide ? "another kind of pixels" : "fewer bits");
   });
 }
 

@@ -80,7 +80,8 @@ ColourFrame decode_image_file(const std::filesystem::path& file,
 /// decode_image, and so of colours. Thread safe.
 IndexImage decode_index_image(const InputFile& file);
 
-/// Decodes a PNG of 16 bits a channel. Throws as decode_image, and so of fewer bits. Thread safe.
+/// Decodes a PNG of red, green and blue in 16 bits each. Throws as decode_image, and so of others.
+/// Thread safe.
 WideFrame decode_wide_image(const InputFile& file);
 
 /// Counts the values of an image of 16 bits: `histogram` has 65,536 counts. False, and nothing is

@@ -58,6 +58,7 @@ struct MadePair {
 
 /// The motion of each pixel of an image that somebody measured, to the image that follows it.
 struct SourceFlow {
+  std::string place;  ///< where it comes from, for messages
   ImageSize size;
   /// As of a volume of this size, in any numbers; known pixels that the other image does not show
   /// have their motion, unknown ones 0, and both are not valid. Empty: there is none.

@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <stdexcept>
+#include <vector>
 
 #include "manifests/values/still_motion.h"
 #include "stages/base/images/image_file.h"
@@ -13,10 +14,12 @@
 
 namespace eventgan {
 
-SourceFlow read_flow_image(const std::filesystem::path& file, double steps_per_px) {
+SourceFlow read_flow_image(const std::filesystem::path& file, const std::string& place,
+                           double steps_per_px) try {
   const WideFrame image = decode_wide_image(open_image_file(file));
   const std::size_t pixels = image.size.pixel_count();
-  SourceFlow flow{image.size, {std::vector<float>(2 * pixels), std::vector<std::uint8_t>(pixels)}};
+  SourceFlow flow{
+      place, image.size, {std::vector<float>(2 * pixels), std::vector<std::uint8_t>(pixels)}};
   for (std::size_t i = 0; i < pixels; ++i) {
     const std::uint16_t* const bgr = &image.bgr[3 * i];
     if (bgr[0] == 0) continue;
@@ -25,17 +28,11 @@ SourceFlow read_flow_image(const std::filesystem::path& file, double steps_per_p
     flow.flow.px[pixels + i] = static_cast<float>((bgr[1] - 32768) / steps_per_px);
   }
   return flow;
+} catch (const std::runtime_error& error) {
+  throw std::runtime_error(fmt::format("{}, in {}", error.what(), place));
 }
 
 namespace {
-
-/// Rounded to float16's eleven bits, steps of 2^-24 and 65504 at most.
-float as_half(double value) {
-  constexpr double kMost = 65504;
-  const int exponent = value == 0 ? -14 : std::max(std::ilogb(value), -14);
-  const double step = std::ldexp(1.0, exponent - 10);
-  return static_cast<float>(std::clamp(std::nearbyint(value / step) * step, -kMost, kMost) + 0.0);
-}
 
 PixelFlow placed(const SourceFlow& flow, const Placement& placement) {
   const VisiblePart part = visible_part(placement);
@@ -52,8 +49,12 @@ PixelFlow placed(const SourceFlow& flow, const Placement& placement) {
       const Point at = mapped(to_source, {double(x), double(y)});
       const std::size_t from =
           nearest(at.y, flow.size.height) * flow.size.width + nearest(at.x, flow.size.width);
-      const float dx = as_half(placement.scale_x() * flow.flow.px[from]);
-      const float dy = as_half(placement.scale_y() * flow.flow.px[source_pixels + from]);
+      const auto scaled = [](double scale, float px) {
+        constexpr double kLargestHalf = 65504;
+        return static_cast<float>(std::clamp(scale * px, -kLargestHalf, kLargestHalf));
+      };
+      const float dx = scaled(placement.scale_x(), flow.flow.px[from]);
+      const float dy = scaled(placement.scale_y(), flow.flow.px[source_pixels + from]);
       const std::size_t pixel = static_cast<std::size_t>(y) * placement.volume.width + x;
       placed.px[pixel] = dx;
       placed.px[pixels + pixel] = dy;
@@ -73,8 +74,7 @@ Outcome<PixelFlow> true_flow(const Dataset& dataset, const std::string& label_ke
   if (flow->flow.empty()) return PixelFlow();
   if (flow->size == placement.source) return placed(*flow, placement);
   return SampleFault{fmt::format("expected flow of {}, as the image is, got {}, in {}",
-                                 to_string(placement.source), to_string(flow->size),
-                                 dataset.label_place(label_key))};
+                                 to_string(placement.source), to_string(flow->size), flow->place)};
 }
 
 }  // namespace eventgan

@@ -348,7 +348,7 @@ class RecordingDataset final : public Dataset {
     }
     recorded.event_span = recording.event_span();
     if (reads_flow_) {
-      recorded.flow = open_recording_flow(recording, recorded.format, own, options_);
+      recorded.flow = open_recording_flow(recorded.format, own, recording.size(), options_);
       if (!recorded.flow) return;
       for (const fs::path& file : recorded.flow->files) {
         annotation_files_.push_back(written_beside(file, own, recorded.path));
@@ -547,6 +547,7 @@ class RecordingDataset final : public Dataset {
       empty_volumes_ += all.size();
       return;
     }
+    if (recorded.flow) note_long_windows(recorded, all);
     if (outside.empty()) return;
     const bool is_all = outside.size() == all.size();
     const auto [first_s, last_s] = *recorded.event_span;
@@ -557,6 +558,23 @@ class RecordingDataset final : public Dataset {
         std::ranges::max(outside), is_all ? " (are events, frames and labels on one clock?)" : "",
         recorded.path));
     if (is_all) warnings_.push_back(notes_.back());
+  }
+
+  /// A window of flow that lasts longer than the recording has fewer events than its flow says.
+  void note_long_windows(const Recorded& recorded, const std::vector<double>& times_s) {
+    constexpr double kMostBeyond = 0.01;  // of its length
+    const auto [first_s, last_s] = recorded.span;
+    const auto is_long = [&](double time_s) {
+      const Span window = *span_of(recorded, time_s);
+      const double within_s = std::min(window[1], last_s) - std::max(window[0], first_s);
+      return within_s < (1 - kMostBeyond) * (window[1] - window[0]);
+    };
+    const auto count = std::ranges::count_if(times_s, is_long);
+    if (count == 0) return;
+    notes_.push_back(
+        fmt::format("{} of {} windows of flow reach beyond the recording, {} s to {} s, "
+                    "in {}",
+                    count, times_s.size(), first_s, last_s, recorded.path));
   }
 
   /// Times within two microseconds of each other are one sample, which is at fault: none of them
@@ -579,7 +597,8 @@ class RecordingDataset final : public Dataset {
     // Without frames nothing tells how long it lasts behind its last event: a window may end there.
     const bool is_late = time_s > recorded.span[1] &&
                          (!recorded.frame_times_s.empty() || !meets_events(recorded, time_s));
-    if (time_s < recorded.span[0] || is_late) {
+    const bool is_outside = time_s < recorded.span[0] || is_late;
+    if (recorded.flow ? recorded.event_span && !meets_events(recorded, time_s) : is_outside) {
       frame.fault = fmt::format(
           "expected a time between {} s and {} s, which the recording lasts, got {} s, in {} ({})",
           recorded.span[0], recorded.span[1], time_s, label_place(frame.label_key),

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -24,30 +26,33 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// From and to must lie behind each other, as maps follow one another.
-void check_times(const std::vector<std::array<double, 2>>& times_s, const std::string& place) {
-  double before_s = -HUGE_VAL;
-  for (const auto& [from_s, to_s] : times_s) {
-    if (std::isfinite(from_s) && std::isfinite(to_s) && before_s < from_s && from_s < to_s) {
-      before_s = from_s;
-      continue;
+using Span = std::array<double, 2>;
+
+void check_times(const std::vector<Span>& times_s, const std::string& place) {
+  const Span* before = nullptr;
+  for (const Span& span : times_s) {
+    const auto [from_s, to_s] = span;
+    if (!(std::isfinite(from_s) && std::isfinite(to_s) && from_s < to_s)) {
+      throw InputError(fmt::format("expected flow to a later time, got {} s to {} s, in {}", from_s,
+                                   to_s, place));
     }
-    throw InputError(
-        fmt::format("expected flow from ascending times, each to a later one, got {} s "
-                    "to {} s after {} s, in {}",
-                    from_s, to_s, before_s, place));
+    if (before && from_s <= (*before)[0]) {
+      throw InputError(fmt::format("expected flow at ascending times, got {} s after {} s, in {}",
+                                   from_s, (*before)[0], place));
+    }
+    before = &span;
   }
 }
 
-void require_left(const RecordingOptions& options, const char* dataset, const fs::path& place) {
-  if (options.camera == "left") return;
+void require_left(const std::string& camera, const char* dataset, const fs::path& place) {
+  if (camera == "left") return;
   throw InputError(
       fmt::format("expected the left camera, which {}'s flow is of, got \"camera\": \"{}\", in {}",
-                  dataset, options.camera, place.string()));
+                  dataset, camera, place.string()));
 }
 
 /// Lines of two times in µs, and comments.
-std::vector<std::array<double, 2>> read_times(const fs::path& file) {
+std::vector<Span> read_times(const fs::path& file) {
   std::string reason;
   const auto text = try_read_file(file, reason);
   if (!text) {
@@ -55,7 +60,7 @@ std::vector<std::array<double, 2>> read_times(const fs::path& file) {
         fmt::format("expected the times of DSEC's flow, got no readable file ({}), in {}", reason,
                     file.string()));
   }
-  std::vector<std::array<double, 2>> times_s;
+  std::vector<Span> times_s;
   std::istringstream stream(*text);
   int number = 0;
   for (std::string line; std::getline(stream, line);) {
@@ -85,22 +90,26 @@ std::vector<std::array<double, 2>> read_times(const fs::path& file) {
 
 std::optional<RecordingFlow> open_dsec_flow(const fs::path& events_file,
                                             const RecordingOptions& options) {
-  const fs::path side = events_file.parent_path();
+  const fs::path side = events_file.parent_path();  // SEQUENCE/events/left
+  if (side.parent_path().filename() != "events") return std::nullopt;
   const fs::path flow = side.parent_path().parent_path() / "flow";
-  if (!has_folder(flow)) return std::nullopt;
-  require_left(options, "DSEC", flow);
+  const fs::path folder = flow / "forward", times = flow / "forward_timestamps.txt";
+  if (!has_folder(folder) && !has_file(times)) return std::nullopt;
+  require_left(side.filename() == "left" ? options.camera : side.filename().string(), "DSEC", flow);
   if (!options.rectify && has_file(side / "rectify_map.h5")) {
     throw InputError(
         "expected \"rectify\": true, since DSEC's flow is of the rectified view, got "
         "false, in " +
         flow.string());
   }
-  const fs::path folder = flow / "forward", times = flow / "forward_timestamps.txt";
   RecordingFlow found{read_times(times), nullptr, {times}};
   std::vector<fs::path> images;
   for (const std::string& name : list_folder(folder).files) {
     if (fs::path(name).extension() == ".png") images.push_back(folder / name);
   }
+  std::ranges::sort(images, {}, [](const fs::path& image) {  // by number, with zeros or without
+    return std::pair(image.filename().string().size(), image);
+  });
   if (images.size() != found.times_s.size() || images.empty()) {
     throw InputError(fmt::format("expected an image for each of {} times, got {}, in {}",
                                  found.times_s.size(), images.size(), folder.string()));
@@ -108,41 +117,10 @@ std::optional<RecordingFlow> open_dsec_flow(const fs::path& events_file,
   found.files.insert(found.files.end(), images.begin(), images.end());
   found.read = [images = std::move(images)](std::size_t i) {
     try {
-      return read_flow_image(images.at(i), kDsecFlowSteps);
+      return read_flow_image(images.at(i), images.at(i).string(), kDsecFlowSteps);
     } catch (const std::runtime_error& error) {
-      throw InputError(fmt::format("{}, in {}", error.what(), images.at(i).string()));
+      throw InputError(error.what());
     }
-  };
-  return found;
-}
-
-/// Where the field is finite, and not 0 if that stands for nothing, it is known.
-SourceFlow flow_of(ImageSize size, std::vector<float> x_px, const std::vector<float>& y_px,
-                   bool is_zero_known) {
-  SourceFlow flow{size, {std::move(x_px), std::vector<std::uint8_t>(size.pixel_count())}};
-  std::vector<float>& px = flow.flow.px;
-  px.insert(px.end(), y_px.begin(), y_px.end());
-  const std::size_t pixels = size.pixel_count();
-  for (std::size_t i = 0; i < pixels; ++i) {
-    float &x = px[i], &y = px[pixels + i];
-    const bool is_known =
-        std::isfinite(x) && std::isfinite(y) && (is_zero_known || x != 0 || y != 0);
-    flow.flow.valid[i] = is_known;
-    if (!is_known) x = y = 0;
-  }
-  return flow;
-}
-
-/// Of `simulate`, each pixel of which is known.
-std::optional<RecordingFlow> simulated_flow(const Recording& recording) {
-  if (recording.frame_count() < 2 || !recording.flow(0)) return std::nullopt;
-  RecordingFlow found;
-  for (std::int64_t i = 0; i + 1 < recording.frame_count(); ++i) {
-    found.times_s.push_back({recording.frame_time_s(i), recording.frame_time_s(i + 1)});
-  }
-  found.read = [&recording](std::size_t i) {
-    FlowField field = *recording.flow(static_cast<std::int64_t>(i));
-    return flow_of(field.size, std::move(field.x_px), field.y_px, /*is_zero_known=*/true);
   };
   return found;
 }
@@ -153,7 +131,7 @@ class MvsecFlow {
   MvsecFlow(fs::path file, ImageSize size)
       : file_(std::move(file)), size_(size), x_(file_, "x_flow_dist"), y_(file_, "y_flow_dist") {}
 
-  std::vector<std::array<double, 2>> times_s() const {
+  std::vector<Span> times_s() const {
     const TypedArray times = parse_npy(ZipArchive(file_).read("timestamps.npy"), file_.string());
     const std::vector<std::size_t> shape{times.size(), static_cast<std::size_t>(size_.height),
                                          static_cast<std::size_t>(size_.width)};
@@ -165,7 +143,7 @@ class MvsecFlow {
           size_.height, size_.width, times.shape_text(), fmt::join(x_.shape(), ", "),
           fmt::join(y_.shape(), ", "), file_.string()));
     }
-    std::vector<std::array<double, 2>> times_s;
+    std::vector<Span> times_s;
     for (std::size_t i = 1; i < times.size(); ++i) {
       times_s.push_back({times.number(i - 1), times.number(i)});
     }
@@ -173,9 +151,20 @@ class MvsecFlow {
     return times_s;
   }
 
-  /// Pixels of no depth are 0, not a number or infinite.
+  /// Of pixels whose depth is not known, x and y are 0, infinite, or no number.
   SourceFlow read(std::size_t index) const try {
-    return flow_of(size_, values(x_, index), values(y_, index), /*is_zero_known=*/false);
+    std::vector<float> px = values(x_, index);
+    const std::vector<float> y_px = values(y_, index);
+    const std::size_t pixels = px.size();
+    px.insert(px.end(), y_px.begin(), y_px.end());
+    SourceFlow flow{file_.string(), size_, {std::move(px), std::vector<std::uint8_t>(pixels)}};
+    for (std::size_t i = 0; i < pixels; ++i) {
+      float &x = flow.flow.px[i], &y = flow.flow.px[pixels + i];
+      const bool is_known = std::isfinite(x) && std::isfinite(y) && (x != 0 || y != 0);
+      flow.flow.valid[i] = is_known;
+      if (!is_known) x = y = 0;
+    }
+    return flow;
   } catch (const std::runtime_error& error) {
     throw InputError(error.what());
   }
@@ -203,7 +192,7 @@ std::optional<RecordingFlow> open_mvsec_flow(const fs::path& events_file, ImageS
   if (name.ends_with(kData)) name.resize(name.size() - kData.size());
   const fs::path file = events_file.parent_path() / (name + "_gt_flow_dist.npz");
   if (!has_file(file)) return std::nullopt;
-  require_left(options, "MVSEC", file);
+  require_left(options.camera, "MVSEC", file);
   try {
     const auto flow = std::make_shared<const MvsecFlow>(file, size);
     return RecordingFlow{
@@ -215,14 +204,11 @@ std::optional<RecordingFlow> open_mvsec_flow(const fs::path& events_file, ImageS
 
 }  // namespace
 
-std::optional<RecordingFlow> open_recording_flow(const Recording& recording, RecordingFormat format,
-                                                 const fs::path& events_file,
+std::optional<RecordingFlow> open_recording_flow(RecordingFormat format,
+                                                 const fs::path& events_file, ImageSize size,
                                                  const RecordingOptions& options) {
   if (format == RecordingFormat::kDsec) return open_dsec_flow(events_file, options);
-  if (format == RecordingFormat::kMvsec) {
-    if (auto found = open_mvsec_flow(events_file, recording.size(), options)) return found;
-    return simulated_flow(recording);
-  }
+  if (format == RecordingFormat::kMvsec) return open_mvsec_flow(events_file, size, options);
   return std::nullopt;
 }
 

@@ -10,7 +10,6 @@
 #include "manifests/values/job.h"
 #include "manifests/values/recording_formats.h"
 #include "stages/frames/dataset/dataset.h"
-#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 
@@ -25,14 +24,15 @@ struct RecordingFlow {
 
 /// What is known of a recording:
 ///   DSEC    SEQUENCE/flow/forward/*.png and forward_timestamps.txt (from and to in µs, as many as
-///           images, in the order of their names); of the left camera, rectified;
+///           images, in the order of their numbers), beside SEQUENCE/events/left; rectified;
 ///   MVSEC   NAME_gt_flow_dist.npz beside NAME_data.hdf5 (timestamps [N], x_flow_dist and
 ///           y_flow_dist [N, y, x]: from each time to the next one; known where it is finite and
-///           not 0), of the left camera; else what `simulate` stores with the frames.
-/// None of others. `events_file`: as event_file has it, on disk. Throws InputError "expected X, got
-/// Y, in PATH" if it is damaged, or another view's.
-std::optional<RecordingFlow> open_recording_flow(const Recording& recording, RecordingFormat format,
+///           not 0), of the left camera.
+/// Neither tells what is hidden later. None of others. `events_file`: as event_file has it, on
+/// disk; `size`: the recording's. Throws InputError "expected X, got Y, in PATH" if it is damaged,
+/// or another view's.
+std::optional<RecordingFlow> open_recording_flow(RecordingFormat format,
                                                  const std::filesystem::path& events_file,
-                                                 const RecordingOptions& options);
+                                                 ImageSize size, const RecordingOptions& options);
 
 }  // namespace eventgan

@@ -217,24 +217,20 @@ class FolderSearch {
     note_names_of_windows();
   }
 
-  /// Windows of flow have their own times, and no other labels.
+  /// Windows of flow have their own times, and no other labels, not even damaged ones.
   void pass_labels_over(const SourceSpec& spec, const fs::path& base) {
-    if (spec.annotations) {
-      throw UsageError(
-          "annotations: expected none beside \"flow\", whose times are other ones, in " +
-          spec.root);
-    }
     RecordingFolder all = found_;
-    find_labels(spec, base);
-    std::vector<std::string> labelled;
-    for (const auto& [name, recorded] : found_.recordings) {
-      if (!recorded.label_file.empty()) labelled.push_back(name);
+    bool has_labels = false;
+    try {
+      find_labels(spec, base);
+      has_labels = std::ranges::any_of(
+          found_.recordings, [](const auto& entry) { return !entry.second.label_file.empty(); });
+    } catch (const InputError&) {
+      has_labels = true;
     }
     found_ = std::move(all);
-    if (labelled.empty()) return;
-    found_.notes.push_back(
-        counted(labelled, "recording",
-                " whose labels are not read, since flow has other times, in " + spec.root));
+    if (!has_labels) return;
+    found_.notes.push_back("labels are not read, since flow has times of its own, in " + spec.root);
   }
 
   /// DSEC-Det's boxes, in a folder of its sequences or with the events; empty if there are none, or

@@ -11,6 +11,12 @@
 
 namespace eventgan {
 
+/// KITTI's ground truth: of all pixels, of those that both images show; beside the folders of its
+/// left camera, of whose images it is.
+inline constexpr std::array<std::string_view, 2> kKittiFlow{"flow_occ", "flow_noc"};
+inline constexpr std::array<std::string_view, 3> kKittiLeftCamera{"image_2", "image_0",
+                                                                  "colored_0"};
+
 /// The extension with its dot, in small letters: ".json" for "a.JSON"; empty if there is none.
 std::string lower_extension(const std::filesystem::path& file);
 

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/decoding/source_flow.h"
 #include "stages/frames/listing/image_folder.h"
 #include "stages/frames/listing/source_folders.h"
 #include "stages/frames/own_labels/find_labels.h"
@@ -68,8 +67,8 @@ std::vector<FoundSource> find_labels_and_flow(FoundSource found) {
     });
     if (!is_left || !has_flow) continue;
     source.remarks.push_back(
-        "KITTI's flow lies beside the images: \"flow\": true, with \"gaps\": [1] "
-        "and \"side\": \"after\", reads it");
+        "KITTI's flow lies beside the images: \"flow\": true and \"pairs\": { \"gaps\": [1], "
+        "\"side\": \"after\" } read it");
   }
   return sources;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <iterator>
 #include <set>
 #include <stdexcept>
@@ -14,9 +15,9 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
-#include "manifests/values/text.h"
 #include "stages/frames/dataset/wrapped_dataset.h"
 #include "stages/frames/decoding/source_flow.h"
+#include "stages/frames/listing/image_folder.h"
 #include "stages/frames/listing/source_folders.h"
 
 namespace eventgan {
@@ -40,29 +41,34 @@ class FlowDataset final : public WrappedDataset {
 
   const std::vector<LabelledFrame>& labelled_frames() const override { return labelled_; }
 
-  Outcome<SourceFlow> flow(const std::string& label_key) const override {
+  Outcome<SourceFlow> flow(const std::string& label_key) const override try {
     const auto found = flow_of_.find(label_key);
     if (found == flow_of_.end()) return SourceFlow();
+    const auto& [files, fault] = found->second;
+    if (!fault.empty()) return SampleFault{fault};
     std::vector<SourceFlow> read;
-    for (const std::string& file : found->second) {
-      try {
-        read.push_back(read_flow_image(beside_.on_disk(file), kKittiFlowSteps));
-      } catch (const std::runtime_error& error) {
-        return SampleFault{fmt::format("{}, in {}", error.what(), beside_.written(file))};
-      }
-      if (read.back().size == read.front().size) continue;
-      return SampleFault{fmt::format("expected flow of {} as in {}, got {}, in {}",
-                                     to_string(read.front().size), found->second.front(),
-                                     to_string(read.back().size), beside_.written(file))};
+    for (const std::string& file : files) {
+      read.push_back(
+          read_flow_image(beside_.on_disk(file), beside_.written(file), kKittiFlowSteps));
     }
-    if (read.size() == 2) read[0].flow.valid = std::move(read[1].flow.valid);
-    return std::move(read[0]);
+    SourceFlow& of_all = read.front();
+    const SourceFlow& of_seen = read.back();
+    if (of_seen.size != of_all.size) {
+      return SampleFault{fmt::format("expected flow of {} as in {}, got {}, in {}",
+                                     to_string(of_all.size), of_all.place, to_string(of_seen.size),
+                                     of_seen.place)};
+    }
+    std::ranges::transform(of_all.flow.valid, of_seen.flow.valid, of_all.flow.valid.begin(),
+                           std::bit_and());
+    return std::move(of_all);
+  } catch (const std::runtime_error& error) {
+    return SampleFault{error.what()};
   }
 
   std::vector<std::string> annotation_files() const override {
     std::vector<std::string> files = dataset_->annotation_files();
     for (const auto& [label_key, maps] : flow_of_) {
-      for (const std::string& file : maps) files.push_back(beside_.written(file));
+      for (const std::string& file : maps.files) files.push_back(beside_.written(file));
     }
     std::ranges::sort(files);
     return files;
@@ -75,45 +81,82 @@ class FlowDataset final : public WrappedDataset {
   }
 
  private:
-  void find_flow(const SourceRoot& root, bool keeps_others) {
-    std::array<std::set<std::string>, 2> maps;  // of all known pixels; of those that both show
-    for (std::size_t i = 0; i < maps.size(); ++i) {
-      for (const std::string& name : beside_.files_in(kKittiFlow[i])) maps[i].insert(name);
+  struct Maps {
+    std::vector<std::string> files;  ///< below the folder that ROOT is in
+    std::string fault;               ///< why they are not an image's; empty: they are
+  };
+
+  /// Those of an image, and why they are not to be trusted.
+  Maps maps_of(const LabelledFrame& labelled, const std::string& name) const {
+    Maps maps;
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      const std::string file = fmt::format("{}/{}", kKittiFlow[i], name);
+      if (names_[i].contains(name)) {
+        maps.files.push_back(file);
+      } else if (!names_[i].empty()) {
+        maps.fault = fmt::format("expected {}, as there is another one, got none, in {}", file,
+                                 beside_.written(""));
+      }
     }
-    std::vector<std::string> without;
+    if (maps.files.empty()) return {};
+    const PairedFrame next = dataset_->paired_frame(labelled, 1);
+    if (next.state == PairedFrame::State::kPresent &&
+        next.frame.index != labelled.frame.index + 1) {
+      maps.fault = fmt::format("expected the image after {}, whose flow there is, got {}, in {}",
+                               labelled.frame.path, next.frame.path, beside_.written(""));
+    }
+    return maps;
+  }
+
+  void find_flow(const SourceRoot& root, bool keeps_others) {
+    std::set<std::string> unused;
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      for (const std::string& name : beside_.files_in(kKittiFlow[i])) {
+        names_[i].insert(name);
+        unused.insert(fmt::format("{}/{}", kKittiFlow[i], name));
+      }
+    }
+    std::vector<std::string> without;  // though there is a next image
     for (const LabelledFrame& labelled : dataset_->labelled_frames()) {
       const fs::path image(labelled.frame.path);
       const bool is_in_root = labelled.frame.path == root.written(image.filename().string());
-      const std::string name = image.stem().string() + ".png";
-      std::vector<std::string> files;
-      for (std::size_t i = 0; is_in_root && i < maps.size(); ++i) {
-        if (maps[i].contains(name)) files.push_back(std::string(kKittiFlow[i]) + "/" + name);
+      Maps maps = is_in_root ? maps_of(labelled, image.stem().string() + ".png") : Maps();
+      const bool has_flow = !maps.files.empty();
+      if (has_flow || keeps_others) labelled_.push_back(labelled);
+      if (!has_flow && dataset_->paired_frame(labelled, 1).state == PairedFrame::State::kPresent) {
+        without.push_back(labelled.sample_id);
       }
-      if (files.empty()) without.push_back(labelled.sample_id);
-      if (!files.empty() || keeps_others) labelled_.push_back(labelled);
-      if (!files.empty()) flow_of_.emplace(labelled.label_key, std::move(files));
+      for (const std::string& file : maps.files) unused.erase(file);
+      if (has_flow) flow_of_.emplace(labelled.label_key, std::move(maps));
     }
-    const auto count = std::ssize(dataset_->labelled_frames());
     if (flow_of_.empty()) {
       throw InputError(
           fmt::format("expected flow_occ/NAME.png or flow_noc/NAME.png of the images, "
                       "got of none of the {}, in {}",
-                      count, beside_.written("")));
+                      std::ssize(dataset_->labelled_frames()), beside_.written("")));
     }
-    if (maps[0].empty() || maps[1].empty()) {
+    if (names_[0].empty() || names_[1].empty()) {
       notes_.push_back(fmt::format("no {} in {}: flow_valid is 1 where {} tells flow",
-                                   kKittiFlow[maps[0].empty() ? 0 : 1], beside_.written(""),
-                                   kKittiFlow[maps[0].empty() ? 1 : 0]));
+                                   kKittiFlow[names_[0].empty() ? 0 : 1], beside_.written(""),
+                                   kKittiFlow[names_[0].empty() ? 1 : 0]));
     }
-    if (without.empty()) return;
-    notes_.push_back(fmt::format(
-        "no flow of {} of {}, {}, first of {}", without.size(), count_text(count, "labelled frame"),
-        keeps_others ? "which have labels alone" : "which are left out", without.front()));
+    if (!without.empty()) {
+      notes_.push_back(counted(without, "image",
+                               std::string(" without flow, though another one follows, ") +
+                                   (keeps_others ? "taken for the labels" : "left out") + " in " +
+                                   root.written("")));
+    }
+    if (!unused.empty()) {
+      notes_.push_back(
+          counted({unused.begin(), unused.end()}, "file",
+                  " of flow without a labelled image left out in " + beside_.written("")));
+    }
   }
 
-  SourceRoot beside_;  ///< the folder that ROOT is in
+  SourceRoot beside_;                           ///< the folder that ROOT is in
+  std::array<std::set<std::string>, 2> names_;  ///< of the files in each folder of kKittiFlow
   std::vector<LabelledFrame> labelled_;
-  std::unordered_map<std::string, std::vector<std::string>> flow_of_;  ///< below it, by label_key
+  std::unordered_map<std::string, Maps> flow_of_;  ///< by label_key
   std::vector<std::string> notes_;
 };
 

@@ -151,8 +151,8 @@ std::vector<ManifestCase> source_cases() {
         {"/sources/2", R"({"dataset": "dhp19", "root": "r", "flow": true})"},
         events,
         own_size},
-       {"$.sources[1].flow: expected no such key beside window_s, window_events or label_at, got "
-        "true",
+       {"$.sources[1].flow: expected no such key beside annotations, window_s, window_events "
+        "or label_at, got true",
         R"($.sources[2].flow: expected no such key for dataset "dhp19" (only for kitti_object, kitti_tracking, kitti_raw, mpii, human36m, mpii_list, recording, frames), got true)"}},
       {"a recording for a network",
        {{"/sources/0", R"({"dataset": "recording", "root": "r"})"}, own_size},

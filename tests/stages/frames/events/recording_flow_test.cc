@@ -100,6 +100,11 @@ TEST_F(DsecFlow, IsOfTheRectifiedLeftView) {
   fs::rename(at("seq/events/left"), at("seq/events/right"));
   refused("expected the left camera, which DSEC's flow is of, got \"camera\": \"right\"",
           "seq/flow");
+  spec_.recording.camera = "left";
+  spec_.root = "seq/events/right/events.h5";
+  refused("expected the left camera, which DSEC's flow is of, got \"camera\": \"right\"",
+          "seq/flow");
+  spec_.root = "seq";
   fs::rename(at("seq/events/right"), at("seq/events/left"));
   spec_.recording.camera = "left";
   std::vector<float> places;  // a column to the right
@@ -127,8 +132,9 @@ TEST_F(DsecFlow, NamesWhatIsWrong) {
       {"10000000, 10001000, 1\n", "(line 1)"},
       {"#\n1e7, 10001000\n", "(line 2)"},
       {"9007199254740993, 9007199254740994\n", "(line 1)"},
-      {"10001000, 10000000\n", "expected flow from ascending times, each to a later one, got"},
-      {"10000000, 10001000\n10000000, 10002000\n", "got 10 s to 10.002 s after 10 s"},
+      {"10001000, 10000000\n", "expected flow to a later time, got 10.001 s to 10 s"},
+      {"10000000, 10001000\n10000000, 10002000\n",
+       "expected flow at ascending times, got 10 s after 10 s"},
       {"", "expected an image for each of 0 times, got 3"}};
   for (const auto& [times, fault] : faults) {
     write("seq/flow/forward_timestamps.txt", times);
@@ -138,16 +144,50 @@ TEST_F(DsecFlow, NamesWhatIsWrong) {
   refused("expected the times of DSEC's flow, got no readable file", "forward_timestamps.txt");
 }
 
-TEST_F(DsecFlow, OtherLabelsAreNotLostWithoutAWord) {
-  write("seq.csv", "time_s,left,top,right,bottom,class\n10.001,0,0,1,1,car\n");
+TEST_F(DsecFlow, FollowsTheNumbersOfItsNames) {
+  for (const char* name : {"000002.png", "000004.png"}) fs::remove(at("seq/flow/forward/"s + name));
+  map("9.png", 9, 1);
+  map("10.png", 10, 1);
+  EXPECT_EQ(flow_of(*open()).flow.px[0], 9);
+  EXPECT_EQ(flow_of(*open(), 1).flow.px[0], 10);
+}
+
+TEST_F(DsecFlow, LiesBesideTheFolderOfEvents) {
+  fs::create_directories(at("other/a"));
+  fs::rename(at("seq/flow"), at("flow"));
+  fs::rename(at("seq/events/left/events.h5"), at("other/a/events.h5"));
+  spec_.root = "other/a/events.h5";
+  EXPECT_THROWS(open(), InputError, "expected flow beside a recording of DSEC or MVSEC, got none",
+                "other/a/events.h5");
+}
+
+TEST_F(DsecFlow, BackwardAloneIsNone) {
+  fs::rename(at("seq/flow/forward"), at("seq/flow/backward"));
+  fs::remove(at("seq/flow/forward_timestamps.txt"));
+  EXPECT_THROWS(open(), InputError, "expected flow beside a recording of DSEC or MVSEC, got none",
+                "seq");
+}
+
+TEST_F(DsecFlow, OfATimeWithoutEventsIsAFaultAndOfALongOneNoted) {
+  // Begins before the first event; ends behind the last one; is behind all of them.
+  write("seq/flow/forward_timestamps.txt",
+        "9999000, 10001000\n10002000, 10004000\n10003001, 10009000\n");
+  map("000006.png", 3, 1);
   const auto dataset = open();
-  EXPECT_THAT(dataset->label_schema().class_names, IsEmpty());
-  EXPECT_THAT(dataset->notes(),
-              Contains("1 recording whose labels are not read, since flow has other times, in "
-                       "seq: seq"));
-  spec_.annotations = "seq.csv";
-  EXPECT_THROWS(open(), UsageError,
-                "annotations: expected none beside \"flow\", whose times are other ones, in seq");
+  EXPECT_THAT(faults_of(*dataset),
+              ElementsAre("", "", HasSubstr("expected a time between 10 s and 10.003 s, which")));
+  EXPECT_THAT(dataset->notes(), Contains("2 of 2 windows of flow reach beyond the recording, 10 s "
+                                         "to 10.003 s, in seq/events/left/events.h5"));
+}
+
+TEST_F(DsecFlow, OtherLabelsAreNotLostWithoutAWord) {
+  const std::string note = "labels are not read, since flow has times of its own, in seq";
+  EXPECT_THAT(open()->notes(), Not(Contains(note)));
+  write("seq.csv", "time_s,left,top,right,bottom,class\n10.001,0,0,1,1,car\n");
+  EXPECT_THAT(open()->label_schema().class_names, IsEmpty());
+  EXPECT_THAT(open()->notes(), Contains(note));
+  write("seq.json", "{}");  // two, of which none counts
+  EXPECT_THAT(open()->notes(), Contains(note));
 }
 
 /// drive_data.h5, 4 x 3 pixels, and flow from 1 s to 1.25 s and on to 1.75 s.
@@ -197,8 +237,9 @@ TEST_F(MvsecFlow, NamesWhatIsWrong) {
   write_flow({1, 1.25});
   refused("expected timestamps [N], x_flow_dist and y_flow_dist [N, 3, 4], got [2], [3, 3, 4]");
   write_flow({1, 1.25, 1.25});
-  refused(
-      "expected flow from ascending times, each to a later one, got 1.25 s to 1.25 s after 1 s");
+  refused("expected flow to a later time, got 1.25 s to 1.25 s");
+  write_flow({1.25, 1, 1.75});
+  refused("expected flow to a later time, got 1.25 s to 1 s");
   x_.resize(27);
   y_.resize(27);
   write_flow({1, 1.25, 1.75}, 3);
@@ -218,30 +259,17 @@ TEST_F(MvsecFlow, OfOneTimeHasNoEnd) {
                 "drive_data.h5");
 }
 
-TEST_F(RecordingFlowTest, OfSimulateIsThatBetweenItsFrames) {
-  testing::write_hdf5(at("drive.h5"), testing::small_mvsec());
-  spec_.root = "drive.h5";
-  const auto dataset = open();
-  EXPECT_THAT(ids_of(*dataset), ElementsAre("drive/0000000001.000000", "drive/0000000001.500000"));
-  EXPECT_EQ(window(*dataset, 1), (std::array{1.5, 2.0}));
-  const SourceFlow flow = flow_of(*dataset, 1);
-  EXPECT_EQ(flow.size, (ImageSize{3, 4}));
-  EXPECT_THAT(std::vector(flow.flow.px.begin(), flow.flow.px.begin() + 12), Each(2));
-  EXPECT_THAT(std::vector(flow.flow.px.begin() + 12, flow.flow.px.end()), Each(-2));
-  EXPECT_THAT(flow.flow.valid, Each(1));
-}
-
-TEST_F(RecordingFlowTest, ThoseWithoutAreLeftOut) {
-  auto datasets = testing::small_mvsec();
-  testing::write_hdf5(at("all/a.h5"), datasets);
-  datasets.erase("davis/left/flow_dist");
-  testing::write_hdf5(at("all/b.h5"), datasets);
+TEST_F(MvsecFlow, ThoseWithoutAreLeftOut) {
+  testing::write_hdf5(at("all/a.h5"), testing::small_mvsec());
+  testing::write_hdf5(at("all/b.h5"), testing::small_mvsec());
+  write_flow({1, 1.25, 1.75});
+  fs::rename(at("drive_gt_flow_dist.npz"), at("all/a_gt_flow_dist.npz"));
   spec_.root = "all";
   const auto dataset = open();
-  EXPECT_THAT(ids_of(*dataset), ElementsAre("a/0000000001.000000", "a/0000000001.500000"));
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("a/0000000001.000000", "a/0000000001.250000"));
   EXPECT_THAT(dataset->notes(), Contains("1 recording without flow left out in all: b"));
   EXPECT_THAT(dataset->unreadable().reasons, IsEmpty());
-  fs::remove(at("all/a.h5"));
+  fs::remove(at("all/a_gt_flow_dist.npz"));
   EXPECT_THROWS(open(), InputError, "expected flow beside a recording of DSEC or MVSEC, got none",
                 "all");
 }

@@ -125,8 +125,9 @@ TEST_F(FindSource, SaysHowKittisFlowIsRead) {
   touch({"flow/image_2/000000_10.png", "flow/image_3/000000_10.png"});
   EXPECT_THAT(find("flow/image_2").remarks, IsEmpty());
   touch({"flow/flow_noc/000000_10.png"});
-  EXPECT_THAT(find("flow/image_2").remarks,
-              ElementsAre(HasSubstr("\"flow\": true, with \"gaps\": [1] and \"side\": \"after\"")));
+  EXPECT_THAT(
+      find("flow/image_2").remarks,
+      ElementsAre(HasSubstr(R"("flow": true and "pairs": { "gaps": [1], "side": "after" })")));
   EXPECT_THAT(find("flow/image_3").remarks, IsEmpty());
 }
 

@@ -44,7 +44,7 @@ TEST_F(FlowOfKitti, IsThatOfAllPixelsValidWhereBothImagesShowThem) {
   flow("flow_occ/000000_10.png", 64, 1, 1);
   flow("flow_noc/000000_10.png", 64, 1, 0);
   flow("flow_occ/000001_10.png", 32, 0, 1);
-  flow("flow_noc/000001_10.png", 32, 0, 1);
+  flow("flow_noc/000001_10.png", 32, 1, 1);
   const auto dataset = open();
   EXPECT_THAT(ids_of(*dataset), ElementsAre("000000_10", "000001_10"));
   EXPECT_THAT(paired(*dataset, 0, {0, 1}),
@@ -56,9 +56,7 @@ TEST_F(FlowOfKitti, IsThatOfAllPixelsValidWhereBothImagesShowThem) {
   EXPECT_THAT(dataset->annotation_files(),
               ElementsAre("training/flow_noc/000000_10.png", "training/flow_noc/000001_10.png",
                           "training/flow_occ/000000_10.png", "training/flow_occ/000001_10.png"));
-  EXPECT_THAT(
-      dataset->notes(),
-      Contains("no flow of 2 of 4 labelled frames, which are left out, first of 000000_11"));
+  EXPECT_THAT(dataset->notes(), IsEmpty());
 }
 
 TEST_F(FlowOfKitti, OneFolderTellsBoth) {
@@ -73,6 +71,17 @@ TEST_F(FlowOfKitti, OneFolderTellsBoth) {
   }
 }
 
+TEST_F(FlowOfKitti, WhatIsNotUsedIsNamed) {
+  flow("flow_occ/000000_10.png", 64, 1, 1);
+  flow("flow_occ/000002_10.png", 64, 1, 1);
+  EXPECT_THAT(open()->notes(),
+              ElementsAre("no flow_noc in training: flow_valid is 1 where flow_occ tells flow",
+                          "1 image without flow, though another one follows, left out in "
+                          "training/image_2: 000001_10",
+                          "1 file of flow without a labelled image left out in training: "
+                          "flow_occ/000002_10.png"));
+}
+
 TEST_F(FlowOfKitti, LabelledImagesWithoutFlowStay) {
   flow("flow_occ/000000_10.png", 64, 1, 1);
   write("boxes.csv",
@@ -83,8 +92,28 @@ TEST_F(FlowOfKitti, LabelledImagesWithoutFlowStay) {
   EXPECT_TRUE(flow_of(*dataset, 1)->flow.empty());
   EXPECT_FALSE(is_fault(flow_of(*dataset, 1)));
   EXPECT_THAT(annotation_of(*dataset, 1).boxes, SizeIs(1));
-  EXPECT_THAT(dataset->notes(), Contains("no flow of 1 of 2 labelled frames, which have labels "
-                                         "alone, first of 000001_10"));
+  EXPECT_THAT(dataset->notes(), Contains("1 image without flow, though another one follows, taken "
+                                         "for the labels in training/image_2: 000001_10"));
+}
+
+TEST_F(FlowOfKitti, OneMapWhereThereShouldBeTwoIsAFault) {
+  flow("flow_occ/000000_10.png", 64, 1, 1);
+  flow("flow_noc/000001_10.png", 64, 1, 1);
+  const auto dataset = open();
+  EXPECT_EQ(fault_of(flow_of(*dataset)),
+            "expected flow_noc/000000_10.png, as there is another one, got none, in training");
+  EXPECT_EQ(fault_of(flow_of(*dataset, 1)),
+            "expected flow_occ/000001_10.png, as there is another one, got none, in training");
+}
+
+TEST_F(FlowOfKitti, LeadsToTheImageOfTheNextNumber) {
+  flow("flow_occ/000000_10.png", 64, 1, 1);
+  flow("flow_occ/000001_10.png", 64, 1, 1);
+  fs::rename(at("training/image_2/000000_11.png"), at("training/image_2/000000_12.png"));
+  fs::rename(at("training/image_2/000001_11.png"), at("training/image_2/000001_13.png"));
+  EXPECT_EQ(fault_of(flow_of(*open())),
+            "expected the image after training/image_2/000000_10.png, whose flow there is, got "
+            "training/image_2/000000_12.png, in training");
 }
 
 TEST_F(FlowOfKitti, ADamagedFileIsItsSamplesFault) {
@@ -94,7 +123,7 @@ TEST_F(FlowOfKitti, ADamagedFileIsItsSamplesFault) {
                                                 EndsWith(", in training/flow_noc/000000_10.png")));
   write("training/flow_noc/000000_10.png", encode_wide_png({2, 1}, std::vector<std::uint16_t>(6)));
   EXPECT_EQ(fault_of(flow_of(*open())),
-            "expected flow of 2x1 as in flow_occ/000000_10.png, got 1x2, in "
+            "expected flow of 2x1 as in training/flow_occ/000000_10.png, got 1x2, in "
             "training/flow_noc/000000_10.png");
 }
 
