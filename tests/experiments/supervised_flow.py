@@ -167,12 +167,12 @@ def main() -> None:
             print(name, round(float(np.mean([*results[name].values()] / plain)), 3), flush=True)
     table = io.StringIO()
     writer = csv.writer(table, lineterminator="\n")
-    writer.writerow(["learnt on", "seeds", "mean", "sd", *tests])
+    writer.writerow(["learnt on", "steps", "seeds", "mean", "sd", *tests])
     for row, of_seeds in rows.items():
         shares = np.array([[*each.values()] for each in of_seeds]) / plain  # [seed, recording]
         means = shares.mean(1)
-        writer.writerow([row, len(shares), f"{means.mean():.3f}", f"{means.std():.3f}" if len(means) > 1 else "",
-                         *(f"{share:.2f}" for share in shares.mean(0))])
+        writer.writerow([row, args.steps if row in ROWS else 0, len(shares), f"{means.mean():.3f}",
+                         f"{means.std():.3f}" if len(means) > 1 else "", *(f"{share:.2f}" for share in shares.mean(0))])
     self_supervised.write(args.out / "table.csv", table.getvalue())
     print(table.getvalue())
 

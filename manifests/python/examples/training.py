@@ -36,7 +36,7 @@ GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps togeth
 MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "images", "every",
               "test", "as_bright", "without_noise"}  # when a run goes on
 
-LEAST = {"epochs": 1, "steps": 1, "every": 1, "batch": 1, "threads": 0, "workers": 0, "images": 0, "rotation": 0}
+LEAST = {"epochs": 1, "steps": 0, "every": 1, "batch": 1, "threads": 0, "workers": 0, "images": 0, "rotation": 0}
 ABOVE_0 = ("minutes", "lr", "sigma", "scale")
 MOST_SCALE = 16  # 256 times a camera's pixels
 TUNING_STEPS, TUNING_RATE = 200, 0.25  # the latter a share of the learning rate
@@ -97,6 +97,8 @@ def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
     for name, least in LEAST.items():
         if name in given and not least <= given[name] < math.inf:
             sys.exit(f"expected --{name} of at least {least}, got {given[name]}")
+    if given.get("steps") == 0 and "pretrained" not in given:
+        sys.exit("expected --pretrained weights, since --steps is 0, got none")
     for name in ABOVE_0:
         if name in given and not 0 < given[name] < math.inf:
             sys.exit(f"expected --{name} above 0 and finite, got {given[name]:g}")
@@ -262,7 +264,7 @@ def items_of(shards: Shards, classes: Sequence[str], size: tuple[int, int], view
 def add_tune(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--tune", help="folder of shards of your camera's labelled recordings, to go on with once the "
                         f"training has ended: {TUNING_STEPS} steps, in which they are drawn as often as the samples of "
-                        "--data; into OUT/tuned")
+                        "--data; into OUT/tuned (from the weights of --pretrained alone: --steps 0)")
 
 
 def tuned_on(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]], tested_shards: Shards) -> Shards:
@@ -448,11 +450,11 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
     began = time.monotonic()
     steps = min(math.inf if args.steps is None else args.steps,
                 math.inf if args.epochs is None else args.epochs * len(loader))
-    every = args.every or (1 if math.isinf(steps) else math.ceil(steps / (20 * len(loader))))
+    every = args.every or (1 if math.isinf(steps) else max(1, math.ceil(steps / (20 * len(loader)))))
 
     def progress() -> float:
         minutes = (state["seconds"] + time.monotonic() - began) / 60
-        return max(state["step"] / steps, 0 if args.minutes is None else minutes / args.minutes)
+        return max(state["step"] / steps if steps else 1, 0 if args.minutes is None else minutes / args.minutes)
 
     def report(loss: float | None) -> None:
         model.eval()

@@ -351,6 +351,14 @@ def test_tuned_on_the_camera_s_own_windows(data, tmp_path, monkeypatch):
     assert code == 1 and "expected --tune 3 samples of plan " in said and "as when this run started" in said, said
     said, code = run_script(*line, "--epochs", "3", "--tune", own)  # other weights to begin with
     assert code == 0 and "tuned: anew" in said and "step     4" in said, said
+    line[line.index("--out") + 1] = tmp_path / "from weights"
+    said, code = run_script(*line[:-2], "--steps", "0", "--tune", own)
+    assert code == 1 and "expected --pretrained weights, since --steps is 0, got none" in said, said
+    for more in ("step     4", "resuming after epoch"):
+        said, code = run_script(*line[:-2], "--steps", "0", "--pretrained", out / "weights.pt", "--tune", own)
+        assert code == 0 and more in said, said
+    first, then = (torch.load(folder / "weights.pt") for folder in (out, tmp_path / "from weights"))
+    assert all(torch.equal(first[name], then[name]) for name in first)
 
 
 def test_a_few_windows_are_drawn_as_often_as_many_images():
