@@ -548,9 +548,9 @@ def test_what_cannot_be_trained_with_is_named(data, tmp_path):
         said = train("train_torchvision", data, tmp_path / "out", "--task", "keypoints", option, expect=1)
         assert said == (f"expected {option.split('=')[0]} with --task detection only: keypoints have no "
                         "predictions.json\n")
-    for limit in ("--epochs", "--steps", "--minutes", "--every"):
-        said = train("train_torchvision", data, tmp_path / "out", limit, "0", expect=1)
-        assert f"expected {limit} " in said and "got 0" in said
+    for limit, value in (("--epochs", "0"), ("--steps", "-1"), ("--minutes", "0"), ("--every", "0")):
+        said = train("train_torchvision", data, tmp_path / "out", limit, value, expect=1)
+        assert f"expected {limit} " in said and f"got {value}" in said
     for option, value, error in (
             ("--lr", "nan", "above 0 and finite"), ("--minutes", "nan", "above 0 and finite"),
             ("--minutes", "inf", "above 0 and finite"), ("--scale", "0", "above 0 and finite"),
