@@ -218,7 +218,7 @@ std::optional<std::string> flow_fault(const ShardTables& tables, const ShardSamp
     if (flow.valid[i] > 1) return "expected flow_valid of 0 or 1, got another number";
     const auto is_inside = [&](std::size_t pixel, float by, int side) {
       const double at = static_cast<double>(pixel) + sign * by;
-      const double rounding = 0x1p-11 * std::abs(by);  // of float16
+      const double rounding = 0x1p-11 * std::abs(by) + 0x1p-25;  // of float16
       return at >= -rounding && at <= side - 1 + rounding;
     };
     if (flow.valid[i] != 0 && !(is_inside(i % size.width, dx, size.width) &&

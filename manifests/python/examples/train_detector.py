@@ -270,7 +270,7 @@ def advice(summary: Mapping[str, Any], items: int, larger: float | None) -> str 
     score, steps = summary[summary["metric"]], summary["history"][-1]["step"]
     if score is None:
         return f"there is no {summary['metric']}: the validation samples have no box of that class"
-    if score >= POOR and score > summary["untrained"]:
+    if score >= POOR and (score > summary["untrained"] or not steps):
         return None
     todo = [f"--steps {max(STEPS, 2 * steps)} in place of {steps}"]
     todo += [f"--scale {larger:g} (and another --out)"] if larger else []

@@ -336,7 +336,7 @@ def frames_of(sample: Sample) -> list[torch.Tensor]:
         with h5py.File(path) as file:
             return file["davis/left/image_raw"][index] if "davis/left/image_raw" in file else None
 
-    if sample["pair"]["dataset"] != "recording" or has_flow(sample):  # whose windows may begin between frames
+    if sample["pair"]["dataset"] != "recording" or "flow" in sample:  # whose windows may begin between frames
         return []
     images = [read(training.frame_path(sample, side), sample["pair"][f"{side}_video_frame"])
               for side in ("prev", "next")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import functools
+import hashlib
 import importlib
 import json
 import math
@@ -34,7 +35,7 @@ from eventgan.torch import DetectionDataset, fitted, inverse, mixture, move_boxe
 VALIDATION_SPLITS = ("validation", "valid", "val", "test")
 GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps together, the most first
 MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "images", "every",
-              "test", "as_bright", "without_noise"}  # when a run goes on
+              "test", "as_bright", "without_noise", "defaults"}  # when a run goes on
 
 LEAST = {"epochs": 1, "steps": 0, "every": 1, "batch": 1, "threads": 0, "workers": 0, "images": 0, "rotation": 0}
 ABOVE_0 = ("minutes", "lr", "sigma", "scale")
@@ -97,7 +98,7 @@ def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
     for name, least in LEAST.items():
         if name in given and not least <= given[name] < math.inf:
             sys.exit(f"expected --{name} of at least {least}, got {given[name]}")
-    if given.get("steps") == 0 and "pretrained" not in given:
+    if given.get("steps") == 0 and not given.get("pretrained"):
         sys.exit("expected --pretrained weights, since --steps is 0, got none")
     for name in ABOVE_0:
         if name in given and not 0 < given[name] < math.inf:
@@ -111,6 +112,7 @@ def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
     shards = [name for name in (PLAN, DESCRIPTION) if pathlib.Path(args.out, name).exists()]
     if shards:
         sys.exit(f"expected a folder of its own for --out, got one of shards, with {shards[0]}, in {args.out}")
+    args.defaults = {name: parser.get_default(name) for name in vars(args)}
     name, value = vars(args).pop("unlimited")
     if args.epochs is None and args.steps is None and args.minutes is None:
         setattr(args, name, value)
@@ -299,13 +301,13 @@ def tuning(args: argparse.Namespace, samples: int) -> argparse.Namespace:
     and anew where these have learnt more since."""
     out = pathlib.Path(args.out)
     (out / "tuned").mkdir(exist_ok=True)
-    base_steps = json.loads((out / "metrics.json").read_text(encoding="utf-8"))["history"][-1]["step"]
+    base = hashlib.sha256((out / "weights.pt").read_bytes()).hexdigest()[:16]
     checkpoint = out / "tuned" / "checkpoint.pt"
-    if checkpoint.exists() and _checkpoint(checkpoint)["settings"].get("base_steps") != base_steps:
-        print(f"{out / 'tuned'}: anew, since the training before has gone on")
+    if checkpoint.exists() and _checkpoint(checkpoint)["settings"].get("base") != base:
+        print(f"{out / 'tuned'}: anew, since the weights before are other ones")
         checkpoint.unlink()
     plan = read_description(args.tune)["plan_hash"]
-    return argparse.Namespace(**{**vars(args), "out": str(out / "tuned"), "base_steps": base_steps,
+    return argparse.Namespace(**{**vars(args), "out": str(out / "tuned"), "base": base,
                                  "tune": f"{samples} samples of plan {plan[:8]}",
                                  "pretrained": str(out / "weights.pt"), "lr": args.lr * TUNING_RATE,
                                  "steps": TUNING_STEPS, "epochs": None, "minutes": None})
@@ -433,15 +435,22 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
     of the way to the nearest limit. check(): the numbers to report, `metric` among them; asked before the first step
     and after each epoch (each --every). Minutes are those of the steps, here and in metrics.json."""
     out = pathlib.Path(args.out)
-    may_change = MAY_CHANGE | ({"pretrained"} if "base_steps" in args else set())  # of tuning, OUT's own
+    may_change = MAY_CHANGE | ({"pretrained"} if "base" in args else set())  # of tuning, OUT's own
     settings = {name: value for name, value in vars(args).items() if name not in may_change}
     state: dict[str, Any] = {"settings": settings, "epoch": 0, "step": 0, "seconds": 0.0, "history": []}
     if (out / "checkpoint.pt").exists():
         state = _checkpoint(out / "checkpoint.pt")
+        # of an option that there was not, its default
+        state["settings"] = {**{name: getattr(args, "defaults", {}).get(name) for name in settings},
+                             **state["settings"]}
         for name, value in settings.items():
-            if state["settings"].get(name, value) != value:  # of an option that there was not, any goes on
-                sys.exit(f"expected --{name} {state['settings'][name]}, as when this run started, got {value}, in "
-                         f"{out / 'checkpoint.pt'}")
+            before = state["settings"][name]
+            if before != value:
+                option = f"no --{name}" if before is None else f"--{name} {before}"
+                sys.exit(f"expected {option}, as when this run started, got {value}, in {out / 'checkpoint.pt'}")
+        if args.steps == 0 and state["step"]:
+            sys.exit(f"expected --out without a training, since --steps is 0, got {state['step']} steps, in "
+                     f"{out / 'checkpoint.pt'}")
         model.load_state_dict(state["model"])
         optimizer.load_state_dict(state["optimizer"])
         print(f"resuming after epoch {state['epoch']}")

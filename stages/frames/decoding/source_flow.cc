@@ -58,8 +58,9 @@ PixelFlow placed(const SourceFlow& flow, const Placement& placement) {
       const std::size_t pixel = static_cast<std::size_t>(y) * placement.volume.width + x;
       placed.px[pixel] = dx;
       placed.px[pixels + pixel] = dy;
-      placed.valid[pixel] = flow.flow.valid[from] != 0 && x + dx >= part.volume_x &&
-                            x + dx <= right - 1 && y + dy >= part.volume_y && y + dy <= bottom - 1;
+      const double to_x = double(x) + dx, to_y = double(y) + dy;
+      placed.valid[pixel] = flow.flow.valid[from] != 0 && to_x >= part.volume_x &&
+                            to_x <= right - 1 && to_y >= part.volume_y && to_y <= bottom - 1;
     }
   }
   return placed;

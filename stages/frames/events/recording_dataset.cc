@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "stages/frames/events/recording_flow.h"
 #include "stages/frames/events/recording_folder.h"
 #include "stages/frames/events/recording_labels.h"
@@ -538,7 +539,7 @@ class RecordingDataset final : public Dataset {
   void compare_clocks(const Recorded& recorded, std::span<const LabelledFrame> windows) {
     std::vector<double> all, outside;
     for (const LabelledFrame& window : windows) {
-      if (!window.fault.empty()) continue;
+      if (!window.fault.empty() && !recorded.flow) continue;
       all.push_back(window.frame.time_s);
       if (!meets_events(recorded, all.back())) outside.push_back(all.back());
     }
@@ -560,10 +561,10 @@ class RecordingDataset final : public Dataset {
     if (is_all) warnings_.push_back(notes_.back());
   }
 
-  /// A window of flow that lasts longer than the recording has fewer events than its flow says.
+  /// A window of flow that reaches beyond the events has fewer of them than its flow says.
   void note_long_windows(const Recorded& recorded, const std::vector<double>& times_s) {
     constexpr double kMostBeyond = 0.01;  // of its length
-    const auto [first_s, last_s] = recorded.span;
+    const auto [first_s, last_s] = *recorded.event_span;
     const auto is_long = [&](double time_s) {
       const Span window = *span_of(recorded, time_s);
       const double within_s = std::min(window[1], last_s) - std::max(window[0], first_s);
@@ -572,9 +573,9 @@ class RecordingDataset final : public Dataset {
     const auto count = std::ranges::count_if(times_s, is_long);
     if (count == 0) return;
     notes_.push_back(
-        fmt::format("{} of {} windows of flow reach beyond the recording, {} s to {} s, "
-                    "in {}",
-                    count, times_s.size(), first_s, last_s, recorded.path));
+        count_text(count, "window",
+                   fmt::format(" of flow beyond the events, which last from {} s to {} s, in {}",
+                               first_s, last_s, recorded.path)));
   }
 
   /// Times within two microseconds of each other are one sample, which is at fault: none of them
@@ -598,7 +599,14 @@ class RecordingDataset final : public Dataset {
     const bool is_late = time_s > recorded.span[1] &&
                          (!recorded.frame_times_s.empty() || !meets_events(recorded, time_s));
     const bool is_outside = time_s < recorded.span[0] || is_late;
-    if (recorded.flow ? recorded.event_span && !meets_events(recorded, time_s) : is_outside) {
+    if (recorded.flow) {
+      if (recorded.event_span && !meets_events(recorded, time_s)) {
+        frame.fault = fmt::format(
+            "expected a window among the events, from {} s to {} s, got one from {} s, in {} ({})",
+            (*recorded.event_span)[0], (*recorded.event_span)[1], time_s,
+            label_place(frame.label_key), frame.sample_id);
+      }
+    } else if (is_outside) {
       frame.fault = fmt::format(
           "expected a time between {} s and {} s, which the recording lasts, got {} s, in {} ({})",
           recorded.span[0], recorded.span[1], time_s, label_place(frame.label_key),

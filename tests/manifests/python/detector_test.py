@@ -359,6 +359,11 @@ def test_tuned_on_the_camera_s_own_windows(data, tmp_path, monkeypatch):
         assert code == 0 and more in said, said
     first, then = (torch.load(folder / "weights.pt") for folder in (out, tmp_path / "from weights"))
     assert all(torch.equal(first[name], then[name]) for name in first)
+    said, code = run_script(*line[:-2], "--steps", "0", "--pretrained", out / "tuned" / "weights.pt", "--tune", own)
+    assert code == 0 and "from weights/tuned: anew" in said and "step     4" in said, said
+    line[line.index("--out") + 1] = out
+    said, code = run_script(*line[:-2], "--steps", "0", "--pretrained", out / "weights.pt", "--tune", own)
+    assert code == 1 and "expected no --pretrained, as when this run started, got" in said, said
 
 
 def test_a_few_windows_are_drawn_as_often_as_many_images():

@@ -504,7 +504,7 @@ def test_files_of_weights_that_cannot_be_read_are_named_in_a_line(tmp_path, monk
     model, args = torch.nn.Linear(1, 1), argparse.Namespace(out=str(tmp_path), device="cpu")
     paths = [tmp_path / "checkpoint.pt", tmp_path / "tuned" / "checkpoint.pt"]
     paths[1].parent.mkdir()
-    (tmp_path / "metrics.json").write_text('{"history": [{"step": 1}]}')
+    (tmp_path / "weights.pt").write_bytes(b"any")
     for path in paths:
         torch.save({"settings": {}, "model": model.state_dict()}, path)
         path.write_bytes(damaged(path.read_bytes()))

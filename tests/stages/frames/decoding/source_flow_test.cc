@@ -97,6 +97,12 @@ TEST_F(TrueFlowTest, OfAnImageAsItIsStaysAndIsValidWhereItLeadsInside) {
   EXPECT_EQ(flow.valid, (std::vector<std::uint8_t>{1, 1, 0, 0, 1, 1, 0, 0}));  // 1 + 1.5 <= 3
 }
 
+TEST_F(TrueFlowTest, TheLeastStepOverTheEdgeIsOutside) {
+  move({1, 2}, 1e-6f, 0);
+  const PixelFlow flow = in(placed({1, 2}, std::nullopt, ImageFit::kStretch));
+  EXPECT_EQ(flow.valid, (std::vector<std::uint8_t>{1, 0}));
+}
+
 TEST_F(TrueFlowTest, KnownMotionOfWhatIsHiddenStays) {
   move({1, 3}, 0, 0);
   dataset_.flow_->flow.valid = {1, 0, 1};

@@ -174,10 +174,14 @@ TEST_F(DsecFlow, OfATimeWithoutEventsIsAFaultAndOfALongOneNoted) {
         "9999000, 10001000\n10002000, 10004000\n10003001, 10009000\n");
   map("000006.png", 3, 1);
   const auto dataset = open();
-  EXPECT_THAT(faults_of(*dataset),
-              ElementsAre("", "", HasSubstr("expected a time between 10 s and 10.003 s, which")));
-  EXPECT_THAT(dataset->notes(), Contains("2 of 2 windows of flow reach beyond the recording, 10 s "
-                                         "to 10.003 s, in seq/events/left/events.h5"));
+  EXPECT_THAT(
+      faults_of(*dataset),
+      ElementsAre("", "",
+                  HasSubstr("expected a window among the events, from 10 s to 10.003 s, got "
+                            "one from 10.003001 s")));
+  EXPECT_THAT(dataset->notes(),
+              Contains("3 windows of flow beyond the events, which last from 10 s to "
+                       "10.003 s, in seq/events/left/events.h5"));
 }
 
 TEST_F(DsecFlow, OtherLabelsAreNotLostWithoutAWord) {
