@@ -564,10 +564,10 @@ class RecordingDataset final : public Dataset {
   /// A window of flow that reaches beyond the events has fewer of them than its flow says.
   void note_long_windows(const Recorded& recorded, const std::vector<double>& times_s) {
     constexpr double kMostBeyond = 0.01;  // of its length
-    const auto [first_s, last_s] = *recorded.event_span;
+    const Span events = *recorded.event_span;
     const auto is_long = [&](double time_s) {
       const Span window = *span_of(recorded, time_s);
-      const double within_s = std::min(window[1], last_s) - std::max(window[0], first_s);
+      const double within_s = std::min(window[1], events[1]) - std::max(window[0], events[0]);
       return within_s < (1 - kMostBeyond) * (window[1] - window[0]);
     };
     const auto count = std::ranges::count_if(times_s, is_long);
@@ -575,7 +575,7 @@ class RecordingDataset final : public Dataset {
     notes_.push_back(
         count_text(count, "window",
                    fmt::format(" of flow beyond the events, which last from {} s to {} s, in {}",
-                               first_s, last_s, recorded.path)));
+                               events[0], events[1], recorded.path)));
   }
 
   /// Times within two microseconds of each other are one sample, which is at fault: none of them
