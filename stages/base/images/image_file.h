@@ -24,7 +24,7 @@ struct ColourView {
   const std::uint8_t* bgr = nullptr;
 };
 
-/// The same of 16 bits a channel.
+/// A colour image of 16 bits: [y, x, channel] uint16, C order, channels blue, green, red.
 struct WideFrame {
   ImageSize size;
   std::vector<std::uint16_t> bgr;

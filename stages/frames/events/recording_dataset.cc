@@ -200,7 +200,7 @@ class RecordingDataset final : public Dataset {
   Outcome<SourceFlow> flow(const std::string& label_key) const override try {
     const auto& [recorded, time_s] = find(label_key);
     if (!recorded.flow) return SourceFlow();
-    const std::optional<std::size_t> map = flow_map(recorded, time_s);
+    const std::optional<std::size_t> map = recorded.flow->map_from(time_s, kSameTime_s);
     if (map) return recorded.flow->read(*map);
     return SampleFault{"expected flow from " + std::to_string(time_s) + " s, got none, in " +
                        recorded.path};
@@ -257,19 +257,10 @@ class RecordingDataset final : public Dataset {
     return {recorded->second, time_s};
   }
 
-  /// The number of the flow that begins at the time; none if it is not there any more.
-  static std::optional<std::size_t> flow_map(const Recorded& recorded, double time_s) {
-    const auto& times_s = recorded.flow->times_s;
-    const auto map = std::ranges::lower_bound(times_s, time_s - kSameTime_s, {},
-                                              [](const Span& span) { return span[0]; });
-    if (map == times_s.end() || (*map)[0] > time_s + kSameTime_s) return std::nullopt;
-    return static_cast<std::size_t>(map - times_s.begin());
-  }
-
   /// None where so many events make the window, whatever their times.
   std::optional<Span> span_of(const Recorded& recorded, double time_s) const {
     if (recorded.flow) {
-      const std::optional<std::size_t> map = flow_map(recorded, time_s);
+      const std::optional<std::size_t> map = recorded.flow->map_from(time_s, kSameTime_s);
       return map ? recorded.flow->times_s[*map] : Span{time_s, time_s};
     }
     if (window_.events) return std::nullopt;
@@ -384,8 +375,8 @@ class RecordingDataset final : public Dataset {
 
   void open_without_frames(Recorded& recorded) const {
     const bool is_labelled = !recorded.label_file.empty() || recorded.flow;
-    if (!window_.duration_s && !(is_labelled && window_.events) && !recorded.is_window() &&
-        !recorded.flow) {
+    const bool has_windows = recorded.is_window() || recorded.flow;
+    if (!window_.duration_s && !(is_labelled && window_.events) && !has_windows) {
       throw InputError(
           fmt::format("expected window_s{}, since the recording has no frames, got {}, in {}",
                       is_labelled ? " or window_events" : ", or labels",

@@ -204,6 +204,13 @@ std::optional<RecordingFlow> open_mvsec_flow(const fs::path& events_file, ImageS
 
 }  // namespace
 
+std::optional<std::size_t> RecordingFlow::map_from(double time_s, double tolerance_s) const {
+  const auto map = std::ranges::lower_bound(times_s, time_s - tolerance_s, {},
+                                            [](const Span& span) { return span[0]; });
+  if (map == times_s.end() || (*map)[0] > time_s + tolerance_s) return std::nullopt;
+  return static_cast<std::size_t>(map - times_s.begin());
+}
+
 std::optional<RecordingFlow> open_recording_flow(RecordingFormat format,
                                                  const fs::path& events_file, ImageSize size,
                                                  const RecordingOptions& options) {

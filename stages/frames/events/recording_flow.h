@@ -19,7 +19,10 @@ struct RecordingFlow {
   /// A map by its number, at the pixels and the time that it begins at. Throws InputError. May be
   /// called from several threads.
   std::function<SourceFlow(std::size_t)> read;
-  std::vector<std::filesystem::path> files;  ///< that it comes from, but the recording's own
+  std::vector<std::filesystem::path> files;  ///< that it comes from
+
+  /// The map that begins within so many seconds of a time; none if there is none.
+  std::optional<std::size_t> map_from(double time_s, double tolerance_s) const;
 };
 
 /// What is known of a recording:

@@ -11,8 +11,8 @@
 
 namespace eventgan {
 
-/// KITTI's ground truth: of all pixels, of those that both images show; beside the folders of its
-/// left camera, of whose images it is.
+/// KITTI's folders of optical flow: of all pixels whose motion is known, and of those of them that
+/// both images show. They lie beside the left camera's folders, of whose images they are.
 inline constexpr std::array<std::string_view, 2> kKittiFlow{"flow_occ", "flow_noc"};
 inline constexpr std::array<std::string_view, 3> kKittiLeftCamera{"image_2", "image_0",
                                                                   "colored_0"};
