@@ -516,6 +516,23 @@ def test_files_of_weights_that_cannot_be_read_are_named_in_a_line(tmp_path, monk
         training.load_fitting(model, paths[0])
 
 
+@pytest.mark.parametrize("options, reason", [
+    ({"steps": 0}, "expected --out without a training, since --steps is 0, got 3 steps"),
+    ({"steps": 9, "channels": "voxel", "defaults": {"channels": "volume"}},
+     "expected --channels volume, as when this run started, got voxel"),  # an option that there was not
+    ({"steps": 9, "pretrained": "a.pt"}, "expected no --pretrained, as when this run started, got a.pt")])
+def test_a_training_goes_on_with_its_own_options(tmp_path, monkeypatch, options, reason):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import training
+
+    model, args = torch.nn.Linear(1, 1), argparse.Namespace(out=str(tmp_path), **options)
+    optimizer = torch.optim.SGD(model.parameters(), 1)
+    torch.save({"settings": {}, "step": 3, "epoch": 1, "model": model.state_dict(),
+                "optimizer": optimizer.state_dict()}, tmp_path / "checkpoint.pt")
+    with pytest.raises(SystemExit, match=f"^{reason}, in {tmp_path / 'checkpoint.pt'}$"):
+        training.fit(args, model, optimizer, (), None, None, "score")
+
+
 def test_a_file_of_something_else_has_no_weights_that_fit(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(EXAMPLES))
     import training
