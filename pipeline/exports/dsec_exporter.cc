@@ -61,7 +61,7 @@ class HalfSize {
 /// the scripts of DSEC (github.com/uzh-rpg/DSEC, commit 9ddd029: EventSlicer), of DSEC-Det
 /// (github.com/uzh-rpg/dsec-det, commit db941c2: DSECDet) and of DAGr read. And of samples with
 /// flow flow/forward, or, where the labelled image is a pair's next one, flow/backward, as DSEC's
-/// own (dsec.ifi.uzh.ch, "Data format").
+/// own (dsec.ifi.uzh.ch, "Data format"), and the rectify_map.h5 that its loaders open.
 class DsecExporter : public RecordingsExporter {
  public:
   DsecExporter(const ExportInput& input, const ExportOptions& options)
@@ -154,6 +154,9 @@ class DsecExporter : public RecordingsExporter {
     images.finish(step);
     step.write(folder + "windows.txt", windows);
     for (const FlowFiles& files : flow) files.finish(step);
+    if (std::ranges::any_of(flow, &FlowFiles::has_files)) {  // loaders of flow rectify the events
+      write_rectify_map(step.file(folder + "events/left/rectify_map.h5"), recording.shape.size);
+    }
     if (!recording.source->has_boxes()) return;
     number_tracks(boxes, recording);
     step.write(folder + "object_detections/left/tracks.npy", tracks(boxes));
@@ -213,8 +216,10 @@ class DsecExporter : public RecordingsExporter {
       times_ += fmt::format("{}, {}\n", window.label_us, other_us);
     }
 
+    bool has_files() const { return count_ > 0; }
+
     void finish(ExportFolder::Step& step) const {
-      if (count_ == 0) return;
+      if (!has_files()) return;
       step.write(folder_ + "_timestamps.txt", "# from_timestamp_us, to_timestamp_us\n" + times_);
     }
 
@@ -280,6 +285,8 @@ ExportFormat dsec_format() {
       .files = {{"dsec/SPLIT/RECORDING/events/left/events.h5",
                  "events/{x, y, t, p}, ms_to_idx, t_offset"},
                 {"dsec/SPLIT/RECORDING/events/left/events_2x.h5", "the same at half the size"},
+                {"dsec/SPLIT/RECORDING/events/left/rectify_map.h5",
+                 "beside flow: rectify_map [H, W, 2], each pixel's place, itself"},
                 {"dsec/SPLIT/RECORDING/images/timestamps.txt",
                  "the time of each image, microseconds",
                  {{"", "time_us:Integer"}}},

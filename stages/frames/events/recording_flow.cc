@@ -20,6 +20,7 @@
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/frames/decoding/source_flow.h"
 #include "stages/frames/listing/source_folders.h"
+#include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
 namespace {
@@ -96,7 +97,8 @@ std::optional<RecordingFlow> open_dsec_flow(const fs::path& events_file,
   const fs::path folder = flow / "forward", times = flow / "forward_timestamps.txt";
   if (!has_folder(folder) && !has_file(times)) return std::nullopt;
   require_left(side.filename() == "left" ? options.camera : side.filename().string(), "DSEC", flow);
-  if (!options.rectify && has_file(side / "rectify_map.h5")) {
+  const fs::path map = side / "rectify_map.h5";
+  if (!options.rectify && has_file(map) && moves_events(map)) {
     throw InputError(
         "expected \"rectify\": true, since DSEC's flow is of the rectified view, got "
         "false, in " +

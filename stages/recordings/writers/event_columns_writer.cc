@@ -153,4 +153,23 @@ void EventColumnsWriter::commit(std::int64_t end_us) {
   file_->hdf5.output().publish();
 }
 
+void write_rectify_map(const std::filesystem::path& file, ImageSize size) {
+  const auto width = static_cast<hsize_t>(size.width);
+  std::vector<float> places;
+  places.reserve(2 * size.pixel_count());
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      places.insert(places.end(), {static_cast<float>(x), static_cast<float>(y)});
+    }
+  }
+  Hdf5OutputFile hdf5(file);
+  hdf5.write([&] {
+    GrowingDataset<float> map(hdf5.id(), "rectify_map", {width, 2}, {1, width, 2}, 1);
+    map.append(places);
+    map.close();
+    hdf5.close();
+  });
+  hdf5.output().publish();
+}
+
 }  // namespace eventgan

@@ -64,4 +64,8 @@ class EventColumnsWriter {
   std::unique_ptr<File> file_;
 };
 
+/// Writes DSEC's rectify_map.h5 of a camera without distortion: `rectify_map`, float32 [H, W, 2],
+/// where each pixel's place (x, y) is itself. Whole, as above. Throws std::runtime_error.
+void write_rectify_map(const std::filesystem::path& file, ImageSize size);
+
 }  // namespace eventgan

@@ -116,6 +116,11 @@ TEST_F(DsecFlow, IsOfTheRectifiedLeftView) {
           "seq/flow");
   spec_.recording.rectify = true;
   EXPECT_THAT(ids_of(*open()), SizeIs(2));
+
+  spec_.recording.rectify = false;  // a camera without distortion
+  for (std::size_t i = 0; i < places.size(); i += 2) --places[i];
+  testing::write_hdf5(at("seq/events/left/rectify_map.h5"), {{"rectify_map", {{3, 4, 2}, places}}});
+  EXPECT_THAT(ids_of(*open()), SizeIs(2));
 }
 
 TEST_F(DsecFlow, NamesWhatIsWrong) {

@@ -126,5 +126,12 @@ TEST(EventColumnsWriter, RefusesWhatBreaksItsRules) {
   EXPECT_EQ(numbers<std::uint32_t>(folder / "a", "events/t"), std::vector<std::uint32_t>{100});
 }
 
+TEST(RectifyMap, HasEachPixelAtItsPlace) {
+  const testing::TemporaryFolder folder;
+  write_rectify_map(folder / "m.h5", {2, 3});
+  EXPECT_EQ(numbers<float>(folder / "m.h5", "rectify_map"),
+            (std::vector<float>{0, 0, 1, 0, 2, 0, 0, 1, 1, 1, 2, 1}));
+}
+
 }  // namespace
 }  // namespace eventgan
