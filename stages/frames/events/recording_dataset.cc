@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
-#include <cmath>
 #include <cstdint>
 #include <exception>
 #include <iterator>
@@ -20,9 +18,9 @@
 
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
-#include "stages/frames/events/recording_flow.h"
 #include "stages/frames/events/recording_folder.h"
 #include "stages/frames/events/recording_labels.h"
+#include "stages/frames/events/windowed_recording.h"
 #include "stages/frames/listing/source_folders.h"
 #include "stages/recordings/readers/recording.h"
 
@@ -31,84 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kSameTime_s = 1e-6;  // what labels written with six decimals can lose
-/// An event at a window's begin is not in it, and none at whole microseconds lies on the border of
-/// two windows that begin so long before one.
-constexpr double kJustBefore_s = kSameTime_s / 4;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-/// Consecutive windows from `begin_s` on.
-struct Windows {
-  double begin_s = 0;
-  std::int64_t count = 0;
-};
-
-/// One recording of the source.
-struct Recorded : FoundFile {
-  std::unique_ptr<Recording> recording;
-  std::vector<double> frame_times_s;
-  std::array<double, 2> span{};                     ///< first and last time of a frame or an event
-  std::optional<std::array<double, 2>> event_span;  ///< of an event; none: there are none
-  Windows windows;                                  ///< if it has neither frames nor labels
-  RecordingLabels labels;                           ///< class_id is the source's
-  std::optional<RecordingFlow> flow;                ///< whose times are its windows
-
-  /// Whether it is one window, whose labels have no time.
-  bool is_window() const { return is_window_label_file(label_file); }
-
-  /// The last frame at or before the time; -1 if there is none.
-  std::int64_t frame_at(double time_s) const {
-    return std::ranges::upper_bound(frame_times_s, time_s) - frame_times_s.begin() - 1;
-  }
-
-  FrameRef ref(double time_s) const {
-    const std::int64_t frame = frame_at(time_s);
-    return {path, frame, frame, time_s};
-  }
-};
-
-/// Begin (exclusive) and end of a window in seconds.
-using Span = std::array<double, 2>;
-
-/// `time_s` + `length_s`. Of whole microseconds, or nanoseconds, the same number as the time of an
-/// event that is stored so: whether it is in a window is not for rounding to say.
-double later(double time_s, double length_s) {
-  for (const double ticks_per_s : {1e6, 1e9}) {
-    constexpr double kMostTicks = 9007199254740992;  // 2^53: beyond it a double has not all
-    const double time = std::round(time_s * ticks_per_s);
-    const double length = std::round(length_s * ticks_per_s);
-    const double rounding = 4 * std::numeric_limits<double>::epsilon() * std::abs(length_s);
-    if (std::abs(time) < kMostTicks && time / ticks_per_s == time_s &&
-        std::abs(length / ticks_per_s - length_s) <= rounding) {
-      return (time + length) / ticks_per_s;
-    }
-  }
-  return time_s + length_s;
-}
-
-/// The window of a time by the frames around it.
-Span frame_window(const std::vector<double>& frames, double time_s, LabelPlace place) {
-  const auto after = std::ranges::lower_bound(frames, time_s);
-  const std::ptrdiff_t last =
-      std::clamp<std::ptrdiff_t>(after - frames.begin(), 1, std::ssize(frames) - 1);
-  const double before_s = frames[static_cast<std::size_t>(last) - 1];
-  const double last_s = frames[static_cast<std::size_t>(last)];
-  if (place == LabelPlace::kMiddle) {
-    const double half_s = later(last_s, -before_s) / 2;
-    return {later(time_s, -half_s), later(time_s, half_s)};
-  }
-  return {later(later(time_s, -last_s), before_s), time_s};
-}
-
-/// What lies beside a file, or near it, written as that one is.
-std::string written_beside(const fs::path& beside, const fs::path& file,
-                           const std::string& written_file) {
-  const auto normal = [](const fs::path& path) { return fs::absolute(path).lexically_normal(); };
-  const fs::path from_file = normal(beside).lexically_relative(normal(file).parent_path());
-  fs::path written = fs::path(written_file).parent_path() / from_file;
-  if (from_file.has_parent_path()) written = written.lexically_normal();  // left/../../images
-  return written.generic_string();
-}
 
 class RecordingDataset final : public Dataset {
  public:
@@ -119,14 +40,14 @@ class RecordingDataset final : public Dataset {
     unreadable_ = std::move(found.unreadable);
     unopened_ = std::move(found.unopened);
     for (auto& [name, file] : found.recordings) {
-      static_cast<FoundFile&>(recordings_[name]) = std::move(file);
+      recordings_.emplace(name, WindowedRecording(std::move(file), window_));
     }
     read_labels();
     open_all(base, spec.root);
     number_classes();
     for (const auto& [name, recorded] : recordings_) {
       const std::size_t first = labelled_.size();
-      list_times(name, recorded);
+      for (const double time_s : recorded.times_s()) list_time(name, recorded, time_s);
       compare_clocks(recorded, std::span(labelled_).subspan(first));
     }
     tell_counts();
@@ -167,9 +88,9 @@ class RecordingDataset final : public Dataset {
   PairedFrame paired_frame(const LabelledFrame& labelled, int steps) const override {
     if (steps == 0) return {PairedFrame::State::kPresent, labelled.frame};
     if (steps != 1 && steps != -1) return {};
-    const Recorded& recorded = recordings_.at(labelled.sequence);
+    const WindowedRecording& recorded = recordings_.at(labelled.sequence);
     FrameRef edge = labelled.frame;
-    if (const std::optional<Span> span = span_of(recorded, labelled.frame.time_s)) {
+    if (const std::optional<Span> span = recorded.window_at(labelled.frame.time_s)) {
       edge = recorded.ref((*span)[steps < 0 ? 0 : 1]);
     } else {
       edge.time_s = kNan;
@@ -185,7 +106,7 @@ class RecordingDataset final : public Dataset {
     const auto& [recorded, time_s] = find(label_key);
     const Recording& recording = *recorded.recording;
     EventWindow window{recording.size(), {}};
-    if (const std::optional<Span> span = span_of(recorded, time_s)) {
+    if (const std::optional<Span> span = recorded.window_at(time_s)) {
       window.events = recording.events_in((*span)[0], (*span)[1]);
     } else {
       const std::int64_t after =
@@ -241,7 +162,7 @@ class RecordingDataset final : public Dataset {
 
  private:
   /// The recording and the time that a label_key names. Throws InputError if there is none.
-  std::pair<const Recorded&, double> find(const std::string& label_key) const {
+  std::pair<const WindowedRecording&, double> find(const std::string& label_key) const {
     const std::size_t slash = std::min(label_key.rfind('/'), label_key.size());
     const auto recorded = recordings_.find(label_key.substr(0, slash));
     double time_s = 0;
@@ -255,29 +176,6 @@ class RecordingDataset final : public Dataset {
       throw InputError("expected a recording and a time of the source, got " + label_key);
     }
     return {recorded->second, time_s};
-  }
-
-  /// None where so many events make the window, whatever their times.
-  std::optional<Span> span_of(const Recorded& recorded, double time_s) const {
-    if (recorded.flow) {
-      const std::optional<std::size_t> map = recorded.flow->map_from(time_s, kSameTime_s);
-      return map ? recorded.flow->times_s[*map] : Span{time_s, time_s};
-    }
-    if (window_.events) return std::nullopt;
-    if (!window_.duration_s && recorded.is_window()) {
-      return Span{recorded.span[0] - kJustBefore_s, recorded.span[1]};
-    }
-    if (!window_.duration_s) return frame_window(recorded.frame_times_s, time_s, window_.label);
-    if (recorded.windows.count > 0) {
-      // From the window's number, so that one's end is the next one's begin to the last bit: no
-      // event falls between two.
-      const double place = window_.label == LabelPlace::kMiddle ? 0.5 : 1;
-      const double begin_s = recorded.windows.begin_s, length_s = *window_.duration_s;
-      const double i = std::round((time_s - begin_s) / length_s - place);
-      return Span{begin_s + i * length_s, begin_s + (i + 1) * length_s};
-    }
-    const double after_s = window_.label == LabelPlace::kMiddle ? *window_.duration_s / 2 : 0;
-    return Span{later(time_s, after_s - *window_.duration_s), later(time_s, after_s)};
   }
 
   void read_labels() {
@@ -301,15 +199,17 @@ class RecordingDataset final : public Dataset {
     std::exception_ptr first;
     for (auto entry = recordings_.begin(); entry != recordings_.end();) {
       try {
-        open(entry->second, base);
+        entry->second.open(base, options_, reads_flow_);
       } catch (const InputError& error) {
         if (is_one) throw;
+        keep_files(entry->second);
         if (!first) first = std::current_exception();
         unreadable_.emplace_back(error.what());
         unopened_[entry->first] = error.what();
         entry = recordings_.erase(entry);
         continue;
       }
+      keep_files(entry->second);
       if (reads_flow_ && !entry->second.flow) {
         without_flow.push_back(entry->first);
         entry = recordings_.erase(entry);
@@ -327,45 +227,13 @@ class RecordingDataset final : public Dataset {
     notes_.push_back(counted(without_flow, "recording", " without flow left out in " + root));
   }
 
-  void open(Recorded& recorded, const fs::path& base) {
-    const fs::path path = base / recorded.path;
-    const fs::path own = fs::absolute(path).lexically_normal();
-    for (const fs::path& file : event_companions(own, recorded.format, options_)) {
-      annotation_files_.push_back(written_beside(file, own, recorded.path));
-    }
-    recorded.recording = open_recording(path, recorded.format, options_);
-    const Recording& recording = *recorded.recording;
-    for (std::int64_t i = 0; i < recording.frame_count(); ++i) {
-      recorded.frame_times_s.push_back(recording.frame_time_s(i));
-    }
-    recorded.event_span = recording.event_span();
-    if (reads_flow_) {
-      recorded.flow = open_recording_flow(recorded.format, own, recording.size(), options_);
-      if (!recorded.flow) return;
-      for (const fs::path& file : recorded.flow->files) {
-        annotation_files_.push_back(written_beside(file, own, recorded.path));
-      }
-    }
-    if (recorded.frame_times_s.empty()) {
-      open_without_frames(recorded);
-      return;
-    }
-    const bool by_frames = !window_.duration_s && !window_.events && !recorded.flow;
-    if (recorded.frame_times_s.size() < 2 && by_frames) {
-      throw InputError(
-          "expected two frames or more, or window_s or window_events, got one frame, "
-          "in " +
-          recorded.path);
-    }
-    recorded.span = {recorded.frame_times_s.front(), recorded.frame_times_s.back()};
-    if (const auto& events = recorded.event_span) {
-      recorded.span[0] = std::min(recorded.span[0], (*events)[0]);
-      recorded.span[1] = std::max(recorded.span[1], (*events)[1]);
-    }
+  void keep_files(const WindowedRecording& recorded) {
+    annotation_files_.insert(annotation_files_.end(), recorded.beside.begin(),
+                             recorded.beside.end());
   }
 
   /// The labels' time is where the window has it.
-  void read_window(Recorded& recorded) {
+  void read_window(WindowedRecording& recorded) {
     const auto [first_s, last_s] = recorded.span;
     const double time_s =
         window_.label == LabelPlace::kMiddle ? first_s + (last_s - first_s) / 2 : last_s;
@@ -373,38 +241,9 @@ class RecordingDataset final : public Dataset {
         window_labels_.read(recorded.label_file_on_disk, recorded.recording->size(), time_s);
   }
 
-  void open_without_frames(Recorded& recorded) const {
-    const bool is_labelled = !recorded.label_file.empty() || recorded.flow;
-    const bool has_windows = recorded.is_window() || recorded.flow;
-    if (!window_.duration_s && !(is_labelled && window_.events) && !has_windows) {
-      throw InputError(
-          fmt::format("expected window_s{}, since the recording has no frames, got {}, in {}",
-                      is_labelled ? " or window_events" : ", or labels",
-                      window_.events ? "window_events alone" : "neither", recorded.path));
-    }
-    // A still scene begins at 0, and nothing tells how long it lasts.
-    recorded.span = recorded.event_span.value_or(std::array{0.0, 0.0});
-    if (is_labelled) {
-      constexpr double kEver = std::numeric_limits<double>::infinity();
-      if (!recorded.event_span && !recorded.is_window()) recorded.span = {-kEver, kEver};
-      return;
-    }
-    const double length_s = *window_.duration_s;
-    const double begin_s = recorded.span[0] - kJustBefore_s;
-    const double count = std::ceil((recorded.span[1] - begin_s) / length_s);
-    constexpr double kMostWindows = 1e7;
-    if (count > kMostWindows) {
-      throw InputError(fmt::format(
-          "expected events of at most {:.0f} windows, got times from {} s to {} s, in {}",
-          kMostWindows, recorded.span[0], recorded.span[1], recorded.path));
-    }
-    recorded.windows = {begin_s, static_cast<std::int64_t>(count)};
-    recorded.span[1] = begin_s + count * length_s;
-  }
-
   /// Of Prophesee's boxes, which reach beyond the sensor, those that lie outside or have no size
   /// are left out; the others are cut where labels are mapped.
-  void fit_boxes(Recorded& recorded) {
+  void fit_boxes(WindowedRecording& recorded) {
     if (recorded.label_file_on_disk.extension() != ".npy") return;
     const ImageSize size = recorded.recording->size();
     const double width = size.width, height = size.height;
@@ -491,48 +330,13 @@ class RecordingDataset final : public Dataset {
     }
   }
 
-  void list_times(const std::string& name, const Recorded& recorded) {
-    const std::vector<double>& frames = recorded.frame_times_s;
-    if (recorded.flow) {
-      for (const Span& span : recorded.flow->times_s) list_time(name, recorded, span[0]);
-      return;
-    }
-    if (recorded.label_file.empty()) {
-      // The first frame ends no interval.
-      const bool by_frames = !window_.duration_s && !window_.events;
-      for (std::size_t i = by_frames ? 1 : 0; i < frames.size(); ++i) {
-        list_time(name, recorded, frames[i]);
-      }
-      const double length_s = window_.duration_s.value_or(0);
-      const double place = window_.label == LabelPlace::kMiddle ? 0.5 : 1;
-      for (std::int64_t i = 0; i < recorded.windows.count; ++i) {
-        list_time(name, recorded,
-                  recorded.windows.begin_s + (static_cast<double>(i) + place) * length_s);
-      }
-      return;
-    }
-    for (const auto& [labelled_s, annotation] : recorded.labels.annotations) {
-      const auto near = std::ranges::lower_bound(frames, labelled_s - kSameTime_s);
-      const bool on_frame = near != frames.end() && *near <= labelled_s + kSameTime_s;
-      list_time(name, recorded, on_frame ? *near : labelled_s);
-    }
-  }
-
-  /// Whether there can be events of the window's time.
-  bool meets_events(const Recorded& recorded, double time_s) const {
-    if (!recorded.event_span) return false;
-    const auto [first_s, last_s] = *recorded.event_span;
-    const Span window = span_of(recorded, time_s).value_or(Span{time_s, time_s});
-    return window[1] >= first_s && (window[0] < last_s || window[1] <= last_s);
-  }
-
   /// A clock that began elsewhere makes sound samples of nothing: no single one can tell.
-  void compare_clocks(const Recorded& recorded, std::span<const LabelledFrame> windows) {
+  void compare_clocks(const WindowedRecording& recorded, std::span<const LabelledFrame> windows) {
     std::vector<double> all, outside;
     for (const LabelledFrame& window : windows) {
       if (!window.fault.empty() && !recorded.flow) continue;
       all.push_back(window.frame.time_s);
-      if (!meets_events(recorded, all.back())) outside.push_back(all.back());
+      if (!recorded.meets_events(all.back())) outside.push_back(all.back());
     }
     if (!recorded.event_span) {
       without_events_.push_back(recorded.path);
@@ -553,11 +357,11 @@ class RecordingDataset final : public Dataset {
   }
 
   /// A window of flow that reaches beyond the events has fewer of them than its flow says.
-  void note_long_windows(const Recorded& recorded, const std::vector<double>& times_s) {
+  void note_long_windows(const WindowedRecording& recorded, const std::vector<double>& times_s) {
     constexpr double kMostBeyond = 0.01;  // of its length
     const Span events = *recorded.event_span;
     const auto is_long = [&](double time_s) {
-      const Span window = *span_of(recorded, time_s);
+      const Span window = *recorded.window_at(time_s);
       const double within_s = std::min(window[1], events[1]) - std::max(window[0], events[0]);
       return within_s < (1 - kMostBeyond) * (window[1] - window[0]);
     };
@@ -571,7 +375,7 @@ class RecordingDataset final : public Dataset {
 
   /// Times within two microseconds of each other are one sample, which is at fault: none of them
   /// tells what is there.
-  void list_time(const std::string& name, const Recorded& recorded, double time_s) {
+  void list_time(const std::string& name, const WindowedRecording& recorded, double time_s) {
     const double before_s = std::exchange(listed_s_, time_s);
     if (!labelled_.empty() && labelled_.back().sequence == name &&
         time_s - before_s <= 2 * kSameTime_s) {
@@ -588,10 +392,10 @@ class RecordingDataset final : public Dataset {
     frame.label_key = fmt::format("{}/{}", name, time_s);  // exactly, as short as can be
     // Without frames nothing tells how long it lasts behind its last event: a window may end there.
     const bool is_late = time_s > recorded.span[1] &&
-                         (!recorded.frame_times_s.empty() || !meets_events(recorded, time_s));
+                         (!recorded.frame_times_s.empty() || !recorded.meets_events(time_s));
     const bool is_outside = time_s < recorded.span[0] || is_late;
     if (recorded.flow) {
-      if (recorded.event_span && !meets_events(recorded, time_s)) {
+      if (recorded.event_span && !recorded.meets_events(time_s)) {
         frame.fault = fmt::format(
             "expected a window among the events, from {} s to {} s, got one from {} s, in {} ({})",
             (*recorded.event_span)[0], (*recorded.event_span)[1], time_s,
@@ -610,7 +414,7 @@ class RecordingDataset final : public Dataset {
   RecordingOptions options_;
   bool reads_flow_;
   WindowLabels window_labels_;
-  std::map<std::string, Recorded> recordings_;  ///< by name
+  std::map<std::string, WindowedRecording> recordings_;  ///< by name
   LabelSchema schema_;
   std::vector<LabelledFrame> labelled_;
   double listed_s_ = 0;  ///< the time of the last one

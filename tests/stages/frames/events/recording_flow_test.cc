@@ -6,9 +6,7 @@
 #include <vector>
 
 #include "stages/base/images/image_file.h"
-#include "stages/frames/events/recording_dataset.h"
-#include "tests/stages/frames/frames_fixture.h"
-#include "tests/stages/recordings/small_recording.h"
+#include "tests/stages/frames/events/recording_dataset_fixture.h"
 #include "tests/testing/npy_bytes.h"
 #include "tests/testing/zip_file.h"
 
@@ -16,27 +14,15 @@ namespace eventgan {
 namespace {
 
 /// A source of the recording `seq`, opened as a dataset.
-class RecordingFlowTest : public FolderTest {
+class RecordingFlowTest : public RecordingDatasetTest {
  protected:
-  RecordingFlowTest() {
-    spec_.dataset = DatasetKind::kRecording;
-    spec_.flow = true;
-  }
+  RecordingFlowTest() { spec_.flow = true; }
 
-  std::unique_ptr<Dataset> open() const { return open_recording_dataset(spec_, folder_.path()); }
   static SourceFlow flow_of(const Dataset& dataset, std::size_t frame = 0) {
     const auto flow = dataset.flow(dataset.labelled_frames().at(frame).label_key);
     EXPECT_EQ(fault_of(flow), "no fault");
     return is_fault(flow) ? SourceFlow() : *flow;
   }
-  /// Begin and end of a sample's window.
-  static std::array<double, 2> window(const Dataset& dataset, std::size_t sample) {
-    const LabelledFrame& frame = dataset.labelled_frames().at(sample);
-    return {dataset.paired_frame(frame, -1).frame.time_s,
-            dataset.paired_frame(frame, 1).frame.time_s};
-  }
-
-  SourceSpec spec_;
 };
 
 /// 4 x 3 pixels, five events at 0, 1, 1, 2.5 and 3 ms after 10 s; flow from 10 s to 10.001 s and
