@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "stages/base/hdf5/hdf5.h"
-#include "stages/synthetic/figure_scene.h"
 #include "stages/synthetic/layouts/layout_writers.h"
 #include "stages/synthetic/layouts/output_files.h"
+#include "stages/synthetic/scenes/figure_scene.h"
 
 namespace eventgan {
 namespace {

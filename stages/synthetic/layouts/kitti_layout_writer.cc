@@ -5,7 +5,7 @@
 
 #include "stages/synthetic/layouts/layout_writers.h"
 #include "stages/synthetic/layouts/output_files.h"
-#include "stages/synthetic/road_scene.h"
+#include "stages/synthetic/scenes/road_scene.h"
 
 namespace eventgan {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "manifests/values/labels.h"
-#include "stages/synthetic/road_scene.h"
+#include "stages/synthetic/scenes/road_scene.h"
 
 namespace eventgan {
 

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "stages/synthetic/figure_scene.h"
 #include "stages/synthetic/layouts/layout_writers.h"
 #include "stages/synthetic/layouts/output_files.h"
+#include "stages/synthetic/scenes/figure_scene.h"
 
 namespace eventgan {
 namespace {

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "manifests/files/atomic_file.h"
+#include "stages/base/images/image_file.h"
 
 namespace eventgan {
 
@@ -20,6 +21,14 @@ void write_text(const std::filesystem::path& path, std::string_view text) {
   stream.write(text.data(), static_cast<std::streamsize>(text.size()));
   stream.close();
   if (!stream) throw_system_error("cannot write " + path.string(), errno);
+}
+
+void write_png(const Image& image, const std::filesystem::path& path) {
+  write_text(path, encode_png({image.size, image.bgr.data()}));
+}
+
+void write_jpeg(const Image& image, const std::filesystem::path& path) {
+  write_text(path, encode_jpeg({image.size, image.bgr.data()}, 90));
 }
 
 void copy_output(const std::filesystem::path& from, const std::filesystem::path& to) {

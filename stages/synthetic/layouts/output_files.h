@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "stages/synthetic/image.h"
+#include "stages/synthetic/scenes/image.h"
 
 namespace eventgan {
 
@@ -14,6 +14,10 @@ std::string numbered(int number, int digits);
 
 /// Writes a file whose folder exists. Throws std::runtime_error naming the path.
 void write_text(const std::filesystem::path& path, std::string_view text);
+
+/// Write the file, whose folder must exist. Throw std::runtime_error naming the path.
+void write_png(const Image& image, const std::filesystem::path& path);
+void write_jpeg(const Image& image, const std::filesystem::path& path);
 
 /// Copies a file to a new path. Throws std::runtime_error naming both.
 void copy_output(const std::filesystem::path& from, const std::filesystem::path& to);

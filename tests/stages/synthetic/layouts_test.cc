@@ -2,17 +2,18 @@
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
+#include <opencv2/imgcodecs.hpp>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "stages/synthetic/figure_scene.h"
-#include "stages/synthetic/image.h"
 #include "stages/synthetic/layouts/detail/mpii_layout_writer.h"
 #include "stages/synthetic/layouts/layout_writers.h"
 #include "stages/synthetic/layouts/output_files.h"
+#include "stages/synthetic/scenes/figure_scene.h"
+#include "stages/synthetic/scenes/image.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 #include "tests/testing/texts.h"
@@ -34,6 +35,17 @@ TEST(OutputFiles, AreNumberedWrittenAndCopied) {
   write_text(folder / "a/b/one.txt", "text");
   copy_output(folder / "a/b/one.txt", folder / "a/two.txt");
   EXPECT_EQ(testing::read_file(folder / "a/two.txt"), "text");
+}
+
+TEST(OutputFiles, APngHoldsThePixels) {
+  const TemporaryFolder folder;
+  Image image = black_image({4, 5});
+  set_pixel(image, 3, 2, {10, 20, 30});
+  write_png(image, folder / "p.png");
+  const cv::Mat read = cv::imread((folder / "p.png").string());
+  ASSERT_EQ(read.size(), cv::Size(5, 4));
+  EXPECT_EQ(read.at<cv::Vec3b>(2, 3), cv::Vec3b(10, 20, 30));
+  EXPECT_EQ(read.at<cv::Vec3b>(2, 2), cv::Vec3b(0, 0, 0));
 }
 
 TEST(OutputFiles, FailuresNameThePath) {

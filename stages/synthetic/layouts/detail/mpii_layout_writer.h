@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/synthetic/figure_scene.h"
+#include "stages/synthetic/scenes/figure_scene.h"
 
 namespace eventgan {
 

@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cstdint>
 #include <thread>
-#include <tuple>
 
 #include "manifests/files/input_file.h"
 #include "tests/stages/frames/events/recording_dataset_fixture.h"

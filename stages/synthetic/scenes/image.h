@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <vector>
 
 #include "manifests/values/counter_random.h"
@@ -37,10 +36,6 @@ Image black_image(ImageSize size);
 
 /// Rounds to 8 bit and stores.
 void set_pixel(Image& image, int x, int y, const Colour& colour);
-
-/// Write the file, whose folder must exist. Throw std::runtime_error naming the path.
-void write_png(const Image& image, const std::filesystem::path& path);
-void write_jpeg(const Image& image, const std::filesystem::path& path);
 
 /// A surface pattern without end: random values on a grid of whole numbers, smooth between them. A
 /// pure function of the place, so that a moving surface carries its pattern with it.

@@ -1,4 +1,4 @@
-#include "stages/synthetic/figure_scene.h"
+#include "stages/synthetic/scenes/figure_scene.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "stages/synthetic/camera.h"
-#include "stages/synthetic/figure.h"
+#include "stages/synthetic/scenes/camera.h"
+#include "stages/synthetic/scenes/figure.h"
 
 namespace eventgan {
 namespace {

@@ -1,11 +1,8 @@
-#include "stages/synthetic/image.h"
+#include "stages/synthetic/scenes/image.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-
-#include "stages/base/images/image_file.h"
-#include "stages/synthetic/layouts/output_files.h"
 
 namespace eventgan {
 namespace {
@@ -13,6 +10,9 @@ namespace {
 std::uint8_t rounded(float value) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0f, 255.0f)));
 }
+
+/// 3 t^2 - 2 t^3: from 0 to 1 with flat ends, which hides the grid.
+float eased(double t) { return static_cast<float>(t * t * (3 - 2 * t)); }
 
 }  // namespace
 
@@ -26,21 +26,6 @@ void set_pixel(Image& image, int x, int y, const Colour& colour) {
   pixel[1] = rounded(colour.green);
   pixel[2] = rounded(colour.red);
 }
-
-void write_png(const Image& image, const std::filesystem::path& path) {
-  write_text(path, encode_png({image.size, image.bgr.data()}));
-}
-
-void write_jpeg(const Image& image, const std::filesystem::path& path) {
-  write_text(path, encode_jpeg({image.size, image.bgr.data()}, 90));
-}
-
-namespace {
-
-/// 3 t^2 - 2 t^3: from 0 to 1 with flat ends, which hides the grid.
-float eased(double t) { return static_cast<float>(t * t * (3 - 2 * t)); }
-
-}  // namespace
 
 float Texture::cell(int x, int y) const {
   const auto counter =

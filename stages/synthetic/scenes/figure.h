@@ -6,8 +6,8 @@
 
 #include "manifests/values/frames.h"
 #include "manifests/values/labels.h"
-#include "stages/synthetic/camera.h"
-#include "stages/synthetic/image.h"
+#include "stages/synthetic/scenes/camera.h"
+#include "stages/synthetic/scenes/image.h"
 
 namespace eventgan {
 

@@ -1,10 +1,10 @@
-#include "stages/synthetic/figure.h"
+#include "stages/synthetic/scenes/figure.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "stages/synthetic/camera.h"
+#include "stages/synthetic/scenes/camera.h"
 
 namespace eventgan {
 namespace {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "manifests/values/labels.h"
-#include "stages/synthetic/figure.h"
-#include "stages/synthetic/image.h"
+#include "stages/synthetic/scenes/figure.h"
+#include "stages/synthetic/scenes/image.h"
 
 namespace eventgan {
 

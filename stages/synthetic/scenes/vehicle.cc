@@ -1,4 +1,4 @@
-#include "stages/synthetic/vehicle.h"
+#include "stages/synthetic/scenes/vehicle.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "stages/synthetic/camera.h"
+#include "stages/synthetic/scenes/camera.h"
 
 namespace eventgan {
 namespace {

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "manifests/values/labels.h"
-#include "stages/synthetic/camera.h"
-#include "stages/synthetic/image.h"
-#include "stages/synthetic/vehicle.h"
+#include "stages/synthetic/scenes/camera.h"
+#include "stages/synthetic/scenes/image.h"
+#include "stages/synthetic/scenes/vehicle.h"
 
 namespace eventgan {
 

@@ -1,12 +1,12 @@
-#include "stages/synthetic/figure_scene.h"
+#include "stages/synthetic/scenes/figure_scene.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "manifests/values/counter_random.h"
-#include "stages/synthetic/camera.h"
-#include "stages/synthetic/figure.h"
+#include "stages/synthetic/scenes/camera.h"
+#include "stages/synthetic/scenes/figure.h"
 
 namespace eventgan {
 namespace {

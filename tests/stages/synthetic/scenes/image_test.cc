@@ -1,11 +1,8 @@
-#include "stages/synthetic/image.h"
+#include "stages/synthetic/scenes/image.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
-
-#include "tests/testing/temporary_folder.h"
 
 namespace eventgan {
 namespace {
@@ -22,17 +19,6 @@ TEST(Image, PixelsAreRoundedAndColoursMix) {
   EXPECT_FLOAT_EQ(middle.blue, 25);
   EXPECT_FLOAT_EQ(middle.green, 125);
   EXPECT_FLOAT_EQ(middle.red, 150);
-}
-
-TEST(Image, PngHoldsThePixels) {
-  const testing::TemporaryFolder folder;
-  Image image = black_image({4, 5});
-  set_pixel(image, 3, 2, {10, 20, 30});
-  write_png(image, folder / "p.png");
-  const cv::Mat read = cv::imread((folder / "p.png").string());
-  ASSERT_EQ(read.size(), cv::Size(5, 4));
-  EXPECT_EQ(read.at<cv::Vec3b>(2, 3), cv::Vec3b(10, 20, 30));
-  EXPECT_EQ(read.at<cv::Vec3b>(2, 2), cv::Vec3b(0, 0, 0));
 }
 
 TEST(Texture, CellsAreUniformAndTheSameEveryTime) {

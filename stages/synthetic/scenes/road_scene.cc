@@ -1,4 +1,4 @@
-#include "stages/synthetic/road_scene.h"
+#include "stages/synthetic/scenes/road_scene.h"
 
 #include <algorithm>
 #include <array>
@@ -8,8 +8,8 @@
 #include <optional>
 
 #include "manifests/values/counter_random.h"
-#include "stages/synthetic/camera.h"
-#include "stages/synthetic/vehicle.h"
+#include "stages/synthetic/scenes/camera.h"
+#include "stages/synthetic/scenes/vehicle.h"
 
 namespace eventgan {
 namespace {
