@@ -88,10 +88,10 @@ TASKS["cars_motion"] = dataclasses.replace(
 TASKS |= {f"{name}_scope": dataclasses.replace(TASKS[name], steps=900,
                                                methods=("EventGAN 8, layers", "EventGAN 8, layers, motion"))
           for name in ("persons", "cars", "joints")}
-# `train_detector.py --tune`: how many labelled windows of a camera bring what, tested on its other clips
-TASKS["tuning"] = dataclasses.replace(
-    TASKS["persons"], learnt={"cdehp": 48 + 60},  # the first two of four clips, as of joints
-    methods=("ESIM, layers",), windows=(5, 10, 20, 50, 108), steps=600)
+# `--tune` of the trainers: how many labelled windows of a camera bring what, tested on its other clips
+TASKS |= {task: dataclasses.replace(TASKS[name], learnt={"cdehp": 48 + 60},  # the first two of four clips
+                                    methods=("ESIM, layers",), windows=(5, 10, 20, 50, 108), steps=600)
+          for task, name in (("tuning", "persons"), ("joints_tuning", "joints"))}
 
 Results = dict[str, list[dict[str, Any]]]  # by row, for each seed, what train_and_test gives
 
@@ -204,7 +204,7 @@ def train(args: argparse.Namespace, row: Row, seed: int) -> nn.Module:
         run = argparse.Namespace(out=str(folder), batch=BATCH, lr=rate, steps=args.steps or row.steps, epochs=None,
                                  minutes=None, every=10_000, seed=seed, workers=0, device="cpu",
                                  pretrained=str(_run_folder(args, row.base, seed) / "weights.pt") if row.base else None,
-                                 classes=task.classes, last_layer=row.base is not None,
+                                 classes=task.classes, last_layer=row.base is not None and row.windows is None,
                                  bfloat16=row.norm == "batch" and training.has_bfloat16())
         augmentation = row.augmentation if task.polarity else Unsigned(**dataclasses.asdict(row.augmentation))
         task.network.train(run, items, augmentation, norm)

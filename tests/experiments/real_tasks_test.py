@@ -321,6 +321,7 @@ def test_windows_of_the_first_clips_are_learnt_and_the_others_tested(tmp_path, m
     seen = []
 
     def train(run, learnt, *_):
+        assert not run.last_layer
         seen.append((run.steps, run.lr / real_cameras.RATE, run.pretrained is not None,
                      [sum(item["id"].startswith(kind) for item in learnt) for kind in ("photograph", "window")],
                      len({item["id"] for item in learnt} & {f"window {i}" for i in range(3)})))
@@ -342,7 +343,7 @@ def test_windows_of_the_first_clips_are_learnt_and_the_others_tested(tmp_path, m
 
 
 @nightly
-@pytest.mark.parametrize("task", ["cars", "joints", "tuning"])
+@pytest.mark.parametrize("task", ["cars", "joints", "tuning", "joints_tuning"])
 def test_what_learnt_from_photographs_finds_something_in_real_events(tmp_path, task):
     if not (DATA / "labelled_frames").is_dir() or not (DATA / "real_labels").is_dir():
         pytest.skip("no ../shared/data")
