@@ -426,7 +426,9 @@ def load_fitting(model: nn.Module, path: str | None) -> None:
     if not fitting:
         sys.exit(f"expected weights that fit the model, such as {next(iter(own))}, got none, in {path}")
     model.load_state_dict(fitting, strict=False)
-    print(f"{len(fitting)} of the model's {len(own)} tensors loaded from {path}")
+    others = [name for name in own if name not in fitting]
+    print(f"{len(fitting)} of the model's {len(own)} tensors loaded from {path}"
+          + (f", others begin anew, such as {others[0]}" if others else ""))
 
 
 def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optimizer, loader: DataLoader,

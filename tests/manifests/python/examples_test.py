@@ -543,6 +543,20 @@ def test_a_file_of_something_else_has_no_weights_that_fit(tmp_path, monkeypatch)
             training.load_fitting(torch.nn.Linear(1, 1), tmp_path / "other.pt")
 
 
+def test_what_weights_do_not_fit_begins_anew_and_is_named(tmp_path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import training
+
+    other, model = torch.nn.Linear(3, 2), torch.nn.Linear(4, 2)
+    torch.save(other.state_dict(), tmp_path / "w.pt")
+    training.load_fitting(model, tmp_path / "w.pt")
+    assert torch.equal(model.bias, other.bias)
+    training.load_fitting(other, tmp_path / "w.pt")
+    assert capsys.readouterr().out.splitlines() == [
+        f"1 of the model's 2 tensors loaded from {tmp_path / 'w.pt'}, others begin anew, such as weight",
+        f"2 of the model's 2 tensors loaded from {tmp_path / 'w.pt'}"]
+
+
 def test_what_is_to_be_run_can_be_run():
     for path in (*EXAMPLES.glob("*.py"), *(SOURCE / "tests" / "experiments").glob("*.py")):
         text = path.read_text()
