@@ -25,6 +25,7 @@ import layers
 import numerics
 import on_the_fly
 import pair_counts
+import photographs
 import python_call
 import reading
 import scopes
@@ -41,8 +42,8 @@ from measuring.report import write_lines
 
 PARTS = {"engines": engines, "intra_op": intra_op, "layers": layers, "numerics": numerics, "stages": stages,
          "whole_conversion": whole_conversion, "image_sizes": image_sizes, "pair_counts": pair_counts,
-         "threads": threads, "storage": storage, "reading": reading, "on_the_fly": on_the_fly,
-         "python_call": python_call, "slow_disk": slow_disk, "scopes": scopes, "v2e": v2e}
+         "threads": threads, "photographs": photographs, "storage": storage, "reading": reading,
+         "on_the_fly": on_the_fly, "python_call": python_call, "slow_disk": slow_disk, "scopes": scopes, "v2e": v2e}
 
 
 def measure_part(bench, name, out):
@@ -54,7 +55,7 @@ def measure_part(bench, name, out):
     for what, why in part.missing.items():
         print(f"not measured: {what} ({why})", file=sys.stderr)
     measured = {"command": shlex.join(sys.argv), "settings": PARTS[name].SETTINGS[bench.effort],
-                "frames": original_frames(bench)[1], **description(bench, part.libraries)}
+                "frames": part.frames or original_frames(bench)[1], **description(bench, part.libraries)}
     tables = [table for table in part.tables if table.rows]
     for table in tables:
         table.write(out)

@@ -35,7 +35,7 @@ class Benchmarks(program.InFolder):
         self.assertIn("not measured: v2e (", said)
         expected = {"engines", "engine_errors", "intra_op", "layers", "stability", "saturation", "subnormals", "stages",
                     "whole_conversion", "image_sizes", "pair_counts", "threads", "storage", "reading", "on_the_fly",
-                    "python_call", "python_start", "python_workers", "slow_disk", "scopes"}
+                    "python_call", "python_start", "python_workers", "slow_disk", "scopes", "photographs"}
         for name in ("slow_disk", "on_the_fly", "saturation"):  # without /dev/fuse, PyTorch or VNNI
             if name not in tables:
                 self.assertIn("not measured: ", said)

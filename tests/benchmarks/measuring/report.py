@@ -32,6 +32,7 @@ class Part:
     tables: list
     missing: dict = dataclasses.field(default_factory=dict)  # why it was not measured, by name
     libraries: set = dataclasses.field(default_factory=set)  # with their versions, as far as the part knows them
+    frames: str = ""  # if they are not those of original_frames
 
 
 def _parts(cell):
