@@ -425,9 +425,16 @@ void list_errors(Fields& fields, ErrorSpec& spec) {
 }
 
 /// Events are the only volumes that a dataset of events can give, and no other dataset has them.
+/// ESIM moves an image of a sequence as it likes, and not as its flow says.
 void check_kind(const JobManifest& manifest, const std::vector<StrictValue>& sources) {
   const bool wants_events = !needs_frames(manifest.generator.kind);
   for (std::size_t i = 0; i < sources.size(); ++i) {
+    const SourceSpec& source = manifest.sources[i];
+    if (manifest.generator.kind == GeneratorKind::kEsim && source.flow && !source.pairs.stills &&
+        !has_events(source.dataset)) {
+      sources[i].object().at("flow").fault(
+          "no such key of sequences for generator.kind \"esim\", which draws a motion of its own");
+    }
     if (has_events(manifest.sources[i].dataset) == wants_events) continue;
     sources[i].object().at("dataset").fault(
         wants_events ? fmt::format("a dataset of events ({}), since generator.kind is \"events\"",
@@ -472,6 +479,12 @@ void add_rules(Fields& fields) {
   events["then"]["properties"]["sources"] = sources(&DatasetRow::has_events);
   events["else"]["properties"]["sources"] = sources(has_none);
   fields.rule(events);
+  fields.rule(R"({"if": {"required": ["generator"], "properties": {"generator": {
+                      "required": ["kind"], "properties": {"kind": {"const": "esim"}}}}},
+                  "then": {"properties": {"sources": {"items": {
+                      "if": {"required": ["flow"], "properties": {"flow": {"const": true}}},
+                      "then": {"required": ["pairs"], "properties": {"pairs": {
+                          "required": ["from"], "properties": {"from": {"const": "stills"}}}}}}}}}})");
 }
 
 constexpr char kImageField[] =

@@ -56,6 +56,11 @@ class HalfSize {
   std::vector<std::int8_t> quarters_;
 };
 
+constexpr double kFlowSteps = 128;  // of a pixel of motion
+
+/// Whether an image of flow can tell so many pixels of motion, in either direction.
+bool fits_flow(float px) { return std::abs(std::nearbyint(kFlowSteps * px)) < 32768; }
+
 /// dsec/SPLIT/RECORDING/events/left/events.h5 and events_2x.h5, images/timestamps.txt and
 /// left/distorted, windows.txt, and of sources with boxes object_detections/left/tracks.npy: what
 /// the scripts of DSEC (github.com/uzh-rpg/DSEC, commit 9ddd029: EventSlicer), of DSEC-Det
@@ -87,6 +92,19 @@ class DsecExporter : public RecordingsExporter {
         look_for_frames(work, *shard);
     }
     RecordingsExporter::finish(work, shards);
+  }
+
+  void account(const OutgoingSample& sample, LeftOut& left_out) const override {
+    RecordingsExporter::account(sample, left_out);
+    const PixelFlow& flow = sample.labels.flow;
+    const std::size_t pixels = flow.valid.size();
+    std::int64_t far = 0;
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const bool fits = fits_flow(flow.px[i]) && fits_flow(flow.px[pixels + i]);
+      far += flow.valid[i] != 0 && !fits ? 1 : 0;
+    }
+    if (far > 0)
+      left_out["pixels of flow of 256 px or more, which DSEC's images do not hold"] += far;
   }
 
   std::vector<std::string> notes() const override {
@@ -226,18 +244,17 @@ class DsecExporter : public RecordingsExporter {
    private:
     /// x and y as 2^15 + 128 px, and 1 where they are valid.
     static std::vector<std::uint16_t> numbers_of(const PixelFlow& flow, double sign) {
-      constexpr double kZero = 32768, kSteps = 128;
+      constexpr double kZero = 32768;
       const std::size_t pixels = flow.valid.size();
       std::vector<std::uint16_t> numbers;
       numbers.reserve(3 * pixels);
       for (std::size_t i = 0; i < pixels; ++i) {
-        bool fits = true;
-        for (const float px : {flow.px[i], flow.px[pixels + i]}) {
-          const double number = std::nearbyint(kZero + kSteps * sign * px);
-          fits &= number >= 0 && number < 2 * kZero;
+        const std::array px{flow.px[i], flow.px[pixels + i]};
+        for (const float one_px : px) {
+          const double number = kZero + std::nearbyint(kFlowSteps * sign * one_px);
           numbers.push_back(static_cast<std::uint16_t>(std::clamp(number, 0.0, 2 * kZero - 1)));
         }
-        numbers.push_back(fits && flow.valid[i] != 0);
+        numbers.push_back(std::ranges::all_of(px, fits_flow) && flow.valid[i] != 0);
       }
       return numbers;
     }

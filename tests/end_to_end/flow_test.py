@@ -70,6 +70,21 @@ class Flow(program.InFolder):
         self.assertEqual(sample, "000001_10")
         self.assertIn("in training/flow_occ/000001_10.png", reason)
 
+    def test_an_export_to_dsec_says_what_it_cannot_hold(self):
+        (self.folder / "training/image_2").mkdir(parents=True)
+        for frame in (10, 11):
+            cv2.imwrite(str(self.folder / f"training/image_2/000000_{frame}.png"), texture(16, 600))
+        flow = np.zeros((2, 16, 600))
+        flow[0, :8], flow[0, 8:] = 255, 256
+        self.write_flow("flow_occ/000000_10.png", flow, np.ones((16, 600)))
+        self.convert(manifest([{"dataset": "frames", "root": "training/image_2", "flow": True,
+                                "pairs": {"gaps": [1], "side": "after"}}], image={"preset": "mpii"})).close()
+        said = "".join(run("export", self.folder / "out", "--to", "dsec", "--out", self.folder / "dsec"))
+        self.assertIn("left out: pixels of flow of 256 px or more, which DSEC's images do not hold: 2752\n", said)
+        (written,) = self.folder.glob("dsec/dsec/train/*/flow/forward/000000.png")
+        valid = cv2.imread(str(written), cv2.IMREAD_UNCHANGED)[..., 0]
+        self.assertEqual([int(valid[:8].sum()), int(valid[8:].sum())], [8 * (600 - 255), 0])
+
     def test_of_mvsec_is_numpys(self):
         random = np.random.default_rng(2)
         flow = random.normal(0, 2, (2, 3, *SIZE))

@@ -380,9 +380,12 @@ def evaluate_flows(predictions: PathLike, samples: Samples) -> tuple[dict[str, A
         for name, i in labelled.items():
             sample = shards.sample(i, {"volume", "flow"})
             scored, flow = sample["flow_valid"] != 0, found[name]
-            if flow.shape != sample["flow"].shape or not np.isfinite(flow[:, scored]).all():
-                raise ValueError(f"expected finite numbers of shape {sample['flow'].shape}, got {flow.dtype} "
-                                 f"of shape {flow.shape}, in {predictions} (sample {name})")
+            if flow.shape != sample["flow"].shape:
+                raise ValueError(f"expected flow of shape {sample['flow'].shape}, got {flow.shape}, in {predictions} "
+                                 f"(sample {name})")
+            if not np.isfinite(flow[:, scored]).all():
+                raise ValueError(f"expected finite flow, got {np.count_nonzero(~np.isfinite(flow[:, scored]))} NaN or "
+                                 f"infinite numbers, in {predictions} (sample {name})")
             yield flow, sample["flow"], scored & (sample["volume"] != 0).any(0) if at_events else scored
 
     counts = {"samples": len(labelled), "not_of_these_samples": len(names - labelled.keys())}

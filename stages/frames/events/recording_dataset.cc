@@ -215,6 +215,10 @@ class RecordingDataset final : public Dataset {
         entry = recordings_.erase(entry);
         continue;
       }
+      if (const auto& flow = entry->second.flow; flow && !flow->warning.empty()) {
+        notes_.push_back(flow->warning);
+        warnings_.push_back(flow->warning);
+      }
       if (entry->second.is_window()) read_window(entry->second);
       fit_boxes(entry->second);
       ++entry;

@@ -29,6 +29,8 @@ namespace fs = std::filesystem;
 
 using Span = std::array<double, 2>;
 
+constexpr std::string_view kMvsecFlow = "_gt_flow_dist.npz";
+
 void check_times(const std::vector<Span>& times_s, const std::string& place) {
   const Span* before = nullptr;
   for (const Span& span : times_s) {
@@ -95,7 +97,12 @@ std::optional<RecordingFlow> open_dsec_flow(const fs::path& events_file,
   if (side.parent_path().filename() != "events") return std::nullopt;
   const fs::path flow = side.parent_path().parent_path() / "flow";
   const fs::path folder = flow / "forward", times = flow / "forward_timestamps.txt";
-  if (!has_folder(folder) && !has_file(times)) return std::nullopt;
+  if (!has_folder(folder) && !has_file(times)) {
+    if (!has_folder(flow / "backward")) return std::nullopt;
+    throw InputError(
+        "expected flow/forward, got flow/backward alone, which \"side\": \"before\" makes, in " +
+        flow.parent_path().string());
+  }
   require_left(side.filename() == "left" ? options.camera : side.filename().string(), "DSEC", flow);
   const fs::path map = side / "rectify_map.h5";
   if (!options.rectify && has_file(map) && moves_events(map)) {
@@ -105,6 +112,13 @@ std::optional<RecordingFlow> open_dsec_flow(const fs::path& events_file,
         flow.string());
   }
   RecordingFlow found{read_times(times), nullptr, {times}};
+  if (!options.rectify && !has_file(map)) {
+    found.warning =
+        "expected rectify_map.h5 beside the events, since DSEC's flow is of the rectified view, "
+        "got "
+        "none: flow is wrong unless these events are, too, in " +
+        flow.string();
+  }
   std::vector<fs::path> images;
   for (const std::string& name : list_folder(folder).files) {
     if (fs::path(name).extension() == ".png") images.push_back(folder / name);
@@ -192,7 +206,7 @@ std::optional<RecordingFlow> open_mvsec_flow(const fs::path& events_file, ImageS
   std::string name = events_file.stem().string();
   constexpr std::string_view kData = "_data";
   if (name.ends_with(kData)) name.resize(name.size() - kData.size());
-  const fs::path file = events_file.parent_path() / (name + "_gt_flow_dist.npz");
+  const fs::path file = events_file.parent_path() / (name + std::string(kMvsecFlow));
   if (!has_file(file)) return std::nullopt;
   require_left(options.camera, "MVSEC", file);
   try {
@@ -205,6 +219,8 @@ std::optional<RecordingFlow> open_mvsec_flow(const fs::path& events_file, ImageS
 }
 
 }  // namespace
+
+bool is_mvsec_flow(const fs::path& file) { return file.filename().string().ends_with(kMvsecFlow); }
 
 std::optional<std::size_t> RecordingFlow::map_from(double time_s, double tolerance_s) const {
   const auto map = std::ranges::lower_bound(times_s, time_s - tolerance_s, {},

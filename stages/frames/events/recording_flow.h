@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "manifests/values/job.h"
@@ -20,6 +21,7 @@ struct RecordingFlow {
   /// called from several threads.
   std::function<SourceFlow(std::size_t)> read;
   std::vector<std::filesystem::path> files;  ///< that it comes from
+  std::string warning = {};  ///< what may be wrong with it, "..., in PATH"; empty: nothing
 
   /// The map that begins within so many seconds of a time; none if there is none.
   std::optional<std::size_t> map_from(double time_s, double tolerance_s) const;
@@ -31,11 +33,15 @@ struct RecordingFlow {
 ///   MVSEC   NAME_gt_flow_dist.npz beside NAME_data.hdf5 (timestamps [N], x_flow_dist and
 ///           y_flow_dist [N, y, x]: from each time to the next one; known where it is finite and
 ///           not 0), of the left camera.
-/// Neither tells what is hidden later. None of others. `events_file`: as event_file has it, on
-/// disk; `size`: the recording's. Throws InputError "expected X, got Y, in PATH" if it is damaged,
-/// or another view's.
+/// Neither tells what is hidden later. Of DSEC's events without `rectify` and rectify_map.h5 a
+/// warning says that they may not be of its view. None of others. `events_file`: as event_file has
+/// it, on disk; `size`: the recording's. Throws InputError "expected X, got Y, in PATH" if it is
+/// damaged, or another view's.
 std::optional<RecordingFlow> open_recording_flow(RecordingFormat format,
                                                  const std::filesystem::path& events_file,
                                                  ImageSize size, const RecordingOptions& options);
+
+/// Whether a file is such a NAME_gt_flow_dist.npz.
+bool is_mvsec_flow(const std::filesystem::path& file);
 
 }  // namespace eventgan

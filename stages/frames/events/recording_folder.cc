@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "stages/frames/events/recording_flow.h"
 #include "stages/frames/events/recording_labels.h"
 #include "stages/frames/listing/source_folders.h"
 #include "stages/frames/naming/found_frames.h"
@@ -95,6 +96,10 @@ class FolderSearch {
     for (const fs::path name : folder.files_in("")) {
       if (const auto format = find_recording_format(folder.on_disk(name.string()), options_)) {
         add(name.stem().string(), folder.written(name.string()), *format);
+        continue;
+      }
+      if (is_mvsec_flow(name)) {  // of a recording in another file
+        if (!spec.flow) left_out.push_back(name.string());
         continue;
       }
       const RecordingFault fault = recording_fault(folder.on_disk(name.string()), options_);

@@ -248,7 +248,8 @@ std::string deeper_data(const fs::path& root) {
                                 look_at(folders[i], DatasetKind::kRecording, /*own_too=*/false);
     if (!has_images && !has_recordings) {
       for (const std::string& name : listing.folders) {
-        if (!name.starts_with('.')) folders.push_back(folders[i] / name);
+        const bool is_flow = std::ranges::find(kKittiFlow, name) != kKittiFlow.end();
+        if (!name.starts_with('.') && !is_flow) folders.push_back(folders[i] / name);
       }
       continue;
     }

@@ -369,8 +369,8 @@ def test_flows_of_a_folder(folder, tmp_path):
     assert dense["pixels"] == 35 and at_events["pixels"] == there.sum()
     assert dense["aee"] == pytest.approx(0.5) and dense["npe_1"] == 0
     for flows, message in [({"000000": still}, "expected a flow of each of 1 samples, got none of 1"),
-                           ({"000004": still[:1]}, r"shape \(2, 6, 8\), got float64 of shape \(1, 6, 8\)"),
-                           ({"000004": still * np.nan}, "expected finite numbers")]:
+                           ({"000004": still[:1]}, r"expected flow of shape \(2, 6, 8\), got \(1, 6, 8\)"),
+                           ({"000004": still * np.nan}, "expected finite flow, got 70 NaN or infinite numbers")]:
         with pytest.raises(ValueError, match=message + r".*found\.npz \(sample 000004\)"):
             evaluated(**flows)
     write(tmp_path / "found.npz", [])

@@ -93,6 +93,12 @@ TEST_F(DsecFlow, IsOfTheRectifiedLeftView) {
   spec_.root = "seq";
   fs::rename(at("seq/events/right"), at("seq/events/left"));
   spec_.recording.camera = "left";
+  const std::string doubt =
+      "expected rectify_map.h5 beside the events, since DSEC's flow is of the rectified view, got "
+      "none: flow is wrong unless these events are, too, in " +
+      at("seq/flow").string();
+  EXPECT_THAT(open()->warnings(), ElementsAre(doubt));
+  EXPECT_THAT(open()->notes(), Contains(doubt));
   std::vector<float> places;  // a column to the right
   for (int y = 0; y < 3; ++y) {
     for (int x = 0; x < 4; ++x) places.insert(places.end(), {x + 1.f, float(y)});
@@ -107,6 +113,12 @@ TEST_F(DsecFlow, IsOfTheRectifiedLeftView) {
   for (std::size_t i = 0; i < places.size(); i += 2) --places[i];
   testing::write_hdf5(at("seq/events/left/rectify_map.h5"), {{"rectify_map", {{3, 4, 2}, places}}});
   EXPECT_THAT(ids_of(*open()), SizeIs(2));
+  EXPECT_THAT(open()->warnings(), IsEmpty());
+
+  fs::rename(at("seq/flow/forward"), at("seq/flow/backward"));
+  fs::remove(at("seq/flow/forward_timestamps.txt"));
+  refused("expected flow/forward, got flow/backward alone, which \"side\": \"before\" makes",
+          "seq");
 }
 
 TEST_F(DsecFlow, NamesWhatIsWrong) {
@@ -150,13 +162,6 @@ TEST_F(DsecFlow, LiesBesideTheFolderOfEvents) {
   spec_.root = "other/a/events.h5";
   EXPECT_THROWS(open(), InputError, "expected flow beside a recording of DSEC or MVSEC, got none",
                 "other/a/events.h5");
-}
-
-TEST_F(DsecFlow, BackwardAloneIsNone) {
-  fs::rename(at("seq/flow/forward"), at("seq/flow/backward"));
-  fs::remove(at("seq/flow/forward_timestamps.txt"));
-  EXPECT_THROWS(open(), InputError, "expected flow beside a recording of DSEC or MVSEC, got none",
-                "seq");
 }
 
 TEST_F(DsecFlow, OfATimeWithoutEventsIsAFaultAndOfALongOneNoted) {
@@ -223,6 +228,10 @@ TEST_F(MvsecFlow, LastsFromEachTimeToTheNext) {
   EXPECT_EQ(flow.valid, (std::vector<std::uint8_t>{1, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1}));
   EXPECT_EQ(flow_of(*dataset).flow.valid[0], 0) << "0, 0 is nothing";
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("drive_gt_flow_dist.npz"));
+  spec_.root = ".";
+  EXPECT_THAT(open()->notes(), Not(Contains(HasSubstr("drive_gt_flow_dist.npz"))));
+  spec_.flow = false;
+  EXPECT_THAT(open()->notes(), Contains(HasSubstr("left out in .: drive_gt_flow_dist.npz")));
 }
 
 TEST_F(MvsecFlow, NamesWhatIsWrong) {

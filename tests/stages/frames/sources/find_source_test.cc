@@ -201,6 +201,13 @@ TEST_F(FindSource, OfSeveralNamesAllWithTheLineForOneManifest) {
   }
 }
 
+TEST_F(FindSource, KittisFlowIsNoPhotographs) {
+  touch({"training/flow_noc/000000_10.png", "training/flow_occ/000000_10.png",
+         "training/image_2/000000_10.png"});
+  EXPECT_THROWS(find("training"), InputError,
+                EndsWith("run eventgan convert \"" + at("training/image_2").string() + "\""));
+}
+
 TEST_F(FindSource, ImagesThatLieTooDeepAreNamed) {
   write("deep/images/train/camA/day1/1.jpg");
   write("deep/labels/train/camA/day1/1.txt", "0 .5 .5 .2 .2\n");
