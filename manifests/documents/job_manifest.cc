@@ -181,7 +181,13 @@ void list_selection(Fields& fields, SelectionSpec& spec) {
               "sequence. Frames without a sequence count by themselves.");
 }
 
-/// Flow is that of stills, or read: from an image to the one after it.
+/// Whether ground truth of flow may lie beside the frames: from an image to the one after it.
+bool is_flow_pair(const SourceSpec& spec) {
+  return spec.dataset == DatasetKind::kFrames && !spec.pairs.stills &&
+         spec.pairs.side == PairSide::kAfter && spec.pairs.gaps == std::vector{1};
+}
+
+/// Flow is that of stills, or read.
 void list_flow(Fields& fields, SourceSpec& spec, bool has_others) {
   const auto flow =
       fields
@@ -190,8 +196,8 @@ void list_flow(Fields& fields, SourceSpec& spec, bool has_others) {
           .find("flow", spec.flow, booleans(),
                 "writes how each pixel moves from the one image of its pair to the other, and "
                 "where both show it: /labels/flow (manifests/guides/shard_format.md). Of stills it "
-                "is exact; of frames and recordings it is the ground truth beside them (KITTI, "
-                "DSEC, MVSEC).");
+                "is exact; of frames (not with esim) and recordings it is the ground truth beside "
+                "them (KITTI, DSEC, MVSEC).");
   fields.rule(R"({"if": {"required": ["flow"]},
                   "then": {"anyOf": [
                       {"required": ["pairs"], "properties": {"pairs": {
@@ -208,8 +214,7 @@ void list_flow(Fields& fields, SourceSpec& spec, bool has_others) {
     if (has_others) {
       flow->fault("no such key beside annotations, window_s, window_events or label_at");
     }
-  } else if (spec.dataset != DatasetKind::kFrames || spec.pairs.side != PairSide::kAfter ||
-             spec.pairs.gaps != std::vector{1}) {
+  } else if (!is_flow_pair(spec)) {
     flow->fault(
         R"(no such key for these pairs (only from "stills", or of frames with gaps [1] and side "after"))");
   }
@@ -425,17 +430,17 @@ void list_errors(Fields& fields, ErrorSpec& spec) {
 }
 
 /// Events are the only volumes that a dataset of events can give, and no other dataset has them.
-/// ESIM moves an image of a sequence as it likes, and not as its flow says.
+/// ESIM draws a motion of its own for an image of a sequence: the flow of the two images is not
+/// that of its events.
 void check_kind(const JobManifest& manifest, const std::vector<StrictValue>& sources) {
   const bool wants_events = !needs_frames(manifest.generator.kind);
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const SourceSpec& source = manifest.sources[i];
-    if (manifest.generator.kind == GeneratorKind::kEsim && source.flow && !source.pairs.stills &&
-        !has_events(source.dataset)) {
+    if (manifest.generator.kind == GeneratorKind::kEsim && source.flow && is_flow_pair(source)) {
       sources[i].object().at("flow").fault(
           "no such key of sequences for generator.kind \"esim\", which draws a motion of its own");
     }
-    if (has_events(manifest.sources[i].dataset) == wants_events) continue;
+    if (has_events(source.dataset) == wants_events) continue;
     sources[i].object().at("dataset").fault(
         wants_events ? fmt::format("a dataset of events ({}), since generator.kind is \"events\"",
                                    fmt::join(words_where(kDatasets, &DatasetRow::has_events), ", "))

@@ -59,9 +59,9 @@ def photographs(bench, most):
             lines = [*csv.DictReader(file)]
         names = [*dict.fromkeys(line["image"] for line in lines)][:most]
         link_frames(folder / "images", [real / "images" / name for name in names], len(names))
-        numbers = {name: index for index, name in enumerate(names)}
-        rows = [[f"{numbers[line['image']]:06d}.jpg", *(line[key] for key in header.split(",")[1:])]
-                for line in lines if line["image"] in numbers]
+        links = {name: f"{index:06d}{(real / name).suffix}" for index, name in enumerate(names)}
+        rows = [[links[line["image"]], *(line[key] for key in header.split(",")[1:])]
+                for line in lines if line["image"] in links]
     else:
         originals = original_frames(bench)[0][:most]
         link_frames(folder / "images", originals, len(originals))

@@ -114,7 +114,7 @@ class Row:
     images: int | None = None  # so many, drawn by the seed; None: all
     norm: str = "batch"
     signed: bool = True        # or the volume
-    base: Row | None = None    # it has that row's weights, and learns its last layer anew
+    base: Row | None = None    # it begins with that row's weights and learns its last layer, or with `windows` all
     # so many real windows, drawn by the seed: a row with a base is tuned on these, one without sees nothing else
     windows: int | None = None
 
@@ -152,7 +152,8 @@ def in_layers() -> list[Row]:
 
 def task_rows(task: Task) -> list[Row]:
     """Of a task other than persons: its methods; where it has windows to learn from, a network that has learnt from
-    these alone, and those that have tuned their last layer on them."""
+    these alone, and those that have been tuned on them: on some windows all layers, on all of a recording's the last
+    one."""
     found = [Row(f"{name}, augmented, {task.steps} steps", (name,), steps=task.steps) for name in task.methods]
     if task.windows:
         base, real = found[0], tuple(f"real {name}" for name in task.learnt)

@@ -150,8 +150,8 @@ class FlowDataset(Dataset):
         sample = self._shards.sample(index, {"volume", "pair", "flow"})
         name, position = sample["pair"]["sample_id"], float(sample["pair"]["label_position"])
         if "flow" not in sample or np.isnan(sample["flow"]).all():
-            raise ValueError(f'expected a sample with flow ("flow": true in its source; shards[indexes] are those with '
-                             f'some), got none, in {sample["shard"]} ({name})')
+            raise ValueError(f'expected a sample with flow ("flow": true in its source; take others, shards[[0, 2]]), '
+                             f'got none, in {sample["shard"]} ({name})')
         volume, flow, valid = _decoded(sample), sample["flow"].astype(np.float32), sample["flow_valid"] != 0
         augmentation = self._augmentation
         if augmentation and augmentation.reverse:

@@ -215,9 +215,8 @@ class RecordingDataset final : public Dataset {
         entry = recordings_.erase(entry);
         continue;
       }
-      if (const auto& flow = entry->second.flow; flow && !flow->warning.empty()) {
-        notes_.push_back(flow->warning);
-        warnings_.push_back(flow->warning);
+      if (entry->second.flow && entry->second.flow->is_of_unknown_view) {
+        of_unknown_view_.push_back(entry->second.path);
       }
       if (entry->second.is_window()) read_window(entry->second);
       fit_boxes(entry->second);
@@ -278,6 +277,13 @@ class RecordingDataset final : public Dataset {
                               "are outside or without a size (their times stay)",
                               cut_boxes_, left_out_boxes_)));
       if (left_out_boxes_ > 0) warnings_.push_back(notes_.back());
+    }
+    if (!of_unknown_view_.empty()) {
+      notes_.push_back(
+          counted(of_unknown_view_, "recording",
+                  " of DSEC with flow of the rectified view but no rectify_map.h5: flow "
+                  "is wrong unless the events are rectified, too"));
+      warnings_.push_back(notes_.back());
     }
     if (!without_events_.empty()) {
       notes_.push_back(counted(without_events_, "recording",
@@ -423,7 +429,8 @@ class RecordingDataset final : public Dataset {
   std::vector<LabelledFrame> labelled_;
   double listed_s_ = 0;  ///< the time of the last one
   std::size_t cut_boxes_ = 0, left_out_boxes_ = 0, empty_volumes_ = 0;
-  std::vector<std::string> files_of_fitted_boxes_, without_events_;  ///< as FrameRef::path
+  std::vector<std::string> files_of_fitted_boxes_, without_events_,
+      of_unknown_view_;                        ///< as FrameRef::path
   std::vector<std::string> annotation_files_;  ///< as FrameRef::path is written
   std::vector<std::string> notes_;
   std::vector<std::string> warnings_;

@@ -23,13 +23,17 @@
 #include "stages/recordings/readers/recording.h"
 
 namespace eventgan {
+
+std::string mvsec_flow_name(const std::filesystem::path& events_file) {
+  std::string name = events_file.stem().string();
+  constexpr std::string_view kData = "_data";
+  if (name.ends_with(kData)) name.resize(name.size() - kData.size());
+  return name + "_gt_flow_dist.npz";
+}
+
 namespace {
 
 namespace fs = std::filesystem;
-
-using Span = std::array<double, 2>;
-
-constexpr std::string_view kMvsecFlow = "_gt_flow_dist.npz";
 
 void check_times(const std::vector<Span>& times_s, const std::string& place) {
   const Span* before = nullptr;
@@ -91,7 +95,7 @@ std::vector<Span> read_times(const fs::path& file) {
   return times_s;
 }
 
-std::optional<RecordingFlow> open_dsec_flow(const fs::path& events_file,
+std::optional<RecordingFlow> open_dsec_flow(const fs::path& events_file, ImageSize sensor,
                                             const RecordingOptions& options) {
   const fs::path side = events_file.parent_path();  // SEQUENCE/events/left
   if (side.parent_path().filename() != "events") return std::nullopt;
@@ -105,20 +109,14 @@ std::optional<RecordingFlow> open_dsec_flow(const fs::path& events_file,
   }
   require_left(side.filename() == "left" ? options.camera : side.filename().string(), "DSEC", flow);
   const fs::path map = side / "rectify_map.h5";
-  if (!options.rectify && has_file(map) && moves_events(map)) {
+  if (!options.rectify && has_file(map) && moves_events(map, sensor)) {
     throw InputError(
         "expected \"rectify\": true, since DSEC's flow is of the rectified view, got "
         "false, in " +
         flow.string());
   }
   RecordingFlow found{read_times(times), nullptr, {times}};
-  if (!options.rectify && !has_file(map)) {
-    found.warning =
-        "expected rectify_map.h5 beside the events, since DSEC's flow is of the rectified view, "
-        "got "
-        "none: flow is wrong unless these events are, too, in " +
-        flow.string();
-  }
+  found.is_of_unknown_view = !options.rectify && !has_file(map);
   std::vector<fs::path> images;
   for (const std::string& name : list_folder(folder).files) {
     if (fs::path(name).extension() == ".png") images.push_back(folder / name);
@@ -203,10 +201,7 @@ class MvsecFlow {
 
 std::optional<RecordingFlow> open_mvsec_flow(const fs::path& events_file, ImageSize size,
                                              const RecordingOptions& options) {
-  std::string name = events_file.stem().string();
-  constexpr std::string_view kData = "_data";
-  if (name.ends_with(kData)) name.resize(name.size() - kData.size());
-  const fs::path file = events_file.parent_path() / (name + std::string(kMvsecFlow));
+  const fs::path file = events_file.parent_path() / mvsec_flow_name(events_file);
   if (!has_file(file)) return std::nullopt;
   require_left(options.camera, "MVSEC", file);
   try {
@@ -220,8 +215,6 @@ std::optional<RecordingFlow> open_mvsec_flow(const fs::path& events_file, ImageS
 
 }  // namespace
 
-bool is_mvsec_flow(const fs::path& file) { return file.filename().string().ends_with(kMvsecFlow); }
-
 std::optional<std::size_t> RecordingFlow::map_from(double time_s, double tolerance_s) const {
   const auto map = std::ranges::lower_bound(times_s, time_s - tolerance_s, {},
                                             [](const Span& span) { return span[0]; });
@@ -232,7 +225,7 @@ std::optional<std::size_t> RecordingFlow::map_from(double time_s, double toleran
 std::optional<RecordingFlow> open_recording_flow(RecordingFormat format,
                                                  const fs::path& events_file, ImageSize size,
                                                  const RecordingOptions& options) {
-  if (format == RecordingFormat::kDsec) return open_dsec_flow(events_file, options);
+  if (format == RecordingFormat::kDsec) return open_dsec_flow(events_file, size, options);
   if (format == RecordingFormat::kMvsec) return open_mvsec_flow(events_file, size, options);
   return std::nullopt;
 }

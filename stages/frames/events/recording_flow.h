@@ -14,14 +14,17 @@
 
 namespace eventgan {
 
+/// Begin (exclusive) and end of a window in seconds.
+using Span = std::array<double, 2>;
+
 /// Ground truth of optical flow of a recording: maps, each from one time to another.
 struct RecordingFlow {
-  std::vector<std::array<double, 2>> times_s;  ///< from and to of each; ascending, from before to
+  std::vector<Span> times_s;  ///< from and to of each; ascending, from before to
   /// A map by its number, at the pixels and the time that it begins at. Throws InputError. May be
   /// called from several threads.
   std::function<SourceFlow(std::size_t)> read;
   std::vector<std::filesystem::path> files;  ///< that it comes from
-  std::string warning = {};  ///< what may be wrong with it, "..., in PATH"; empty: nothing
+  bool is_of_unknown_view = false;  ///< nothing tells whether the events are rectified, as it is
 
   /// The map that begins within so many seconds of a time; none if there is none.
   std::optional<std::size_t> map_from(double time_s, double tolerance_s) const;
@@ -33,15 +36,15 @@ struct RecordingFlow {
 ///   MVSEC   NAME_gt_flow_dist.npz beside NAME_data.hdf5 (timestamps [N], x_flow_dist and
 ///           y_flow_dist [N, y, x]: from each time to the next one; known where it is finite and
 ///           not 0), of the left camera.
-/// Neither tells what is hidden later. Of DSEC's events without `rectify` and rectify_map.h5 a
-/// warning says that they may not be of its view. None of others. `events_file`: as event_file has
+/// Neither tells what is hidden later. DSEC's needs `rectify`, unless rectify_map.h5 moves no
+/// event or is not there. None of others. `events_file`: as event_file has
 /// it, on disk; `size`: the recording's. Throws InputError "expected X, got Y, in PATH" if it is
 /// damaged, or another view's.
 std::optional<RecordingFlow> open_recording_flow(RecordingFormat format,
                                                  const std::filesystem::path& events_file,
                                                  ImageSize size, const RecordingOptions& options);
 
-/// Whether a file is such a NAME_gt_flow_dist.npz.
-bool is_mvsec_flow(const std::filesystem::path& file);
+/// The name of the file that MVSEC's flow of a recording lies in, beside it.
+std::string mvsec_flow_name(const std::filesystem::path& events_file);
 
 }  // namespace eventgan

@@ -98,10 +98,6 @@ class FolderSearch {
         add(name.stem().string(), folder.written(name.string()), *format);
         continue;
       }
-      if (is_mvsec_flow(name)) {  // of a recording in another file
-        if (!spec.flow) left_out.push_back(name.string());
-        continue;
-      }
       const RecordingFault fault = recording_fault(folder.on_disk(name.string()), options_);
       if (fault.is_recording) {
         found_.unreadable.push_back(fault.reason);
@@ -120,6 +116,9 @@ class FolderSearch {
           fmt::join(titles, ", "), root.string(), reason.empty() ? "" : " (" + reason + ")"));
     }
     std::erase(left_out, yolo_names_file(root));
+    for (const auto& [name, file] : found_.recordings) {
+      if (spec.flow) std::erase(left_out, mvsec_flow_name(file.path));
+    }
     std::erase_if(left_out, [&](const fs::path& name) {  // labels, or told of as no such
       const auto recorded = found_.recordings.find(name.stem().string());
       return is_window_label_file(name) && recorded != found_.recordings.end() &&

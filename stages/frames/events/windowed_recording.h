@@ -1,11 +1,11 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "manifests/values/job.h"
@@ -17,10 +17,7 @@
 
 namespace eventgan {
 
-constexpr double kSameTime_s = 1e-6;  ///< what labels written with six decimals can lose
-
-/// Begin (exclusive) and end of a window in seconds.
-using Span = std::array<double, 2>;
+inline constexpr double kSameTime_s = 1e-6;  ///< what labels written with six decimals can lose
 
 /// A recording of a source, and where its windows are (open_recording_dataset has the rules).
 ///
@@ -41,8 +38,10 @@ struct WindowedRecording : FoundFile {
   /// Whether it is one window, whose labels have no time.
   bool is_window() const { return is_window_label_file(label_file); }
 
-  /// `path` starts from `base`. With `reads_flow` the flow beside it, if there is some. Throws
-  /// InputError if it does not open, or if nothing tells where its windows end.
+  /// `path` starts from `base`; `label_file` is known before. With `reads_flow` also the flow
+  /// beside it; if there is none, `flow` stays empty and nothing is said of windows. Throws
+  /// InputError if it or the flow does not open, if nothing tells where its windows end, or if
+  /// there are more than 10 million; `beside` is kept then.
   void open(const std::filesystem::path& base, const RecordingOptions& options, bool reads_flow);
 
   /// The last frame at or before the time; number -1 if there is none.

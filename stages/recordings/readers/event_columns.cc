@@ -355,17 +355,10 @@ std::vector<std::int32_t> read_rectify_map(const fs::path& path, ImageSize size)
 
 }  // namespace
 
-bool moves_events(const fs::path& rectify_map) {
-  const Hdf5Lock lock;
-  const Hdf5Handle file = open_recording_file(rectify_map);
-  const Hdf5Table table(file, "rectify_map", rectify_map.string());
-  const Dims& dims = table.dims();
-  if (!table.is_float() || dims.size() != 3 || dims[2] != 2) table.refuse("float [H, W, 2]");
-  std::vector<float> places(element_count(dims));
-  read_hdf5(table.place(), [&] { table.read({0, 0, 0}, dims, places.data()); });
-  for (std::size_t i = 0; i < places.size() / 2; ++i) {
-    const auto x = static_cast<float>(i % dims[1]), y = static_cast<float>(i / dims[1]);
-    if (places[2 * i] != x || places[2 * i + 1] != y) return true;  // NaN, too
+bool moves_events(const fs::path& rectify_map, ImageSize sensor) {
+  const std::vector<std::int32_t> target = read_rectify_map(rectify_map, sensor);
+  for (std::size_t i = 0; i < target.size(); ++i) {
+    if (target[i] != static_cast<std::int32_t>(i)) return true;
   }
   return false;
 }

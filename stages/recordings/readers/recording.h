@@ -103,9 +103,9 @@ std::vector<std::filesystem::path> event_companions(
     const std::filesystem::path& event_file, std::optional<RecordingFormat> format = std::nullopt,
     const RecordingOptions& options = {});
 
-/// Whether DSEC's rectify_map.h5 moves any event: one of a camera without distortion moves none.
-/// Throws InputError if it is damaged.
-bool moves_events(const std::filesystem::path& rectify_map);
+/// Whether DSEC's rectify_map.h5 moves an event of any of the sensor's pixels to another one.
+/// Throws InputError if it is damaged or of another size.
+bool moves_events(const std::filesystem::path& rectify_map, ImageSize sensor);
 
 /// Opens a recording of the format, or of what is found without one: reads the frames' times and
 /// checks that everything is there and fits together; where a frame's events end is looked up when

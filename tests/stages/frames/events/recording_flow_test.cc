@@ -93,12 +93,9 @@ TEST_F(DsecFlow, IsOfTheRectifiedLeftView) {
   spec_.root = "seq";
   fs::rename(at("seq/events/right"), at("seq/events/left"));
   spec_.recording.camera = "left";
-  const std::string doubt =
-      "expected rectify_map.h5 beside the events, since DSEC's flow is of the rectified view, got "
-      "none: flow is wrong unless these events are, too, in " +
-      at("seq/flow").string();
-  EXPECT_THAT(open()->warnings(), ElementsAre(doubt));
-  EXPECT_THAT(open()->notes(), Contains(doubt));
+  const auto doubted = Contains(HasSubstr("flow is wrong unless the events are rectified, too"));
+  EXPECT_THAT(open()->warnings(), doubted);
+  EXPECT_THAT(open()->notes(), doubted);
   std::vector<float> places;  // a column to the right
   for (int y = 0; y < 3; ++y) {
     for (int x = 0; x < 4; ++x) places.insert(places.end(), {x + 1.f, float(y)});
@@ -114,7 +111,28 @@ TEST_F(DsecFlow, IsOfTheRectifiedLeftView) {
   testing::write_hdf5(at("seq/events/left/rectify_map.h5"), {{"rectify_map", {{3, 4, 2}, places}}});
   EXPECT_THAT(ids_of(*open()), SizeIs(2));
   EXPECT_THAT(open()->warnings(), IsEmpty());
+}
 
+TEST_F(DsecFlow, AMapThatDoesNotFitIsNamed) {
+  const auto map = [&](std::size_t width, float first) {
+    std::vector<float> places(3 * width * 2);
+    for (std::size_t i = 0; i < 3 * width; ++i) {
+      places[2 * i] = static_cast<float>(i % width);
+      places[2 * i + 1] = static_cast<float>(i / width);
+    }
+    places[0] = first;
+    testing::write_hdf5(at("seq/events/left/rectify_map.h5"),
+                        {{"rectify_map", {{3, width, 2}, places}}});
+  };
+  map(5, 0);
+  refused("expected float [3, 4, 2], the sensor's size, got float32 [3, 5, 2]", "rectify_map.h5");
+  map(4, std::numeric_limits<float>::quiet_NaN());
+  refused("expected finite places, got others", "rectify_map.h5");
+  map(4, 0.4f);  // is rounded to its pixel
+  EXPECT_THAT(ids_of(*open()), SizeIs(2));
+}
+
+TEST_F(DsecFlow, BackwardAloneIsNamed) {
   fs::rename(at("seq/flow/forward"), at("seq/flow/backward"));
   fs::remove(at("seq/flow/forward_timestamps.txt"));
   refused("expected flow/forward, got flow/backward alone, which \"side\": \"before\" makes",
@@ -228,10 +246,18 @@ TEST_F(MvsecFlow, LastsFromEachTimeToTheNext) {
   EXPECT_EQ(flow.valid, (std::vector<std::uint8_t>{1, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1}));
   EXPECT_EQ(flow_of(*dataset).flow.valid[0], 0) << "0, 0 is nothing";
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("drive_gt_flow_dist.npz"));
-  spec_.root = ".";
-  EXPECT_THAT(open()->notes(), Not(Contains(HasSubstr("drive_gt_flow_dist.npz"))));
+}
+
+TEST_F(MvsecFlow, IsLeftOutWhereItIsNotRead) {
+  write_flow({1, 1.25, 1.75});
+  fs::create_directory(at("all"));
+  fs::rename(at("drive_data.h5"), at("all/drive_data.h5"));
+  fs::copy(at("drive_gt_flow_dist.npz"), at("all/other_gt_flow_dist.npz"));
+  fs::rename(at("drive_gt_flow_dist.npz"), at("all/drive_gt_flow_dist.npz"));
+  spec_.root = "all";
+  EXPECT_THAT(open()->notes(), Contains("1 entry left out in all: other_gt_flow_dist.npz"));
   spec_.flow = false;
-  EXPECT_THAT(open()->notes(), Contains(HasSubstr("left out in .: drive_gt_flow_dist.npz")));
+  EXPECT_THAT(open()->notes(), Contains(HasSubstr("2 entries left out in all: drive_gt")));
 }
 
 TEST_F(MvsecFlow, NamesWhatIsWrong) {
