@@ -18,6 +18,7 @@
 #include "pipeline/exports/detail/recordings.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/images/image_file.h"
+#include "stages/frames/decoding/source_flow.h"
 
 namespace eventgan {
 namespace {
@@ -56,10 +57,8 @@ class HalfSize {
   std::vector<std::int8_t> quarters_;
 };
 
-constexpr double kFlowSteps = 128;  // of a pixel of motion
-
 /// Whether an image of flow can tell so many pixels of motion, in either direction.
-bool fits_flow(float px) { return std::abs(std::nearbyint(kFlowSteps * px)) < 32768; }
+bool fits_flow(float px) { return std::abs(std::nearbyint(kDsecFlowSteps * px)) < 32768; }
 
 /// dsec/SPLIT/RECORDING/events/left/events.h5 and events_2x.h5, images/timestamps.txt and
 /// left/distorted, windows.txt, and of sources with boxes object_detections/left/tracks.npy: what
@@ -251,7 +250,7 @@ class DsecExporter : public RecordingsExporter {
       for (std::size_t i = 0; i < pixels; ++i) {
         const std::array px{flow.px[i], flow.px[pixels + i]};
         for (const float one_px : px) {
-          const double number = kZero + std::nearbyint(kFlowSteps * sign * one_px);
+          const double number = kZero + std::nearbyint(kDsecFlowSteps * sign * one_px);
           numbers.push_back(static_cast<std::uint16_t>(std::clamp(number, 0.0, 2 * kZero - 1)));
         }
         numbers.push_back(std::ranges::all_of(px, fits_flow) && flow.valid[i] != 0);

@@ -306,6 +306,11 @@ def test_only_the_last_layer_is_tuned_and_parts_are_what_they_say(tmp_path, monk
     changed = {name for name in before if not torch.equal(before[name], after[name])}
     assert changed == {"maps.weight", "maps.bias"}
 
+    on_windows = dataclasses.replace(tuned, name="on windows", windows=2)
+    real_cameras.train(args, on_windows, 0)
+    after = torch.load(real_cameras._run_folder(args, on_windows, 0) / "weights.pt")
+    assert all(not torch.equal(before[name], after[name]) for name in before if name.endswith("weight"))
+
 
 def test_windows_of_the_first_clips_are_learnt_and_the_others_tested(tmp_path, monkeypatch):
     """The tuned network has the base's weights to begin with, and sees as many windows as photographs; a network of

@@ -292,4 +292,13 @@ RecordingFolder look_into_recordings(const SourceSpec& spec, const fs::path& bas
   return FolderSearch(spec, base).take();
 }
 
+std::string written_beside(const fs::path& beside, const fs::path& file,
+                           const std::string& written_file) {
+  const auto normal = [](const fs::path& path) { return fs::absolute(path).lexically_normal(); };
+  const fs::path from_file = normal(beside).lexically_relative(normal(file).parent_path());
+  fs::path written = fs::path(written_file).parent_path() / from_file;
+  if (from_file.has_parent_path()) written = written.lexically_normal();  // left/../../images
+  return written.generic_string();
+}
+
 }  // namespace eventgan

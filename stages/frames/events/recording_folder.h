@@ -38,4 +38,8 @@ struct RecordingFolder {
 /// `annotations` does not fit.
 RecordingFolder look_into_recordings(const SourceSpec& spec, const std::filesystem::path& base);
 
+/// What lies beside a file, or near it, written as that one is.
+std::string written_beside(const std::filesystem::path& beside, const std::filesystem::path& file,
+                           const std::string& written_file);
+
 }  // namespace eventgan

@@ -49,15 +49,6 @@ Span frame_window(const std::vector<double>& frames, double time_s, LabelPlace p
 
 }  // namespace
 
-std::string written_beside(const fs::path& beside, const fs::path& file,
-                           const std::string& written_file) {
-  const auto normal = [](const fs::path& path) { return fs::absolute(path).lexically_normal(); };
-  const fs::path from_file = normal(beside).lexically_relative(normal(file).parent_path());
-  fs::path written = fs::path(written_file).parent_path() / from_file;
-  if (from_file.has_parent_path()) written = written.lexically_normal();  // left/../../images
-  return written.generic_string();
-}
-
 void WindowedRecording::open(const fs::path& base, const RecordingOptions& options,
                              bool reads_flow) {
   const fs::path on_disk = base / path;
@@ -79,8 +70,7 @@ void WindowedRecording::open(const fs::path& base, const RecordingOptions& optio
     open_without_frames();
     return;
   }
-  const bool by_frames = !window.duration_s && !window.events && !flow;
-  if (frame_times_s.size() < 2 && by_frames) {
+  if (frame_times_s.size() < 2 && is_by_frames() && !flow) {
     throw InputError(
         "expected two frames or more, or window_s or window_events, got one frame, "
         "in " +
@@ -136,8 +126,7 @@ std::vector<double> WindowedRecording::times_s() const {
   }
   if (label_file.empty()) {
     // The first frame ends no interval.
-    const bool by_frames = !window.duration_s && !window.events;
-    for (std::size_t i = by_frames ? 1 : 0; i < frame_times_s.size(); ++i) {
+    for (std::size_t i = is_by_frames() ? 1 : 0; i < frame_times_s.size(); ++i) {
       times_s.push_back(frame_times_s[i]);
     }
     const double length_s = window.duration_s.value_or(0);

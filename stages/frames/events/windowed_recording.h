@@ -58,14 +58,11 @@ struct WindowedRecording : FoundFile {
   bool meets_events(double time_s) const;
 
  private:
+  bool is_by_frames() const { return !window.duration_s && !window.events; }
   void open_without_frames();
 
   double first_begin_s_ = 0;       ///< of windows one behind the other,
   std::int64_t window_count_ = 0;  ///< so many
 };
-
-/// What lies beside a file, or near it, written as that one is.
-std::string written_beside(const std::filesystem::path& beside, const std::filesystem::path& file,
-                           const std::string& written_file);
 
 }  // namespace eventgan
