@@ -14,8 +14,12 @@ shift 2
 export SLURM_CONF=$folder/slurm.conf
 patience_s=30
 
+# The daemon's number, or nothing. By cat: what ends takes its files along, and bash itself ends at a $(<FILE) without
+# its file, even before ||.
+pid_of() { cat "$folder/$1.pid" 2>/dev/null || true; }
+
 # Whether a daemon runs; a number left from before a reboot may be another process by now.
-running() { [[ -s $folder/$1.pid && $(cat "/proc/$(<"$folder/$1.pid")/comm" 2>/dev/null) == "$1" ]]; }
+running() { [[ $(cat "/proc/$(pid_of "$1")/comm" 2>/dev/null) == "$1" ]]; }
 
 # Waits until a command succeeds.
 within() {
@@ -109,7 +113,7 @@ processes() {
   local environment process
   for environment in $(grep -lzxsF "SLURM_CONF=$SLURM_CONF" /proc/[0-9]*/environ); do
     process=${environment%/environ}
-    if [[ $(<"$process/comm") =~ ^(slurm|munged) ]] || grep -qzs '^SLURM_JOB_ID=' "$environment"; then
+    if [[ $(cat "$process/comm") =~ ^(slurm|munged) ]] || grep -qzs '^SLURM_JOB_ID=' "$environment"; then
       echo "${process#/proc/}"
     fi
   done 2>/dev/null
@@ -125,7 +129,7 @@ stop() {
     timeout 10 scontrol shutdown || true
   fi
   for daemon in slurmd slurmctld munged; do
-    running "$daemon" && kill "$(<"$folder/$daemon.pid")" || true
+    ! running "$daemon" || kill "$(pid_of "$daemon")" 2>/dev/null || true
   done
   within 10 no_processes && return
   mapfile -t pids < <(processes)
