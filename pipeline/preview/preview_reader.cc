@@ -17,6 +17,7 @@
 #include "pipeline/folder/shard_guard.h"
 #include "stages/frames/decoding/cut_out.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/decoding/moving_still.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/frames/decoding/still_clip.h"
 #include "stages/frames/sources/open_dataset.h"

@@ -1,5 +1,5 @@
 """What a pair of a photograph whose objects move on their own takes, by stage: with objects that are cut out of their
-boxes meanwhile, and with outlines that `eventgan outline` has made before."""
+boxes meanwhile, with outlines that `eventgan outline` has made before, and of clips."""
 
 import csv
 import dataclasses
@@ -35,6 +35,7 @@ SETTINGS = {
 class Photographs(Job):
     """As `eventgan init` writes them, of a folder that has boxes.csv and `images`."""
     outlines: str | None = None
+    frames_of_clip: int | None = None
 
     def manifest(self):
         motion = {"translation_px": [2, 8], "rotation_deg": 2, "scale": 0.03, "rests": 0.5,
@@ -44,6 +45,8 @@ class Photographs(Job):
                   "pairs": {"from": "stills", "motion": motion}}
         if self.outlines:
             source["outlines"] = self.outlines
+        if self.frames_of_clip:
+            source["pairs"]["frames"] = self.frames_of_clip
         image = {"height": self.height, "width": self.width, "fit": "letterbox"}
         return super().manifest() | {"sources": [source], "image": image}
 
@@ -74,7 +77,7 @@ def photographs(bench, most):
 def measure(bench):
     settings = SETTINGS[bench.effort]
     folder, frames = photographs(bench, settings.most)
-    table = Table("photographs", ["generator", "outlines", *(f"{stage} ms" for stage in STAGES)])
+    table = Table("photographs", ["generator", "photographs", *(f"{stage} ms" for stage in STAGES)])
     part = Part([table], frames=frames)
     generators = {"esim": {"kind": "esim"}, "difference": {"kind": "difference"},
                   f"{settings.weights}, float32": {"weights": settings.weights}}
@@ -88,8 +91,10 @@ def measure(bench):
     manifest.write_text(json.dumps(Photographs(str(folder), *SIZE, generator={"kind": "esim"}).manifest()))
     subprocess.run([bench.program, "outline", manifest, "--out", masks, "--progress", "none"], check=True,
                    capture_output=True)
-    jobs = {(name, made): Photographs(str(folder), *SIZE, generator=generator, outlines=str(masks) if made else None)
-            for name, generator in generators.items() for made in (False, True)}
+    kinds = {"cut out meanwhile": {}, "outlines made before": {"outlines": str(masks)},
+             "clips of 5 frames": {"frames_of_clip": 5}}
+    jobs = {(name, kind): Photographs(str(folder), *SIZE, generator=generator, **options)
+            for name, generator in generators.items() for kind, options in kinds.items()}
     times = {key: [] for key in jobs}
     for turn in range(settings.rounds):
         for key in rotated([*jobs], turn):
@@ -100,7 +105,7 @@ def measure(bench):
                 continue
             part.libraries.add(done.libraries)
             times[key].append([1000 * done.stage_s[stage] / done.pairs for stage in STAGES])
-    for (name, made), rounds in times.items():
+    for (name, kind), rounds in times.items():
         if rounds:
-            table.add(name, "made before" if made else "cut out meanwhile", *map(spread, zip(*rounds)))
+            table.add(name, kind, *map(spread, zip(*rounds)))
     return part

@@ -84,7 +84,7 @@ PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_und
       tells_between_(tells_between),
       images_(std::make_unique<RecentlyUsed<std::string, SharedFrame>>(2 * pairs_under_way +
                                                                        kLongestGap + kMargin)),
-      last_still_(std::make_unique<RecentlyUsed<std::string, SharedImage>>(1)),
+      clips_(std::make_unique<RecentlyUsed<std::string, std::shared_ptr<const Clip>>>(2)),
       files_(std::make_unique<FilesAhead>()),
       stills_(base_, pairs_under_way + kMargin),
       videos_(std::make_unique<OpenVideos<SharedFrame>>(
@@ -123,50 +123,71 @@ Outcome<std::array<SharedFrame, 2>> PairReader::frames(const FramePair& pair,
   return both;
 }
 
-Outcome<SharedImage> PairReader::still_image(const FramePair& pair, ImageOrientation orientation,
+Outcome<SharedImage> PairReader::still_image(const FrameRef& still, ImageOrientation orientation,
                                              std::int64_t stride) const {
-  const FrameRef& still = pair.next;
   if (still.video_frame >= 0) {
     Outcome<ColourFrame> decoded = stills_.decode(still, stride);
     if (is_fault(decoded)) return decoded.fault();
     return std::make_shared<const ColourFrame>(*std::move(decoded));
   }
-  const auto decode = [&] {
-    return std::make_shared<const ColourFrame>(
-        decode_image(files_->take(base_ / still.path), orientation, spec_.range));
+  return std::make_shared<const ColourFrame>(
+      decode_image(files_->take(base_ / still.path), orientation, spec_.range));
+}
+
+struct PairReader::Clip {
+  std::vector<Box> boxes;
+  StillPose pose;  ///< any one
+  MovingStill still;
+
+  /// Another source may make other clips of the image.
+  bool is_of(const std::vector<Box>& others, const StillPose& other) const {
+    const auto moves = [](const std::optional<ImageMotion>& object) { return object.has_value(); };
+    return boxes == others && std::ranges::equal(pose.objects, other.objects, {}, moves, moves);
+  }
+};
+
+Outcome<MovingStill> PairReader::still_of_clip(const FramePair& pair, ImageOrientation orientation,
+                                               std::int64_t stride,
+                                               const std::vector<Box>& boxes) const {
+  const StillPose& pose = pair.poses.at(0);
+  const auto take_apart = [&](SharedImage image) {
+    return MovingStill(std::move(image), pair, spec_, boxes);
   };
-  return pair.poses.empty() ? decode() : last_still_->get(name_of(still, orientation), decode);
+  if (pair.next.video_frame < 0) {
+    const auto clip = clips_->get(name_of(pair.next, orientation), [&] {
+      SharedImage image = *still_image(pair.next, orientation, stride);
+      return std::make_shared<const Clip>(boxes, pose, take_apart(std::move(image)));
+    });
+    if (clip->is_of(boxes, pose)) return clip->still;
+  }
+  Outcome<SharedImage> image = still_image(pair.next, orientation, stride);
+  if (is_fault(image)) return image.fault();
+  return take_apart(*std::move(image));
 }
 
 Outcome<PreparedPair> PairReader::still(const FramePair& planned, ImageOrientation orientation,
                                         std::int64_t stride, const std::vector<Box>& boxes,
                                         const Settle& settle, bool with_flow) const {
   try {
-    Outcome<SharedImage> decoded = still_image(planned, orientation, stride);
-    if (is_fault(decoded)) return decoded.fault();
-    const SharedImage image = *std::move(decoded);
-    FramePair pair = settle ? settle(planned, image->size) : planned;
-    const ColourView view{image->size, image->bgr.data()};
-    std::vector<Box> outlined = boxes;
+    FramePair pair = planned;
     OutlineCounts outlines;
-    if (!pair.objects.empty()) outlines = cut_out_missing(view, outlined);
-    FramesBetween between;
-    PixelFlow flow;
-    PixelFlow* const wanted = with_flow ? &flow : nullptr;
-    std::array<PreparedFrame, 2> frames;
-    if (tells_between_ && pair.poses.empty()) {  // its ends are the frames
-      between = frames_between(image, pair, spec_, outlined, wanted);
-      for (const int end : {0, 1}) {
-        frames[end] = {between.at(end).pixels, place(image->size, spec_, pair)};
-      }
-    } else {
-      frames = prepare_still(view, pair, spec_, outlined, wanted);
-      if (tells_between_) between = frames_between(image, pair, spec_, outlined);
-    }
-    PreparedPair prepared = prepare_pair(frames[0], frames[1]);
+    const auto moving = [&]() -> Outcome<MovingStill> {
+      if (!planned.poses.empty()) return still_of_clip(planned, orientation, stride, boxes);
+      Outcome<SharedImage> image = still_image(planned.next, orientation, stride);
+      if (is_fault(image)) return image.fault();
+      const ColourView view{(*image)->size, (*image)->bgr.data()};
+      if (settle) pair = settle(planned, view.size);
+      std::vector<Box> outlined = boxes;
+      if (!pair.objects.empty()) outlines = cut_out_missing(view, outlined);
+      return MovingStill(*std::move(image), pair, spec_, outlined);
+    }();
+    if (is_fault(moving)) return moving.fault();
+    FramesBetween frames = moving->frames(pair);
+    PreparedPair prepared = prepare_pair({frames.at(0).pixels, moving->placement()},
+                                         {frames.at(1).pixels, moving->placement()});
     prepared.outlines = outlines;
-    prepared.between = std::move(between);
-    prepared.flow = std::move(flow);
+    if (with_flow) prepared.flow = moving->flow(pair);
+    if (tells_between_) prepared.between = std::move(frames);
     if (settle) prepared.settled = std::move(pair);
     return prepared;
   } catch (const std::runtime_error& error) {
@@ -179,7 +200,7 @@ void PairReader::expect(const FramePair& pair, ImageOrientation orientation) con
     if ((pair.motion || !pair.poses.empty()) && frame == &pair.next) break;  // both are one image
     if (frame->video_frame >= 0) continue;
     const std::string name = name_of(*frame, orientation);
-    if (pair.poses.empty() ? images_->has(name) : last_still_->has(name)) continue;
+    if (pair.poses.empty() ? images_->has(name) : clips_->has(name)) continue;
     files_->expect(base_ / frame->path);
   }
 }

@@ -20,6 +20,7 @@
 #include "manifests/values/placement.h"
 #include "manifests/values/recently_used.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/decoding/moving_still.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/frames/decoding/video_frames.h"
 
@@ -52,9 +53,9 @@ class FilesAhead {
 /// last are kept, so that each is opened and decoded once. A file that changes meanwhile may be
 /// seen as it was.
 ///
-/// A still's pair (FramePair::motion) is made of its one image (prepare_still); of a video,
-/// besides, as many whole colour frames are kept as prepared ones, and of clips' stills
-/// (FramePair::poses) the last image, so that it is decoded once for all of its clip.
+/// A still's pair (FramePair::motion) is made of its one image (MovingStill); of a video, besides,
+/// as many whole colour frames are kept as prepared ones, and of clips' stills (FramePair::poses)
+/// the last two, so that an image is decoded and taken apart once for all of its clip.
 ///
 /// The two frames must have one size. Thread safety: `read` may be called from several threads;
 /// images are decoded in parallel, videos one frame after another under a lock.
@@ -92,8 +93,13 @@ class PairReader {
   Outcome<std::array<SharedFrame, 2>> frames(const FramePair& pair,
                                              ImageOrientation orientation) const;
   SharedFrame frame(const FrameRef& ref, ImageOrientation orientation) const;
-  Outcome<SharedImage> still_image(const FramePair& pair, ImageOrientation orientation,
+  /// What the pairs of a clip share.
+  struct Clip;
+
+  Outcome<SharedImage> still_image(const FrameRef& still, ImageOrientation orientation,
                                    std::int64_t stride) const;
+  Outcome<MovingStill> still_of_clip(const FramePair& pair, ImageOrientation orientation,
+                                     std::int64_t stride, const std::vector<Box>& boxes) const;
   Outcome<PreparedPair> still(const FramePair& planned, ImageOrientation orientation,
                               std::int64_t stride, const std::vector<Box>& boxes,
                               const Settle& settle, bool with_flow) const;
@@ -102,7 +108,7 @@ class PairReader {
   ImageSpec spec_;
   bool tells_between_;
   std::unique_ptr<RecentlyUsed<std::string, SharedFrame>> images_;
-  std::unique_ptr<RecentlyUsed<std::string, SharedImage>> last_still_;
+  std::unique_ptr<RecentlyUsed<std::string, std::shared_ptr<const Clip>>> clips_;
   std::unique_ptr<FilesAhead> files_;
   FrameDecoder stills_;
   std::unique_ptr<OpenVideos<SharedFrame>> videos_;

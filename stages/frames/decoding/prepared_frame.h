@@ -40,9 +40,6 @@ struct PreparedFrame {
 /// A frame that several pairs may hold, or why there is none, without the file's name.
 using SharedFrame = std::shared_ptr<const Outcome<PreparedFrame>>;
 
-/// An image that several pairs are made of.
-using SharedImage = std::shared_ptr<const ColourFrame>;
-
 /// Two frames, ready for the generator.
 struct PreparedPair {
   /// [frame, y, x] float32, C order; frame 0 = previous, 1 = next; x = (u/255 - 0.5) * 2 in [-1,
@@ -78,41 +75,8 @@ struct ImageView {
 /// A grey image gives what three equal channels give.
 PreparedFrame prepare_frame(const ImageView& frame, const ImageSpec& spec);
 
-/// OpenCV counts the pixels that it moves in 16 bits.
+/// Of stills that are moved: OpenCV counts their pixels in 16 bits.
 inline constexpr int kMostStillSide = 32766;
-
-/// Both frames of a still's pair, which has a motion, previous first: the image itself at
-/// `pair.label_position`, and the image moved as move_still does, both without the borders that
-/// only one of them shows (placement.h). Where grey is made before resizing the grey image is
-/// moved. Of a clip (FramePair::poses), both are what its window shows of the image as it is then,
-/// and boxes are those of the still. Throws as above, also if too little would be left or a side is
-/// beyond kMostStillSide. Thread safe.
-///
-/// `flow`, unless it is null, becomes the pair's: for each pixel of the volume the motion of the
-/// image, or of the object that covers at least half of the labelled image's pixel there, by the
-/// maps that made the frames, whatever the placement. Valid where the same thing is seen at the
-/// place in the other frame to which it leads, between the outermost pixels' centres of what the
-/// volume shows.
-std::array<PreparedFrame, 2> prepare_still(const ColourView& image, const FramePair& pair,
-                                           const ImageSpec& spec,
-                                           const std::vector<Box>& boxes = {},
-                                           PixelFlow* flow = nullptr);
-
-/// The moved frame of a still's pair, of the image's size: each pixel is the image where
-/// moved_to_labelled leads from it, bicubic (Keys with a = -0.75, places rounded to 1/32 px);
-/// places beyond the image take its nearest pixel, for `place` to cut away. Objects that move on
-/// their own (FramePair::objects, of `boxes`) lie over it where object_to_labelled leads, the
-/// farther ones first, and what they uncover is filled (detail/still_layers.h); those of boxes
-/// without an outline do not. Throws std::runtime_error as prepare_still. Thread safe.
-ColourFrame move_still(const ColourFrame& image, const FramePair& pair,
-                       const std::vector<Box>& boxes = {});
-
-/// At label_position prepare_still's image; from there to the other end image and objects move
-/// steadily (manifests/values/still_motion.h), and these frames are sampled in the volume's size
-/// (detail/scaled_layers.h), those of clips (FramePair::poses) in the photograph's. `flow` is as
-/// prepare_still has it. Throws as prepare_still.
-FramesBetween frames_between(const SharedImage& image, const FramePair& pair, const ImageSpec& spec,
-                             const std::vector<Box>& boxes, PixelFlow* flow = nullptr);
 
 /// The generator's input of 8-bit grey: x = (u/255 - 0.5) * 2 in [-1, 1], in single precision.
 /// `input` must have the size of `grey`. Thread safe.

@@ -27,6 +27,9 @@ constexpr int kShare = 1 << kShareBits;  // of both pixels of a resized one
 constexpr int kLevel = 128;              // of a plane, to a grey level
 constexpr int kRowLevel = kLevel / 4;    // of a row: the upper half of a product is kept
 constexpr int kWhite = 255 * kRowLevel;
+// To round with, less what OpenCV's resizing loses on average by rounding down, an eighth: the
+// labelled frame, which is resized by it, must not be darker than the others.
+constexpr int kHalfLevel = kRowLevel / 2 - kRowLevel / 8 - 1;
 
 using Weights = std::array<std::int16_t, 2 * kTaps>;  // twice the same
 
@@ -151,23 +154,24 @@ cv::Mat with_border(const cv::Mat& values) {
 
 }  // namespace
 
-ScaledLayers::Axis ScaledLayers::axis(int border, int cut, int scaled) {
+ScaledLayers::Axis ScaledLayers::axis(int begin, int cut, int scaled) {
   Axis axis;
   const double step = double(cut) / scaled;
   for (int i = 0; i < scaled; ++i) {
     const double place = std::clamp((i + 0.5) * step - 0.5, 0.0, cut - 1.0);
     const double first = std::floor(place);
-    axis.place_px.push_back(border + first);
+    axis.place_px.push_back(begin + first);
     axis.share.push_back(static_cast<int>(std::lround(kShare * (place - first))));
     axis.shares.push_back((axis.share.back() << 16) + kShare - axis.share.back());
   }
   return axis;
 }
 
-ScaledLayers::ScaledLayers(const StillLayers& layers, const Placement& placement, cv::Mat resting)
+ScaledLayers::ScaledLayers(const StillLayers& layers, const Placement& placement, cv::Point origin,
+                           cv::Mat resting)
     : layers_(layers),
-      columns_(axis(placement.border_x, placement.cut().width, placement.scaled.width)),
-      rows_(axis(placement.border_y, placement.cut().height, placement.scaled.height)),
+      columns_(axis(origin.x + placement.border_x, placement.cut().width, placement.scaled.width)),
+      rows_(axis(origin.y + placement.border_y, placement.cut().height, placement.scaled.height)),
       resting_(std::move(resting)) {
   if (resting_.empty()) background_ = with_border(levels_of(layers.background()));
   for (const StillLayers::Layer& layer : layers.layers()) {
@@ -280,7 +284,7 @@ cv::Mat ScaledLayers::frame(const AffineMap& background,
       }
     }
     std::ranges::transform(row, frame.ptr(y), [](std::int16_t level) {
-      return static_cast<std::uint8_t>(std::min((level + kRowLevel / 2) / kRowLevel, 255));
+      return static_cast<std::uint8_t>(std::min((level + kHalfLevel) / kRowLevel, 255));
     });
   }
   return frame;

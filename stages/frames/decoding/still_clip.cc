@@ -8,6 +8,8 @@
 
 #include "manifests/values/outlines.h"
 #include "manifests/values/still_motion.h"
+#include "stages/frames/decoding/detail/frame_steps.h"
+#include "stages/frames/decoding/detail/scaled_layers.h"
 #include "stages/frames/decoding/detail/still_layers.h"
 #include "stages/frames/decoding/detail/unless_refused.h"
 
@@ -32,12 +34,6 @@ std::vector<StillObject> objects_of(const std::vector<Box>& boxes, const StillPo
     objects.push_back({k, boxes[k].outline, boxes[k].xyxy.bottom, far_px});
   }
   return objects;
-}
-
-cv::Mat matrix_of(const ImageView& image) {
-  return {image.size.height, image.size.width,
-          image.channels == ImageView::Channels::kGrey ? CV_8UC1 : CV_8UC3,
-          const_cast<std::uint8_t*>(image.pixels)};
 }
 
 /// How far apart the maps lead a point of the still at most; of affine ones a corner.
@@ -108,6 +104,20 @@ std::vector<std::uint8_t> StillClip::frame(const StillPose& pose) const {
   return unless_refused([&] {
     return state_->windowed<std::uint8_t>(
         state_->layers.frame(inverse(image_in_clip(state_->image, pose)), state_->maps_back(pose)));
+  });
+}
+
+std::function<GreyImage(const StillPose&)> StillClip::resized(const Placement& placement) const {
+  return unless_refused([&] {
+    const cv::Point window(state_->window.x, state_->window.y);
+    const auto scaled = std::make_shared<const ScaledLayers>(state_->layers, placement, window);
+    return [state = state_, scaled](const StillPose& pose) {
+      return unless_refused([&] {
+        const cv::Mat frame =
+            scaled->frame(inverse(image_in_clip(state->image, pose)), state->maps_back(pose));
+        return GreyImage{{frame.rows, frame.cols}, {frame.datastart, frame.dataend}};
+      });
+    };
   });
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -19,7 +20,7 @@ namespace eventgan {
 class StillClip {
  public:
   /// `image` must outlive it. `boxes`: of the still; those with an outline and a motion in `pose`,
-  /// which is any one of the clip, are objects. Throws std::runtime_error as prepare_still.
+  /// which is any one of the clip, are objects. Throws std::runtime_error as MovingStill.
   StillClip(const ImageView& image, std::vector<Box> boxes, const StillPose& pose);
 
   ImageSize size() const;
@@ -27,6 +28,11 @@ class StillClip {
   /// The frame at a pose: [y, x, channel] uint8 of size(), with the image's channels. Throws
   /// std::runtime_error if OpenCV refuses it.
   std::vector<std::uint8_t> frame(const StillPose& pose) const;
+
+  /// Of poses that frame, grey and resized as `placement` of size() says: [y, x] uint8 of
+  /// placement.scaled, sampled there (detail/scaled_layers.h). What is returned throws as `frame`,
+  /// keeps what it needs but for the image, and is thread safe.
+  std::function<GreyImage(const StillPose&)> resized(const Placement& placement) const;
 
   /// What each pixel of that frame shows: [y, x] of size(), 0 the image, else 1 + the box of the
   /// object. Empty if there is nothing but the image.

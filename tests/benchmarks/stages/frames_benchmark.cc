@@ -5,6 +5,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "stages/base/images/image_file.h"
+#include "stages/frames/decoding/moving_still.h"
 #include "stages/frames/decoding/pair_reader.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "tests/testing/temporary_folder.h"
@@ -124,7 +126,9 @@ void prepare(benchmark::State& state) {
 /// A still's pair of 320x192 with three objects, without and with its optical flow. Items are
 /// pairs.
 void still_pair(benchmark::State& state) {
-  const cv::Mat image = street(0);
+  const cv::Mat street_view = street(0);
+  const auto image = std::make_shared<const ColourFrame>(ColourFrame{
+      {street_view.rows, street_view.cols}, {street_view.datastart, street_view.dataend}});
   ImageSpec spec;
   spec.size = ImageSize{192, 320};
   FramePair pair;
@@ -138,10 +142,10 @@ void still_pair(benchmark::State& state) {
     pair.objects.push_back(ImageMotion{.x_px = left / 100});
   }
   for (auto _ : state) {
-    PixelFlow flow;
-    benchmark::DoNotOptimize(prepare_still({{image.rows, image.cols}, image.data}, pair, spec,
-                                           boxes, state.range(0) ? &flow : nullptr));
-    benchmark::DoNotOptimize(flow);
+    const MovingStill still(image, pair, spec, boxes);
+    const FramesBetween frames = still.frames(pair);
+    for (const int end : {0, 1}) benchmark::DoNotOptimize(frames.at(end));
+    if (state.range(0)) benchmark::DoNotOptimize(still.flow(pair));
   }
   state.SetItemsProcessed(state.iterations());
 }

@@ -14,6 +14,7 @@
 #include "pipeline/preview/preview_reader.h"
 #include "stages/frames/dataset/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/decoding/moving_still.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/frames/sources/open_dataset.h"
 #include "stages/shards/shard_reader.h"

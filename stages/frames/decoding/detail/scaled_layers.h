@@ -17,9 +17,11 @@ namespace eventgan {
 /// what moves.
 class ScaledLayers {
  public:
-  /// `resting`: the frame (grey, resized) of all that rests, if the background does: it is taken
-  /// where nothing moves. Else empty, and all is sampled.
-  ScaledLayers(const StillLayers& layers, const Placement& placement, cv::Mat resting);
+  /// `layers` must outlive it. `placement` is of the part of the photograph that begins at
+  /// `origin`. `resting`: the frame (grey, resized) of all that rests, if the background does: it
+  /// is taken where nothing moves. Else empty, and all is sampled.
+  ScaledLayers(const StillLayers& layers, const Placement& placement, cv::Point origin,
+               cv::Mat resting = {});
 
   /// The frame: [y, x] uint8 of placement.scaled; maps as StillLayers::frame has them, and what is
   /// said to rest has none. Thread safe.
@@ -39,7 +41,7 @@ class ScaledLayers {
   };
   class Sampler;
 
-  static Axis axis(int border, int cut, int scaled);
+  static Axis axis(int begin, int cut, int scaled);
   cv::Rect seen_in(const StillLayers::Layer& layer, const AffineMap& map) const;
 
   const StillLayers& layers_;

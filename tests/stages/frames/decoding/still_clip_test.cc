@@ -55,6 +55,37 @@ TEST(StillClip, ShowsItsWindowOfImageAndObjects) {
   }
 }
 
+TEST(StillClip, ResizedFramesAreTheFramesResized) {
+  const StillPose moved = pose({1.25, -0.5, 1, 1.02}, {6.5, -3, 2, 1});
+  for (const std::size_t channels : {1u, 3u}) {
+    const auto pixels = still(channels);
+    const StillClip clip({kStill, pixels.data(),
+                          channels == 1 ? ImageView::Channels::kGrey : ImageView::Channels::kBgr},
+                         {square(50, 40, 20)}, pose({}, {}));
+    const auto whole = clip.frame(moved);
+    for (const ImageSize size : {clip.size(), ImageSize{36, 48}, ImageSize{50, 110}}) {
+      ImageSpec spec;
+      spec.size = size;
+      spec.fit = ImageFit::kStretch;
+      const Placement placement = place(clip.size(), spec);
+      const GreyImage resized = clip.resized(placement)(moved);
+      ASSERT_EQ(resized.size, size);
+      const auto expected =
+          prepare_frame({clip.size(), whole.data(),
+                         channels == 1 ? ImageView::Channels::kGrey : ImageView::Channels::kBgr},
+                        spec);
+      int off = 0;
+      for (std::size_t i = 0; i < resized.pixels.size(); ++i) {
+        const int difference = std::abs(resized.pixels[i] - expected.grey[i]);
+        // An eighth of the edge, where the object and how much it covers are sampled as one.
+        ASSERT_LE(difference, 20) << i << " of " << to_string(size);
+        off += difference > 2;
+      }
+      EXPECT_LT(off, 2 * (size.height + size.width)) << "beside the object's edge";
+    }
+  }
+}
+
 TEST(StillClip, ShiftsAreThoseOfWhatIsSeen) {
   const auto pixels = still(1);
   const StillClip clip({kStill, pixels.data(), ImageView::Channels::kGrey}, {square(50, 40, 20)},

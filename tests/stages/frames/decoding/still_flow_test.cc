@@ -3,18 +3,20 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <opencv2/imgproc.hpp>
 #include <string>
 #include <vector>
 
 #include "manifests/values/still_motion.h"
+#include "stages/frames/decoding/moving_still.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "tests/stages/frames/decoding/still_image.h"
 
 namespace eventgan {
 namespace {
 
-// The flow that prepare_still tells of a pair is held against the two frames that it makes, and
+// The flow that MovingStill tells of a pair is held against the two frames that it makes, and
 // against places that are computed here.
 
 constexpr double kStep_px = 1.0 / 128;
@@ -95,7 +97,12 @@ FlowCase make(const cv::Mat& grey, const FramePair& pair, const ImageSpec& spec,
   cv::Mat colour;
   cv::cvtColor(grey, colour, cv::COLOR_GRAY2BGR);
   FlowCase made{.frames = {}, .flow = {}, .label_position = pair.label_position};
-  made.frames = prepare_still({{grey.rows, grey.cols}, colour.data}, pair, spec, boxes, &made.flow);
+  const auto image = std::make_shared<const ColourFrame>(
+      ColourFrame{{grey.rows, grey.cols}, {colour.datastart, colour.dataend}});
+  const MovingStill still(image, pair, spec, boxes);
+  const FramesBetween frames = still.frames(pair);
+  for (const int end : {0, 1}) made.frames[end] = {frames.at(end).pixels, still.placement()};
+  made.flow = still.flow(pair);
   return made;
 }
 

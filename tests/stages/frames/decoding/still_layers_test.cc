@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <string>
 #include <tuple>
 #include <vector>
 
 #include "manifests/values/counter_random.h"
+#include "stages/frames/decoding/moving_still.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "tests/stages/frames/decoding/still_image.h"
 
@@ -62,7 +64,10 @@ class StillObjects : public ::testing::Test {
 
   ColourFrame moved() const { return move_still(image_, pair_, boxes_); }
 
-  SharedImage shared() const { return std::make_shared<const ColourFrame>(image_); }
+  FramesBetween frames(const ImageSpec& spec = {}) const {
+    const auto image = std::make_shared<const ColourFrame>(image_);
+    return MovingStill(image, pair_, spec, boxes_).frames(pair_);
+  }
 
   /// Calls each(x, y) for every pixel of the image.
   template <class Each>
@@ -252,12 +257,12 @@ TEST_F(StillObjects, TheLabelledImageStaysAsItIs) {
   const ColourFrame before = image_;
   for (const double position : {0.0, 1.0}) {
     pair_.label_position = position;
-    const auto frames = prepare_still({image_.size, image_.bgr.data()}, pair_, {}, boxes_);
-    const auto& labelled = frames[position == 0 ? 0 : 1].grey;
+    const FramesBetween between = frames();
+    const auto labelled = between.at(position).pixels;
     for_each_pixel([&](int x, int y) {
       ASSERT_EQ(labelled[static_cast<std::size_t>(80 * y + x)], at(image_, x, y));
     });
-    EXPECT_NE(frames[0].grey, frames[1].grey);
+    EXPECT_NE(between.at(1 - position).pixels, labelled);
   }
   EXPECT_EQ(image_.bgr, before.bgr);
 }
@@ -269,17 +274,13 @@ TEST_F(StillObjects, BetweenTheFramesEverythingMovesSteadily) {
   for (const double position : {0.0, 1.0}) {
     SCOPED_TRACE(position);
     pair_.label_position = position;
-    const FramesBetween between = frames_between(shared(), pair_, {}, boxes_);
-    const auto ends = prepare_still({image_.size, image_.bgr.data()}, pair_, {}, boxes_);
-    const auto labelled = static_cast<std::size_t>(position), moved = 1 - labelled;
-    EXPECT_EQ(between.at(position).pixels, ends[labelled].grey);
+    const FramesBetween between = frames();
     // Sampled in the volume's size: an edge's shares are rounded otherwise.
-    EXPECT_THAT(between.at(1 - position).pixels,
-                ::testing::Pointwise(::testing::Truly([](const auto& levels) {
-                                       return std::abs(std::get<0>(levels) - std::get<1>(levels)) <=
-                                              1;
-                                     }),
-                                     ends[moved].grey));
+    const ColourFrame whole = moved();
+    const GreyImage end = between.at(1 - position);
+    for_each_pixel([&](int x, int y) {
+      ASSERT_NEAR(end.pixels[static_cast<std::size_t>(80 * y + x)], at(whole, x, y), 1);
+    });
     EXPECT_NEAR(between.displacement_px, std::hypot(8, 4), 1e-9);
     for (const double u : {0.0, 0.25, 0.5, 0.75, 1.0}) {
       const double share = position == 0 ? u : u - 1;  // of the motion, from the labelled image
@@ -298,7 +299,7 @@ TEST_F(StillObjects, BetweenTheFramesEverythingMovesSteadily) {
   ImageSpec spec;
   spec.size = ImageSize{30, 40};
   pair_.motion = ImageMotion{.x_px = 2, .scale = 1.1};
-  const FramesBetween between = frames_between(shared(), pair_, spec, boxes_);
+  const FramesBetween between = frames(spec);
   EXPECT_EQ(between.at(0.3).size, (ImageSize{30, 40}));
 }
 
@@ -318,7 +319,7 @@ TEST_F(StillObjects, BetweenTheFramesAResizedPixelIsSampledWhereItLies) {
     spec.size = size;
     spec.grey = grey;
     spec.blur = blur;
-    const FramesBetween between = frames_between(shared(), pair_, spec, boxes_);
+    const FramesBetween between = frames(spec);
     const AffineMap to_source = inverse(place(image_.size, spec, pair_).source_to_volume());
     for (const double u : {0.3, 0.8}) {
       const auto part = [&](const ImageMotion& motion) {
@@ -356,14 +357,12 @@ TEST_F(StillObjects, NoPointOfAnOutlineBeyondItsBoxMovesFarther) {
   pair_.objects[0] = ImageMotion{.angle_deg = 3};
   // About the box's middle, in pixel centres (34.5, 24.5); the farthest corner is at (79.5, 29.5).
   const double chord = 2 * std::sin(1.5 * std::numbers::pi / 180);
-  EXPECT_NEAR(frames_between(shared(), pair_, {}, boxes_).displacement_px,
-              chord * std::hypot(45, 5), 1e-9);
+  EXPECT_NEAR(frames().displacement_px, chord * std::hypot(45, 5), 1e-9);
   ImageSpec stretched;
   stretched.fit = ImageFit::kStretch;
   for (const ImageSize size : {ImageSize{180, 80}, {60, 240}}) {  // three times as high, or as wide
     stretched.size = size;
-    EXPECT_NEAR(frames_between(shared(), pair_, stretched, boxes_).displacement_px,
-                3 * chord * std::hypot(45, 5), 1e-9);
+    EXPECT_NEAR(frames(stretched).displacement_px, 3 * chord * std::hypot(45, 5), 1e-9);
   }
 }
 
