@@ -55,11 +55,11 @@ std::string version_text() {
 }
 
 std::string own_layers_text(int base_channels, Precision precision) {
+  if (winograd_fits(base_channels, precision)) {  // they come first
+    return ", Winograd layers " + std::to_string(kWinogradVersion);
+  }
   if (NarrowLayers::fit(base_channels, precision)) {
     return ", narrow layers " + std::to_string(NarrowLayers::kVersion);
-  }
-  if (winograd_fits(base_channels, precision)) {
-    return ", Winograd layers " + std::to_string(kWinogradVersion);
   }
   return "";
 }
