@@ -19,6 +19,7 @@
 #include "stages/base/processor/processor.h"
 #include "stages/base/videos/video_file.h"
 #include "stages/frames/decoding/cut_out.h"
+#include "stages/frames/decoding/moving_still.h"
 #include "stages/generator/wanted_tiles.h"
 
 namespace eventgan {
@@ -209,6 +210,8 @@ std::map<std::string, std::string> make_fingerprint(
   if (turns_images(manifest, plan)) {
     fingerprint["orientation"] = "upright, by " + loaded_library("libexif");
   }
+  const auto has_stills = [](const SourceSpec& source) { return source.pairs.stills.has_value(); };
+  if (std::ranges::any_of(manifest.sources, has_stills)) fingerprint["stills"] = kStillSampling;
   const auto moves_objects = [](const SourceSpec& source) {
     return source.pairs.stills && source.pairs.stills->objects;
   };

@@ -58,7 +58,7 @@ def kind_of(inputs, outputs, kernel, stride, widest):
 def pass_of(lines):
     """Milliseconds and multiply-adds of one pass by kind of layer, from the lines that it printed."""
     shapes = [[*map(int, found.groups()[:8]), float(found[9])] for found in map(LINE.match, lines) if found]
-    widest = max((shape[1] for shape in shapes if shape[5] == 2), default=0)  # on AVX2 alone float32 has none
+    widest = max((shape[1] for shape in shapes if shape[5] == 2), default=0)  # float32 by Winograd's kernels has none
     kinds = {kind: [0.0, 0] for kind in KINDS}
     for inputs, outputs, _, rows, kernel, stride, _, columns, milliseconds in shapes:
         sums = kinds[kind_of(inputs, outputs, kernel, stride, widest)]

@@ -1,12 +1,11 @@
 #include "stages/frames/decoding/moving_still.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <opencv2/imgproc.hpp>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <utility>
 
@@ -16,6 +15,7 @@
 #include "stages/frames/decoding/detail/scaled_layers.h"
 #include "stages/frames/decoding/detail/still_layers.h"
 #include "stages/frames/decoding/detail/unless_refused.h"
+#include "stages/frames/decoding/prepared_frame.h"
 #include "stages/frames/decoding/still_clip.h"
 
 namespace eventgan {
@@ -202,7 +202,8 @@ class ClipMotion final : public Motion {
         label_position_(pair.label_position) {}
 
   cv::Mat frame(double u) const override {
-    GreyImage grey = layers_->frame(pose_between(from_, to_, u));
+    // The ends exactly, which other pairs of the clip have, too.
+    GreyImage grey = layers_->frame(u == 0 ? from_ : u == 1 ? to_ : pose_between(from_, to_, u));
     return cv::Mat(grey.size.height, grey.size.width, CV_8UC1, grey.pixels.data()).clone();
   }
 

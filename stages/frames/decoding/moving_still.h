@@ -11,19 +11,22 @@
 
 namespace eventgan {
 
+/// Of a plan's fingerprint: another one wherever stills' frames would have other pixels.
+inline constexpr const char* kStillSampling = "in the volume's size, bicubic";
+
 /// An image that pairs are made of.
 using SharedImage = std::shared_ptr<const ColourFrame>;
 
 /// A still whose image and objects move, taken apart (detail/still_layers.h) once for its pair
 /// (FramePair::motion), or for all pairs of a clip that is made of it (FramePair::poses).
 ///
-/// The labelled frame of a pair is the image itself, prepared as prepare_frame does. What moves is
-/// sampled in the volume's size (detail/scaled_layers.h), bicubic (Keys with a = -0.75): the image
-/// where moved_to_labelled leads, or image_in_clip back; before it objects that move on their own
-/// (FramePair::objects) where object_to_labelled leads, or object_in_clip back, the farther ones
-/// first; what they uncover is filled. Where grey is made before resizing the grey image is moved.
-/// Of a pair the borders that only one of both images shows are left out (placement.h); of a clip,
-/// frames are what its window shows. Thread safe.
+/// The labelled frame of a pair with a motion is the image itself, prepared as prepare_frame does.
+/// All other frames, of clips all, are sampled in the volume's size (detail/scaled_layers.h),
+/// bicubic (Keys with a = -0.75): the image where moved_to_labelled leads, or image_in_clip back;
+/// before it objects that move on their own (FramePair::objects) where object_to_labelled leads, or
+/// object_in_clip back, the farther ones first; what they uncover is filled. Where grey is made
+/// before resizing the grey image is moved. Of a pair the borders that only one of both images
+/// shows are left out (placement.h); of a clip, frames are what its window shows. Thread safe.
 class MovingStill {
  public:
   /// `boxes`: of the still; those without an outline do not move on their own. Of a clip, `pair` is
@@ -35,8 +38,9 @@ class MovingStill {
   const Placement& placement() const;
 
   /// Both frames, u = 0 and 1, and what is between them: image and objects move steadily from one
-  /// to the other (manifests/values/still_motion.h). `pair`: the one it was made of, or of the
-  /// same clip. It keeps what it needs of this. Throws as above, also when asked for a frame.
+  /// to the other (manifests/values/still_motion.h). `pair`: the one it was made of, or one of the
+  /// same clip, with both of its poses. It keeps what it needs of this. Throws as above, also when
+  /// asked for a frame.
   FramesBetween frames(const FramePair& pair) const;
 
   /// For each pixel of the volume the motion of the image, or of the object that covers at least

@@ -84,7 +84,7 @@ PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_und
       tells_between_(tells_between),
       images_(std::make_unique<RecentlyUsed<std::string, SharedFrame>>(2 * pairs_under_way +
                                                                        kLongestGap + kMargin)),
-      clips_(std::make_unique<RecentlyUsed<std::string, std::shared_ptr<const Clip>>>(2)),
+      clips_(std::make_unique<RecentlyUsed<std::string, std::shared_ptr<const Clip>>>(1)),
       files_(std::make_unique<FilesAhead>()),
       stills_(base_, pairs_under_way + kMargin),
       videos_(std::make_unique<OpenVideos<SharedFrame>>(
@@ -139,7 +139,7 @@ struct PairReader::Clip {
   StillPose pose;  ///< any one
   MovingStill still;
 
-  /// Another source may make other clips of the image.
+  /// Another source may make other clips of the image; those are taken apart for each pair.
   bool is_of(const std::vector<Box>& others, const StillPose& other) const {
     const auto moves = [](const std::optional<ImageMotion>& object) { return object.has_value(); };
     return boxes == others && std::ranges::equal(pose.objects, other.objects, {}, moves, moves);
@@ -156,7 +156,7 @@ Outcome<MovingStill> PairReader::still_of_clip(const FramePair& pair, ImageOrien
   if (pair.next.video_frame < 0) {
     const auto clip = clips_->get(name_of(pair.next, orientation), [&] {
       SharedImage image = *still_image(pair.next, orientation, stride);
-      return std::make_shared<const Clip>(boxes, pose, take_apart(std::move(image)));
+      return std::make_shared<const Clip>(Clip{boxes, pose, take_apart(std::move(image))});
     });
     if (clip->is_of(boxes, pose)) return clip->still;
   }
@@ -188,7 +188,7 @@ Outcome<PreparedPair> PairReader::still(const FramePair& planned, ImageOrientati
     prepared.outlines = outlines;
     if (with_flow) prepared.flow = moving->flow(pair);
     if (tells_between_) prepared.between = std::move(frames);
-    if (settle) prepared.settled = std::move(pair);
+    if (settle && planned.poses.empty()) prepared.settled = std::move(pair);
     return prepared;
   } catch (const std::runtime_error& error) {
     return fault_in(planned.next, error.what());

@@ -55,7 +55,7 @@ class FilesAhead {
 ///
 /// A still's pair (FramePair::motion) is made of its one image (MovingStill); of a video, besides,
 /// as many whole colour frames are kept as prepared ones, and of clips' stills (FramePair::poses)
-/// the last two, so that an image is decoded and taken apart once for all of its clip.
+/// the last image of a file, so that it is decoded and taken apart once for all of its clip.
 ///
 /// The two frames must have one size. Thread safety: `read` may be called from several threads;
 /// images are decoded in parallel, videos one frame after another under a lock.
@@ -77,7 +77,8 @@ class PairReader {
   /// differ, or if too little can be seen of a still after its motion. `still_stride`: of the video
   /// that a still is in, each so many of whose frames are taken (SourceSpec::every). `boxes`: those
   /// that FramePair::objects is of; those without an outline are cut out of the image (cut_out.h).
-  /// `settle`: what a still's pair is once its image's size is known; PreparedPair::settled then.
+  /// `settle`: what a still's pair, not of a clip, is once its image's size is known;
+  /// PreparedPair::settled then.
   /// `with_flow`: fills PreparedPair::flow of a still.
   Outcome<PreparedPair> read(const FramePair& pair,
                              ImageOrientation orientation = ImageOrientation::kStored,
@@ -90,12 +91,11 @@ class PairReader {
               ImageOrientation orientation = ImageOrientation::kStored) const;
 
  private:
+  struct Clip;  // what the pairs of a clip share
+
   Outcome<std::array<SharedFrame, 2>> frames(const FramePair& pair,
                                              ImageOrientation orientation) const;
   SharedFrame frame(const FrameRef& ref, ImageOrientation orientation) const;
-  /// What the pairs of a clip share.
-  struct Clip;
-
   Outcome<SharedImage> still_image(const FrameRef& still, ImageOrientation orientation,
                                    std::int64_t stride) const;
   Outcome<MovingStill> still_of_clip(const FramePair& pair, ImageOrientation orientation,

@@ -78,7 +78,8 @@ std::vector<std::uint8_t> finished(cv::Mat scaled, const Placement& placement,
                                    const ImageSpec& spec) {
   if (spec.blur != 0) {
     cv::Mat blurred;
-    cv::GaussianBlur(scaled, blurred, cv::Size(spec.blur, spec.blur), 0);
+    cv::GaussianBlur(scaled, blurred, cv::Size(spec.blur, spec.blur), 0, 0,
+                     cv::BORDER_DEFAULT | cv::BORDER_ISOLATED);  // nothing from beyond a cut
     scaled = blurred;
   }
   const VisiblePart part = visible_part(placement);

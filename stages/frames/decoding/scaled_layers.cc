@@ -27,9 +27,6 @@ constexpr int kShare = 1 << kShareBits;  // of both pixels of a resized one
 constexpr int kLevel = 128;              // of a plane, to a grey level
 constexpr int kRowLevel = kLevel / 4;    // of a row: the upper half of a product is kept
 constexpr int kWhite = 255 * kRowLevel;
-// To round with, less what OpenCV's resizing loses on average by rounding down, an eighth: the
-// labelled frame, which is resized by it, must not be darker than the others.
-constexpr int kHalfLevel = kRowLevel / 2 - kRowLevel / 8 - 1;
 
 using Weights = std::array<std::int16_t, 2 * kTaps>;  // twice the same
 
@@ -146,6 +143,16 @@ bool is_identity(const AffineMap& map) {
                             [](double a, double b) { return std::abs(a - b) < 1e-9; });
 }
 
+/// With that, frames are on average as bright as the labelled one, which OpenCV resizes: it rounds
+/// down by an eighth of a level, but up by as much to exactly half the size.
+int half_level_of(const Placement& placement) {
+  constexpr int kHalf = kRowLevel / 2, kEighth = kRowLevel / 8;
+  const ImageSize cut = placement.cut(), scaled = placement.scaled;
+  if (cut == scaled) return kHalf;
+  const bool is_half = cut.width == 2 * scaled.width && cut.height == 2 * scaled.height;
+  return is_half ? kHalf + kEighth : kHalf - kEighth;
+}
+
 cv::Mat with_border(const cv::Mat& values) {
   cv::Mat bordered;
   cv::copyMakeBorder(values, bordered, kBefore, kBehind, kBefore, kBehind, cv::BORDER_REPLICATE);
@@ -172,6 +179,7 @@ ScaledLayers::ScaledLayers(const StillLayers& layers, const Placement& placement
     : layers_(layers),
       columns_(axis(origin.x + placement.border_x, placement.cut().width, placement.scaled.width)),
       rows_(axis(origin.y + placement.border_y, placement.cut().height, placement.scaled.height)),
+      half_level_(half_level_of(placement)),
       resting_(std::move(resting)) {
   if (resting_.empty()) background_ = with_border(levels_of(layers.background()));
   for (const StillLayers::Layer& layer : layers.layers()) {
@@ -283,8 +291,8 @@ cv::Mat ScaledLayers::frame(const AffineMap& background,
         row[x] = static_cast<std::int16_t>(covering[x] + behind_it);
       }
     }
-    std::ranges::transform(row, frame.ptr(y), [](std::int16_t level) {
-      return static_cast<std::uint8_t>(std::min((level + kHalfLevel) / kRowLevel, 255));
+    std::ranges::transform(row, frame.ptr(y), [this](std::int16_t level) {
+      return static_cast<std::uint8_t>(std::min((level + half_level_) / kRowLevel, 255));
     });
   }
   return frame;

@@ -9,6 +9,7 @@
 
 #include "manifests/values/frames.h"
 #include "manifests/values/labels.h"
+#include "manifests/values/placement.h"
 #include "manifests/values/still_motion.h"
 #include "stages/frames/decoding/prepared_frame.h"
 
@@ -29,9 +30,9 @@ class StillClip {
   /// std::runtime_error if OpenCV refuses it.
   std::vector<std::uint8_t> frame(const StillPose& pose) const;
 
-  /// Of poses that frame, grey and resized as `placement` of size() says: [y, x] uint8 of
-  /// placement.scaled, sampled there (detail/scaled_layers.h). What is returned throws as `frame`,
-  /// keeps what it needs but for the image, and is thread safe.
+  /// Makes that frame of a pose, grey and resized by `placement`, which is of an image of size():
+  /// [y, x] uint8 of placement.scaled (detail/scaled_layers.h). The image must be grey or BGR. What
+  /// is returned throws as `frame`, keeps what it needs but for the image, and is thread safe.
   std::function<GreyImage(const StillPose&)> resized(const Placement& placement) const;
 
   /// What each pixel of that frame shows: [y, x] of size(), 0 the image, else 1 + the box of the

@@ -128,10 +128,12 @@ int tiles_at_once(int bytes_of_tile) {
 
 bool winograd_fits(int base_channels, Precision precision) {
 #if defined(__x86_64__)
-  // Without AVX-512 there is no bfloat16. Of AMD's family 19h only Zen 4 has it.
+  // Without AVX-512 there is no bfloat16. Of AMD's family 19h only Zen 4 has AVX-512, in two halves
+  // of 256 bits, so that oneDNN's wider convolutions gain nothing by it.
+  const OnednnSupport bfloat16 = onednn_support(Precision::kBfloat16);
   return base_channels % kEight == 0 && precision == Precision::kFloat32 &&
          processor_has(dnnl::cpu_isa::avx2) && __builtin_cpu_supports("fma") &&
-         (!onednn_support(Precision::kBfloat16).able || __builtin_cpu_is("amdfam19h"));
+         (!bfloat16.able || (bfloat16.native && __builtin_cpu_is("amdfam19h")));
 #else
   static_cast<void>(base_channels), static_cast<void>(precision);
   return false;

@@ -14,7 +14,7 @@ namespace eventgan {
 
 /// Whether a network of this base width computes all of its layers by the kernels of this file and
 /// plane_layers.h: in float32, on a processor with AVX2 and FMA that has no AVX-512, as oneDNN sees
-/// it, or computes its 512 bits in two halves (AMD's Zen 4).
+/// it, or computes its 512 bits in two halves (AMD's Zen 4, unless oneDNN is limited to less).
 bool winograd_fits(int base_channels, Precision precision);
 /// Counts up with what changes their bytes.
 inline constexpr int kWinogradVersion = 1;

@@ -80,8 +80,10 @@ TEST_F(Fingerprint, HasFfmpegWhereFramesComeFromVideos) {
   EXPECT_THAT(make().at("libraries"), ::testing::ContainsRegex(", FFmpeg [0-9]+\\.[0-9]+"));
 }
 
-TEST_F(Fingerprint, HasHowObjectsAreCutOutWhereTheyMove) {
+TEST_F(Fingerprint, HasHowStillsAreSampledAndObjectsCutOutWhereTheyMove) {
+  EXPECT_FALSE(make().contains("stills"));
   manifest_.sources[0].pairs.stills.emplace();
+  EXPECT_TRUE(make().contains("stills"));
   EXPECT_FALSE(make().contains("cut_out"));
   manifest_.sources[0].pairs.stills->objects.emplace();
   EXPECT_TRUE(make().contains("cut_out"));

@@ -10,11 +10,11 @@
 
 namespace eventgan {
 
-/// A photograph in layers as the volume shows it: StillLayers::frame, made grey and resized, for
-/// many frames between two. Each pixel is sampled once where it lies in the photograph, by the
-/// kernel of the motion and that of the resizing in one, so that nothing is rendered in the
-/// photograph's size. It differs from that frame by rounding, and a little more at the edges of
-/// what moves.
+/// A photograph in layers as the volume shows it: StillLayers::frame, made grey and resized. Each
+/// pixel is sampled once where it lies in the photograph, by the kernel of the motion and that of
+/// the resizing in one, so that nothing is rendered in the photograph's size. It differs from that
+/// frame by rounding, by as much as the kernel of the resizing does not turn and grow with the
+/// motion, and a little more at the edges of what moves.
 class ScaledLayers {
  public:
   /// `layers` must outlive it. `placement` is of the part of the photograph that begins at
@@ -46,6 +46,7 @@ class ScaledLayers {
 
   const StillLayers& layers_;
   Axis columns_, rows_;
+  int half_level_;  ///< of a row, to round with
   cv::Mat resting_;
   cv::Mat background_;  ///< as Planes, 128 a level
   std::vector<Planes> planes_;

@@ -214,7 +214,7 @@ TEST(PairReader, FramesOfAVideoAndOfAFolderPair) {
 
 TEST(PairReader, AStillIsDecodedOnceForAllOfItsClip) {
   const TemporaryFolder folder;
-  for (const auto& [name, grey] : {std::pair{"a.png", 77}, {"b.png", 99}, {"c.png", 55}}) {
+  for (const auto& [name, grey] : {std::pair{"a.png", 77}, {"b.png", 99}}) {
     cv::imwrite((folder / name).string(), cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(grey)));
   }
   for (const bool tells_between : {false, true}) {
@@ -233,8 +233,7 @@ TEST(PairReader, AStillIsDecodedOnceForAllOfItsClip) {
     EXPECT_EQ(second->input, first->input);
     EXPECT_EQ(level(second->input.front()), 77);
     EXPECT_EQ(level(clip("b.png")->input.front()), 99);
-    EXPECT_EQ(level(clip("c.png")->input.front()), 55);
-    EXPECT_TRUE(is_fault(clip("a.png"))) << "the last two are kept";
+    EXPECT_TRUE(is_fault(clip("a.png"))) << "the last one alone is kept";
     fs::rename(folder / "away.png", folder / "a.png");
   }
 }

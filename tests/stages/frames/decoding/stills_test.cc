@@ -1,6 +1,7 @@
-
+#include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "stages/frames/decoding/moving_still.h"
 #include "stages/frames/decoding/pair_reader.h"
@@ -214,6 +215,29 @@ TEST_F(Stills, MovedAndUnmovedImagesAreNotConfused) {
   const PairReader shared(folder_.path(), spec_);
   for (const FramePair& pair : {sequence, little, much, sequence, much, little}) {
     EXPECT_EQ(shared.read(pair)->input, read(pair)->input);
+  }
+}
+
+TEST_F(Stills, MovedFramesAreAsBrightAsTheLabelledOne) {
+  cv::Mat grey = noise({240, 320}), colour;
+  cv::GaussianBlur(grey, grey, {}, 2);
+  cv::normalize(grey, grey, 0, 255, cv::NORM_MINMAX);
+  cv::cvtColor(grey, colour, cv::COLOR_GRAY2BGR);
+  const auto image = std::make_shared<const ColourFrame>(
+      ColourFrame{{240, 320}, {colour.datastart, colour.dataend}});
+  const FramePair pair = still_of({}, {.x_px = 4.25, .y_px = -3.25});
+  const ImageSize cut = place(image->size, spec_, pair).cut();
+  for (const ImageSize size : {cut, ImageSize{cut.height / 2, cut.width / 2}, {100, 133}}) {
+    spec_.size = size;
+    spec_.fit = ImageFit::kStretch;
+    const MovingStill still(image, pair, spec_);
+    const GreyImage moved = still.frames(pair).at(0);
+    const auto placed = place_colour(move_still(*image, pair), still.placement());
+    double difference = 0;
+    for (std::size_t i = 0; i < moved.pixels.size(); ++i) {
+      difference += double(moved.pixels[i]) - placed[3 * i];
+    }
+    EXPECT_NEAR(difference / moved.pixels.size(), 0, 0.07) << to_string(size);
   }
 }
 
