@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -150,11 +151,15 @@ TEST_F(ConvertParts, WhatAnotherWorkerFinishesWhileItIsMadeHereTooIsTaken) {
   ConversionOptions shared = options("out", /*threads=*/1);  // so that it is asked between writes
   // Asked before each sample is written. Takes the unfinished shard and its claim away, as a worker
   // does that takes this one for dead, and makes the shard in its place.
+  std::mutex asked;  // by several threads
+  bool is_taken = false;
   shared.since_stop_request = [&]() -> std::optional<double> {
-    if (!std::filesystem::exists(out(""))) return std::nullopt;
+    const std::lock_guard lock(asked);
+    if (is_taken || !std::filesystem::exists(out(""))) return std::nullopt;
     std::vector<UnfinishedFile> files = unfinished_files(out(""));
     std::erase_if(files, [&](const auto& file) { return file.name.target != shard + ".h5"; });
     if (files.size() < 2) return std::nullopt;
+    is_taken = true;
     for (const char* extension : {".h5", ".json"}) {
       std::filesystem::copy_file(out(shard + extension, "whole"), out(shard + extension));
     }
