@@ -382,6 +382,102 @@ EVENTGAN_CLONES void widen(std::span<const float> values, std::span<float> lowes
   }
 }
 
+EVENTGAN_CLONES void widen(std::span<const std::uint8_t> levels, std::span<std::uint8_t> lowest,
+                           std::span<std::uint8_t> highest) {
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    lowest[i] = std::min(lowest[i], levels[i]);
+    highest[i] = std::max(highest[i], levels[i]);
+  }
+}
+
+/// What the pixels of a row see, image by image.
+class SeenRow {
+ public:
+  virtual ~SeenRow() = default;
+
+  virtual void go_to(int y) = 0;
+
+  /// The light that each pixel sees first, least, and most.
+  virtual void range(std::span<float> first, std::span<float> lowest, std::span<float> highest) = 0;
+
+  /// A pixel's log intensity, by image.
+  virtual void look(std::size_t x, std::span<float> logs) const = 0;
+};
+
+/// Of images that are drawn row by row.
+class DrawnRow final : public SeenRow {
+ public:
+  DrawnRow(const IntensityRow& images, std::size_t count, std::size_t width, float epsilon)
+      : images_(images), width_(width), epsilon_(epsilon), light_(count * width) {}
+
+  void go_to(int y) override {
+    for (std::size_t i = 0; i * width_ < light_.size(); ++i) {
+      images_(i, y, std::span(light_).subspan(i * width_, width_));
+    }
+  }
+
+  void range(std::span<float> first, std::span<float> lowest, std::span<float> highest) override {
+    for (const auto& light : {first, lowest, highest}) {
+      std::copy_n(light_.begin(), width_, light.begin());
+    }
+    for (std::size_t i = width_; i < light_.size(); i += width_) {
+      widen(std::span(light_).subspan(i, width_), lowest, highest);
+    }
+  }
+
+  void look(std::size_t x, std::span<float> logs) const override {
+    for (std::size_t k = 0; k < logs.size(); ++k) {
+      logs[k] = std::log(light_[k * width_ + x] + epsilon_);
+    }
+  }
+
+ private:
+  const IntensityRow& images_;
+  std::size_t width_;
+  float epsilon_;
+  std::vector<float> light_;  ///< [image, x]
+};
+
+/// Of images of grey levels.
+class GreyRow final : public SeenRow {
+ public:
+  GreyRow(std::span<const GreyImage> images, std::size_t width, float epsilon)
+      : images_(images), lowest_(width), highest_(width) {
+    for (std::size_t level = 0; level < light_.size(); ++level) {
+      light_[level] = static_cast<float>(level) / 255.0f;
+      logs_[level] = std::log(light_[level] + epsilon);
+    }
+  }
+
+  void go_to(int y) override { start_ = static_cast<std::size_t>(y) * lowest_.size(); }
+
+  void range(std::span<float> first, std::span<float> lowest, std::span<float> highest) override {
+    const auto row = [&](const GreyImage& image) {
+      return std::span(image.pixels).subspan(start_, lowest_.size());
+    };
+    std::ranges::copy(row(images_[0]), lowest_.begin());
+    highest_ = lowest_;
+    for (const GreyImage& image : images_.subspan(1)) widen(row(image), lowest_, highest_);
+    for (std::size_t x = 0; x < lowest_.size(); ++x) {
+      first[x] = light_[images_[0].pixels[start_ + x]];
+      lowest[x] = light_[lowest_[x]];
+      highest[x] = light_[highest_[x]];
+    }
+  }
+
+  void look(std::size_t x, std::span<float> logs) const override {
+    for (std::size_t k = 0; k < logs.size(); ++k) logs[k] = logs_[images_[k].pixels[start_ + x]];
+  }
+
+ private:
+  std::span<const GreyImage> images_;
+  std::array<float, 256> light_;  ///< by level
+  std::array<float, 256> logs_;
+  std::size_t start_ = 0;
+  std::vector<std::uint8_t> lowest_;
+  std::vector<std::uint8_t> highest_;
+};
+
 /// The least or greatest light that pixels see, and the ratio to the first that it must reach.
 struct Extreme {
   std::span<const float> light;
@@ -461,10 +557,10 @@ class RowRuns {
     only_light_ = !noise_ && !leaks_;
   }
 
-  /// intensity: [image, x] of row y.
-  void run(std::span<const float> intensity, int y, std::vector<Event>& events) {
+  void run(SeenRow& seen, int y, std::vector<Event>& events) {
     const std::size_t row = static_cast<std::size_t>(y) * width_;
-    find_pixels(intensity, row);
+    seen.go_to(y);
+    find_pixels(seen, row);
     positive_.draw(pixels_, positive_thresholds_);
     negative_.draw(pixels_, negative_thresholds_);
     for (std::size_t i = 0; i < pixels_.size(); ++i) {
@@ -475,7 +571,7 @@ class RowRuns {
                         positive_thresholds_[i],
                         negative_thresholds_[i],
                         leaks_ ? draw_leak(random_, pixels_[i]) : PixelLeak()};
-      look(intensity.subspan(x));
+      seen.look(x, logs_);
       PixelState state{.difference = pixel.leak.phase * pixel.positive_threshold,
                        .held_until_s = start_s_};
       for (std::size_t k = 0; k < steps_.size(); ++k) {
@@ -490,19 +586,14 @@ class RowRuns {
   static double log_error(std::size_t images) { return 1e-5 * static_cast<double>(images); }
 
   /// Those that may have an event, of a row whose first pixel has the number `row`.
-  void find_pixels(std::span<const float> intensity, std::size_t row) {
+  void find_pixels(SeenRow& seen, std::size_t row) {
     may_.assign(width_, true);
     if (only_light_) {
-      rise_.resize(width_);
-      fall_.resize(width_);
+      for (auto* values : {&first_, &lowest_, &highest_, &rise_, &fall_}) values->resize(width_);
       positive_.least_ratios(row, rise_);
       negative_.least_ratios(row, fall_);
-      lowest_.assign(intensity.begin(), intensity.begin() + static_cast<std::ptrdiff_t>(width_));
-      highest_ = lowest_;
-      for (std::size_t i = width_; i < intensity.size(); i += width_) {
-        widen(intensity.subspan(i, width_), lowest_, highest_);
-      }
-      compare(intensity.first(width_), epsilon_, {lowest_, fall_}, {highest_, rise_}, may_);
+      seen.range(first_, lowest_, highest_);
+      compare(first_, epsilon_, {lowest_, fall_}, {highest_, rise_}, may_);
     }
     pixels_.resize(width_);
     std::size_t count = 0;
@@ -511,13 +602,6 @@ class RowRuns {
       count += may_[x];
     }
     pixels_.resize(count);
-  }
-
-  /// Computes a pixel's logarithms.
-  void look(std::span<const float> intensity) {
-    for (std::size_t k = 0; k < logs_.size(); ++k) {
-      logs_[k] = std::log(intensity[k * width_] + epsilon_);
-    }
   }
 
   std::size_t width_;
@@ -532,6 +616,7 @@ class RowRuns {
   bool only_light_;  ///< neither noise nor leak: only changes of intensity give events
 
   // Of the row at hand.
+  std::vector<float> first_;
   std::vector<float> lowest_;
   std::vector<float> highest_;
   std::vector<float> rise_;
@@ -545,25 +630,36 @@ class RowRuns {
 
 }  // namespace
 
-std::vector<Event> pixel_events(const SensorSpec& spec, ImageSize size, const IntensityRow& images,
-                                std::span<const double> times_s, CounterRandom random) {
+namespace {
+
+std::vector<Event> events_of(SeenRow& seen, const SensorSpec& spec, ImageSize size,
+                             std::span<const double> times_s, const CounterRandom& random) {
   double before_s = std::numeric_limits<double>::lowest();
   for (const double t_s : times_s) {
     if (!std::isfinite(t_s) || !(t_s > before_s)) refuse_time(t_s, before_s);
     before_s = t_s;
   }
   RowRuns runs(spec, size, times_s, random);
-  const auto width = static_cast<std::size_t>(size.width);
-  std::vector<float> rows(times_s.size() * width);
   std::vector<Event> events;
   events.reserve(size.pixel_count());
-  for (int y = 0; y < size.height; ++y) {
-    for (std::size_t i = 0; i < times_s.size(); ++i) {
-      images(i, y, std::span(rows).subspan(i * width, width));
-    }
-    runs.run(rows, y, events);
-  }
+  for (int y = 0; y < size.height; ++y) runs.run(seen, y, events);
   return events;
+}
+
+}  // namespace
+
+std::vector<Event> pixel_events(const SensorSpec& spec, ImageSize size, const IntensityRow& images,
+                                std::span<const double> times_s, CounterRandom random) {
+  DrawnRow seen(images, times_s.size(), static_cast<std::size_t>(size.width),
+                static_cast<float>(spec.log_epsilon));
+  return events_of(seen, spec, size, times_s, random);
+}
+
+std::vector<Event> pixel_events(const SensorSpec& spec, std::span<const GreyImage> images,
+                                std::span<const double> times_s, CounterRandom random) {
+  const ImageSize size = images[0].size;
+  GreyRow seen(images, static_cast<std::size_t>(size.width), static_cast<float>(spec.log_epsilon));
+  return events_of(seen, spec, size, times_s, random);
 }
 
 }  // namespace eventgan

@@ -151,4 +151,8 @@ using IntensityRow = std::function<void(std::size_t image, int row, std::span<fl
 std::vector<Event> pixel_events(const SensorSpec& spec, ImageSize size, const IntensityRow& images,
                                 std::span<const double> times_s, CounterRandom random);
 
+/// Of images that are seen as linear_intensity has them: as many as times, all of one size.
+std::vector<Event> pixel_events(const SensorSpec& spec, std::span<const GreyImage> images,
+                                std::span<const double> times_s, CounterRandom random);
+
 }  // namespace eventgan

@@ -80,13 +80,7 @@ std::vector<Event> simulate_images(const std::vector<GreyImage>& images, const S
     if (image.size != size) throw std::invalid_argument("expected frames of one size");
     times_s.push_back(step_time_s(static_cast<int>(times_s.size()), steps, 0, duration_s));
   }
-  const auto row = [&](std::size_t image, int y, std::span<float> intensity) {
-    const std::size_t start = static_cast<std::size_t>(y) * intensity.size();
-    std::ranges::transform(std::span(images[image].pixels).subspan(start, intensity.size()),
-                           intensity.begin(),
-                           [](std::uint8_t u) { return static_cast<float>(u) / 255.0f; });
-  };
-  return pixel_events(sensor, size, row, times_s, random);
+  return pixel_events(sensor, images, times_s, random);
 }
 
 std::vector<Event> simulate_difference(const GreyImage& previous, const GreyImage& next,
