@@ -118,12 +118,18 @@ class JpegFile {
     return 1;
   }
 
-  ColourFrame read() {
+  ColourFrame read(int reduced_by = 1, int orientation = 1) {
     ColourFrame frame{read_header(), {}};
     if (codec_.num_components != 1 && codec_.num_components != 3) {
       throw std::runtime_error(std::to_string(codec_.num_components) + " colour channels");
     }
-    frame.bgr.resize(3 * frame.size.pixel_count());
+    ImageSize& size = frame.size;
+    if (orientation == 1 || (size.width % reduced_by == 0 && size.height % reduced_by == 0)) {
+      codec_.scale_num = 1;
+      codec_.scale_denom = static_cast<unsigned>(reduced_by);
+      size = {(size.height - 1) / reduced_by + 1, (size.width - 1) / reduced_by + 1};
+    }
+    frame.bgr.resize(3 * size.pixel_count());
     codec_.out_color_space = JCS_EXT_BGR;
     const std::size_t row_bytes = 3 * static_cast<std::size_t>(frame.size.width);
     run_guarded(escape_, [&] {
@@ -147,6 +153,10 @@ class JpegFile {
 }  // namespace
 
 ColourFrame decode_jpeg(std::FILE* file) { return JpegFile(file).read(); }
+
+ColourFrame decode_reduced_jpeg(std::FILE* file, int by, int orientation) {
+  return JpegFile(file).read(by, orientation);
+}
 
 ImageSize jpeg_size(std::FILE* file) { return JpegFile(file).read_header(); }
 

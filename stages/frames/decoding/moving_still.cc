@@ -29,7 +29,8 @@ class Motion {
   /// The frame at u: [y, x] uint8 of the placement's scaled size, grey.
   virtual cv::Mat frame(double u) const = 0;
 
-  /// StillLayers::seen of either end; of a clip, of what its window shows.
+  /// StillLayers::seen of either end; of a clip, of what its window shows; of a reduced image, of
+  /// its pixels.
   virtual cv::Mat seen(double u) const = 0;
 
   /// Where what lies at a point of the labelled frame lies in the other one, if it is what `seen`
@@ -56,15 +57,23 @@ double farthest(const AffineMap& map, const Rectangle& around) {
 // How far an object goes on behind another beyond its outline, in a frame that nobody labels.
 constexpr double kFarthestBehind_px = 40;
 
+/// From a point of an image to where it lies in the reduced one.
+AffineMap reducing(int by) {
+  const double scale = 1.0 / by, shift = scale / 2 - 0.5;
+  return {scale, 0, shift, 0, scale, shift};
+}
+
 /// How image and objects of a still move from the one frame of its pair to the other.
 class MovingLayers {
  public:
-  /// The image is shared.
-  MovingLayers(const cv::Mat& image, const FramePair& pair, const std::vector<Box>& boxes)
-      : size_{image.rows, image.cols},
+  /// `image`: of that size, or reduced; shared.
+  MovingLayers(const cv::Mat& image, ImageSize size, int reduced_by, const FramePair& pair,
+               const std::vector<Box>& boxes)
+      : size_(size),
+        reduced_by_(reduced_by),
         pair_(pair),
         boxes_(boxes),
-        layers_(image, objects(), kFarthestBehind_px) {}
+        layers_(image, objects(), kFarthestBehind_px / reduced_by) {}
 
   const StillLayers& layers() const { return layers_; }
   double moved_end() const { return 1 - pair_.label_position; }
@@ -94,16 +103,31 @@ class MovingLayers {
                                    : object_to_labelled(size_, pair_, motion, boxes_.at(k), u);
   }
 
+  // As StillLayers wants them, in pixels of the image that it has.
+  AffineMap background_map(double u) const { return reduced(image_map(u)); }
+
   /// Of the boxes that have a motion; the others' are not looked at.
   std::vector<AffineMap> object_maps(double u) const {
     std::vector<AffineMap> maps(pair_.objects.size());
     for (std::size_t k = 0; k < maps.size(); ++k) {
-      if (pair_.objects[k]) maps[k] = object_map(k, u);
+      if (pair_.objects[k]) maps[k] = reduced(object_map(k, u));
     }
     return maps;
   }
 
  private:
+  AffineMap reduced(const AffineMap& map) const {
+    const AffineMap reduce = reducing(reduced_by_);
+    return compose(compose(reduce, map), inverse(reduce));
+  }
+
+  Outline reduced(Outline outline) const {
+    for (auto& ring : outline.rings) {
+      for (Point& corner : ring) corner = {corner.x / reduced_by_, corner.y / reduced_by_};
+    }
+    return outline;
+  }
+
   /// What the image holds of it, as points: an edge lies half a pixel before the centre of the
   /// pixel with its number.
   Rectangle seen_of(const Rectangle& edges) const {
@@ -126,12 +150,14 @@ class MovingLayers {
           reach_px = std::max(reach_px, farthest(over, bounds(boxes_[k].outline)));
         }
       }
-      objects.push_back({k, boxes_[k].outline, boxes_[k].xyxy.bottom, reach_px});
+      objects.push_back(
+          {k, reduced(boxes_[k].outline), boxes_[k].xyxy.bottom, reach_px / reduced_by_});
     }
     return objects;
   }
 
   ImageSize size_;
+  int reduced_by_;
   FramePair pair_;
   std::vector<Box> boxes_;
   StillLayers layers_;
@@ -139,18 +165,18 @@ class MovingLayers {
 
 class PairMotion final : public Motion {
  public:
-  PairMotion(SharedImage image, const FramePair& pair, const ImageSpec& spec,
+  PairMotion(StillImage image, const FramePair& pair, const ImageSpec& spec,
              const std::vector<Box>& boxes, const Placement& placement)
       : image_(std::move(image)),
-        still_(grey_if_first({image_->size, image_->bgr.data()}, spec)),
+        still_(grey_if_first({image_.pixels->size, image_.pixels->bgr.data()}, spec)),
         label_position_(pair.label_position),
         placement_(placement),
-        moving_(still_.image, pair, boxes),
-        scaled_(moving_.layers(), placement, {}, resting()) {}
+        moving_(still_.image, image_.size, image_.reduced_by, pair, boxes),
+        scaled_(moving_.layers(), placement, {}, image_.reduced_by, resting()) {}
 
   cv::Mat frame(double u) const override {
-    if (u == label_position_) return scaled_grey(still_, placement_);
-    return scaled_.frame(moving_.image_map(u), moving_.object_maps(u));
+    if (u == label_position_) return at_rest(still_.image);
+    return scaled_.frame(moving_.background_map(u), moving_.object_maps(u));
   }
 
   cv::Mat seen(double u) const override { return moving_.layers().seen(moving_.object_maps(u)); }
@@ -166,11 +192,18 @@ class PairMotion final : public Motion {
   /// The frame of all that rests, if the image does.
   cv::Mat resting() const {
     if (!moving_.image_rests()) return {};
-    const cv::Mat frame = moving_.layers().resting_frame(moving_.object_maps(moving_.moved_end()));
-    return scaled_grey({frame, still_.channels}, placement_);
+    return at_rest(moving_.layers().resting_frame(moving_.object_maps(moving_.moved_end())));
   }
 
-  SharedImage image_;
+  /// An image of the still's size and channels as a frame.
+  cv::Mat at_rest(const cv::Mat& image) const {
+    if (image_.reduced_by == 1) return scaled_grey({image, still_.channels}, placement_);
+    const StillLayers background(image, {}, 0);
+    return ScaledLayers(background, placement_, {}, image_.reduced_by)
+        .frame({1, 0, 0, 0, 1, 0}, {});
+  }
+
+  StillImage image_;
   Resizable still_;
   double label_position_;
   Placement placement_;
@@ -227,7 +260,8 @@ class ClipMotion final : public Motion {
   double label_position_;
 };
 
-PixelFlow flow_of(const Motion& motion, double label_position, const Placement& placement) {
+PixelFlow flow_of(const Motion& motion, double label_position, const Placement& placement,
+                  int reduced_by) {
   constexpr double kSteps = 128;  // to a pixel, as in DSEC's files; they compress well, too
   // By way of integers, several times as fast as round().
   const auto stepped = [](double px) {
@@ -235,14 +269,15 @@ PixelFlow flow_of(const Motion& motion, double label_position, const Placement& 
   };
   const VisiblePart part = visible_part(placement);
   const AffineMap to_volume = placement.source_to_volume(), to_source = inverse(to_volume);
+  const AffineMap to_seen = compose(reducing(reduced_by), to_source);
   const cv::Mat here = motion.seen(label_position), there = motion.seen(1 - label_position);
   const auto shown = [&](const cv::Mat& seen, Point at) -> std::size_t {
     if (seen.empty()) return 0;
-    const Point source = mapped(to_source, at);
-    const auto nearest = [](double place, int count) {
-      return static_cast<int>(std::clamp(place, 0.0, count - 1.0) + 0.5);
+    const Point place = mapped(to_seen, at);
+    const auto nearest = [](double pixel, int count) {
+      return static_cast<int>(std::clamp(pixel, 0.0, count - 1.0) + 0.5);
     };
-    return seen.at<std::uint16_t>(nearest(source.y, seen.rows), nearest(source.x, seen.cols));
+    return seen.at<std::uint16_t>(nearest(place.y, seen.rows), nearest(place.x, seen.cols));
   };
   std::vector<std::optional<AffineMap>> steps;  // from the labelled frame, in the volume
   const auto step_of = [&](std::size_t number) {
@@ -279,8 +314,19 @@ PixelFlow flow_of(const Motion& motion, double label_position, const Placement& 
 
 }  // namespace
 
+int still_reduction(ImageSize whole, const ImageSpec& spec, const FramePair& pair) {
+  return unless_refused([&] {
+    const Placement placement = place(whole, spec, pair);
+    const ImageSize cut = placement.cut(), scaled = placement.scaled;
+    int by = 8;
+    while (by > 1 && (by * scaled.width > cut.width || by * scaled.height > cut.height)) by /= 2;
+    return by;
+  });
+}
+
 struct MovingStill::State {
   ImageSpec spec;
+  int reduced_by;
   Placement placement;
   std::shared_ptr<const Motion> pair;      ///< of a still's one pair
   std::shared_ptr<const ClipLayers> clip;  ///< of a clip
@@ -290,17 +336,18 @@ struct MovingStill::State {
   }
 };
 
-MovingStill::MovingStill(SharedImage image, const FramePair& pair, const ImageSpec& spec,
+MovingStill::MovingStill(StillImage image, const FramePair& pair, const ImageSpec& spec,
                          const std::vector<Box>& boxes)
     : state_(unless_refused([&] {
-        State state{.spec = spec, .placement = {}, .pair = {}, .clip = {}};
+        State state{
+            .spec = spec, .reduced_by = image.reduced_by, .placement = {}, .pair = {}, .clip = {}};
         if (pair.poses.empty()) {
-          state.placement = place(image->size, spec, pair);
+          state.placement = place(image.size, spec, pair);
           state.pair = std::make_shared<const PairMotion>(std::move(image), pair, spec, boxes,
                                                           state.placement);
         } else {
-          state.placement = place(clip_window(image->size).size, spec);
-          state.clip = std::make_shared<const ClipLayers>(std::move(image), spec, boxes,
+          state.placement = place(clip_window(image.size).size, spec);
+          state.clip = std::make_shared<const ClipLayers>(std::move(image.pixels), spec, boxes,
                                                           pair.poses.at(0), state.placement);
         }
         return std::make_shared<const State>(std::move(state));
@@ -324,17 +371,19 @@ FramesBetween MovingStill::frames(const FramePair& pair) const {
 }
 
 PixelFlow MovingStill::flow(const FramePair& pair) const {
-  return unless_refused(
-      [&] { return flow_of(*state_->motion(pair), pair.label_position, state_->placement); });
+  return unless_refused([&] {
+    return flow_of(*state_->motion(pair), pair.label_position, state_->placement,
+                   state_->reduced_by);
+  });
 }
 
 ColourFrame move_still(const ColourFrame& image, const FramePair& pair,
                        const std::vector<Box>& boxes) {
   return unless_refused([&] {
     const cv::Mat labelled = matrix_of({image.size, image.bgr.data()});
-    const MovingLayers moving(labelled, pair, boxes);
+    const MovingLayers moving(labelled, image.size, 1, pair, boxes);
     const double u = moving.moved_end();
-    const cv::Mat result = moving.layers().frame(moving.image_map(u), moving.object_maps(u));
+    const cv::Mat result = moving.layers().frame(moving.background_map(u), moving.object_maps(u));
     return ColourFrame{image.size, {result.datastart, result.dataend}};
   });
 }

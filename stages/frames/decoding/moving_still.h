@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "manifests/values/frames.h"
@@ -12,15 +13,32 @@
 namespace eventgan {
 
 /// Of a plan's fingerprint: another one wherever stills' frames would have other pixels.
-inline constexpr const char* kStillSampling = "in the volume's size, bicubic";
+inline constexpr const char* kStillSampling =
+    "in the volume's size, bicubic; JPEGs at 1/2, 1/4, 1/8 where that is no less";
 
-/// An image that pairs are made of.
 using SharedImage = std::shared_ptr<const ColourFrame>;
+
+/// An image that pairs are made of; perhaps reduced (decode_image), which nobody else need know:
+/// all places are those of the whole image.
+struct StillImage {
+  SharedImage pixels;
+  ImageSize size;  ///< of the whole image
+  int reduced_by = 1;
+
+  StillImage(SharedImage image) : pixels(std::move(image)), size(pixels->size) {}
+  StillImage(SharedImage image, ImageSize whole, int by)
+      : pixels(std::move(image)), size(whole), reduced_by(by) {}
+};
+
+/// By how much, 8, 4, 2 or 1, the still of a pair with a motion may be reduced and still have a
+/// pixel for each that the volume shows. Throws as MovingStill. Thread safe.
+int still_reduction(ImageSize whole, const ImageSpec& spec, const FramePair& pair);
 
 /// A still whose image and objects move, taken apart (detail/still_layers.h) once for its pair
 /// (FramePair::motion), or for all pairs of a clip that is made of it (FramePair::poses).
 ///
-/// The labelled frame of a pair with a motion is the image itself, prepared as prepare_frame does.
+/// The labelled frame of a pair with a motion is the image itself, prepared as prepare_frame does,
+/// but sampled as all others if it is reduced.
 /// All other frames, of clips all, are sampled in the volume's size (detail/scaled_layers.h),
 /// bicubic (Keys with a = -0.75): the image where moved_to_labelled leads, or image_in_clip back;
 /// before it objects that move on their own (FramePair::objects) where object_to_labelled leads, or
@@ -31,8 +49,8 @@ class MovingStill {
  public:
   /// `boxes`: of the still; those without an outline do not move on their own. Of a clip, `pair` is
   /// any one. Throws std::runtime_error "expected X, got Y" if the image cannot be placed, resized,
-  /// or moved, if a side is beyond kMostStillSide, and if too little of it would be left.
-  MovingStill(SharedImage image, const FramePair& pair, const ImageSpec& spec,
+  /// or moved, if a side is beyond 32,766 pixels, and if too little of it would be left.
+  MovingStill(StillImage image, const FramePair& pair, const ImageSpec& spec,
               const std::vector<Box>& boxes = {});
 
   const Placement& placement() const;
@@ -55,8 +73,8 @@ class MovingStill {
 };
 
 /// The moved frame of a still's pair, of the image's size and in colour, for looking at: as
-/// MovingStill's but for rounding. Places beyond the image take its nearest pixel, for `place` to
-/// cut away. Throws as MovingStill. Thread safe.
+/// MovingStill's but for rounding, of the whole image. Places beyond the image take its nearest
+/// pixel, for `place` to cut away. Throws as MovingStill. Thread safe.
 ColourFrame move_still(const ColourFrame& image, const FramePair& pair,
                        const std::vector<Box>& boxes = {});
 

@@ -75,6 +75,18 @@ SampleFault fault_in(const FrameRef& frame, const std::string& reason) {
   return {reason + ", in " + frame.path};
 }
 
+/// Boxes and outlines of an image `factor` times as large.
+std::vector<Box> resized(std::vector<Box> boxes, double factor) {
+  for (Box& box : boxes) {
+    Rectangle& edges = box.xyxy;
+    edges = {edges.left * factor, edges.top * factor, edges.right * factor, edges.bottom * factor};
+    for (std::vector<Point>& ring : box.outline.rings) {
+      for (Point& corner : ring) corner = {corner.x * factor, corner.y * factor};
+    }
+  }
+  return boxes;
+}
+
 }  // namespace
 
 PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_under_way,
@@ -134,6 +146,26 @@ Outcome<SharedImage> PairReader::still_image(const FrameRef& still, ImageOrienta
       decode_image(files_->take(base_ / still.path), orientation, spec_.range));
 }
 
+/// The image of a still's one pair, which is settled.
+Outcome<StillImage> PairReader::settled_image(FramePair& pair, ImageOrientation orientation,
+                                              std::int64_t stride, const Settle& settle) const {
+  const FramePair planned = pair;
+  if (pair.next.video_frame >= 0) {
+    Outcome<SharedImage> image = still_image(pair.next, orientation, stride);
+    if (is_fault(image)) return image.fault();
+    if (settle) pair = settle(planned, (*image)->size);
+    return StillImage(*std::move(image));
+  }
+  const InputFile file = files_->take(base_ / pair.next.path);
+  const ImageSize size = image_size(file, orientation);
+  if (settle) pair = settle(planned, size);
+  const int by = still_reduction(size, spec_, pair);
+  auto image =
+      std::make_shared<const ColourFrame>(decode_image(file, orientation, spec_.range, by));
+  return image->size == size ? StillImage(std::move(image))
+                             : StillImage(std::move(image), size, by);
+}
+
 struct PairReader::Clip {
   std::vector<Box> boxes;
   StillPose pose;  ///< any one
@@ -173,12 +205,14 @@ Outcome<PreparedPair> PairReader::still(const FramePair& planned, ImageOrientati
     OutlineCounts outlines;
     const auto moving = [&]() -> Outcome<MovingStill> {
       if (!planned.poses.empty()) return still_of_clip(planned, orientation, stride, boxes);
-      Outcome<SharedImage> image = still_image(planned.next, orientation, stride);
+      Outcome<StillImage> image = settled_image(pair, orientation, stride, settle);
       if (is_fault(image)) return image.fault();
-      const ColourView view{(*image)->size, (*image)->bgr.data()};
-      if (settle) pair = settle(planned, view.size);
       std::vector<Box> outlined = boxes;
-      if (!pair.objects.empty()) outlines = cut_out_missing(view, outlined);
+      if (!pair.objects.empty()) {
+        outlined = resized(std::move(outlined), 1.0 / image->reduced_by);
+        outlines = cut_out_missing({image->pixels->size, image->pixels->bgr.data()}, outlined);
+        outlined = resized(std::move(outlined), image->reduced_by);
+      }
       return MovingStill(*std::move(image), pair, spec_, outlined);
     }();
     if (is_fault(moving)) return moving.fault();

@@ -53,7 +53,8 @@ class FilesAhead {
 /// last are kept, so that each is opened and decoded once. A file that changes meanwhile may be
 /// seen as it was.
 ///
-/// A still's pair (FramePair::motion) is made of its one image (MovingStill); of a video, besides,
+/// A still's pair (FramePair::motion) is made of its one image (MovingStill), a JPEG decoded no
+/// larger than it needs (still_reduction); of a video, besides,
 /// as many whole colour frames are kept as prepared ones, and of clips' stills (FramePair::poses)
 /// the last image of a file, so that it is decoded and taken apart once for all of its clip.
 ///
@@ -98,6 +99,8 @@ class PairReader {
   SharedFrame frame(const FrameRef& ref, ImageOrientation orientation) const;
   Outcome<SharedImage> still_image(const FrameRef& still, ImageOrientation orientation,
                                    std::int64_t stride) const;
+  Outcome<StillImage> settled_image(FramePair& pair, ImageOrientation orientation,
+                                    std::int64_t stride, const Settle& settle) const;
   Outcome<MovingStill> still_of_clip(const FramePair& pair, ImageOrientation orientation,
                                      std::int64_t stride, const std::vector<Box>& boxes) const;
   Outcome<PreparedPair> still(const FramePair& planned, ImageOrientation orientation,

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -74,9 +73,6 @@ struct ImageView {
 /// "expected X, got Y" if it cannot be placed or resized. Thread safe.
 /// A grey image gives what three equal channels give.
 PreparedFrame prepare_frame(const ImageView& frame, const ImageSpec& spec);
-
-/// Of stills that are moved: OpenCV counts their pixels in 16 bits.
-inline constexpr int kMostStillSide = 32766;
 
 /// The generator's input of 8-bit grey: x = (u/255 - 0.5) * 2 in [-1, 1], in single precision.
 /// `input` must have the size of `grey`. Thread safe.

@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "manifests/values/frames.h"
 #include "manifests/values/outlines.h"
-#include "stages/frames/decoding/prepared_frame.h"
 
 namespace eventgan {
 namespace {
@@ -47,10 +47,13 @@ void continue_into(cv::Mat& picture, const cv::Mat& known, cv::Mat& wanted) {
   cv::distanceTransform(known == 0, distance, labels, cv::DIST_L2, cv::DIST_MASK_5,
                         cv::DIST_LABEL_PIXEL);
   std::vector<cv::Point> places;  // of known pixels, by label
+  places.reserve(known.total() + 1);
   for (int y = 0; y < known.rows; ++y) {
+    const std::uint8_t* is_known = known.ptr(y);
+    const int* label_of = labels.ptr<int>(y);
     for (int x = 0; x < known.cols; ++x) {
-      if (known.at<std::uint8_t>(y, x) == 0) continue;
-      const auto label = static_cast<std::size_t>(labels.at<int>(y, x));
+      if (is_known[x] == 0) continue;
+      const auto label = static_cast<std::size_t>(label_of[x]);
       if (places.size() <= label) places.resize(label + 1);
       places[label] = {x, y};
     }
@@ -61,8 +64,9 @@ void continue_into(cv::Mat& picture, const cv::Mat& known, cv::Mat& wanted) {
   };
   const auto bytes = static_cast<std::size_t>(picture.channels());
   for (int y = 0; y < wanted.rows; ++y) {
+    std::uint8_t* wants = wanted.ptr(y);
     for (int x = 0; x < wanted.cols; ++x) {
-      std::uint8_t& want = wanted.at<std::uint8_t>(y, x);
+      std::uint8_t& want = wants[x];
       if (want == 0) continue;
       const cv::Point nearest = places[static_cast<std::size_t>(labels.at<int>(y, x))];
       cv::Point step = nearest - cv::Point(x, y);
@@ -88,13 +92,6 @@ const cv::Mat& checked(const cv::Mat& image) {
   throw std::invalid_argument("expected a still of at most " + std::to_string(kMostStillSide) +
                               " pixels a side, got " +
                               to_string(ImageSize{image.rows, image.cols}));
-}
-
-bool is_identity(const AffineMap& map) {
-  constexpr AffineMap kIdentity{1, 0, 0, 0, 1, 0};
-  constexpr double kRounding = 1e-9;
-  return std::ranges::equal(map, kIdentity,
-                            [](double a, double b) { return std::abs(a - b) < kRounding; });
 }
 
 /// The part `to` of the frame, sampled where `map` leads: `image` is the part of the source that
@@ -132,6 +129,13 @@ void lay_over(const cv::Mat& colour, const cv::Mat& cover, cv::Mat frame) {
 }
 
 }  // namespace
+
+bool is_identity(const AffineMap& map) {
+  constexpr AffineMap kIdentity{1, 0, 0, 0, 1, 0};
+  constexpr double kRounding = 1e-9;
+  return std::ranges::equal(map, kIdentity,
+                            [](double a, double b) { return std::abs(a - b) < kRounding; });
+}
 
 StillLayers::StillLayers(const cv::Mat& image, std::vector<StillObject> objects, double behind_px)
     : behind_px_(behind_px), background_(checked(image)) {
@@ -180,10 +184,14 @@ void StillLayers::fill_background(const cv::Mat& owner) {
   cv::Mat wanted = hole.clone();
   for (std::size_t i = 0; i < layers_.size(); ++i) {
     const Layer& layer = layers_[i];
-    if (!can_be_seen(i, owner)) continue;
-    cv::Mat depth;
-    cv::distanceTransform(layer.mask, depth, cv::DIST_L2, cv::DIST_MASK_5);
-    wanted(layer.area).setTo(0, depth > layer.reach_px + kSlack_px);
+    const int reach = static_cast<int>(std::ceil(layer.reach_px + kSlack_px));
+    if (!can_be_seen(i, owner) || 2 * reach >= std::max(layer.area.width, layer.area.height)) {
+      continue;
+    }
+    cv::Mat covered;  // however it moves
+    cv::erode(layer.mask, covered,
+              cv::getStructuringElement(cv::MORPH_RECT, {2 * reach + 1, 2 * reach + 1}));
+    wanted(layer.area).setTo(0, covered);
   }
   cv::Rect area = cv::boundingRect(hole);
   if (area.empty()) return;

@@ -2,11 +2,13 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "manifests/values/placement.h"
 #include "manifests/values/still_motion.h"
 #include "stages/frames/decoding/detail/still_layers.h"
+#include "stages/frames/decoding/detail/still_samples.h"
 
 namespace eventgan {
 
@@ -18,20 +20,21 @@ namespace eventgan {
 class ScaledLayers {
  public:
   /// `layers` must outlive it. `placement` is of the part of the photograph that begins at
-  /// `origin`. `resting`: the frame (grey, resized) of all that rests, if the background does: it
-  /// is taken where nothing moves. Else empty, and all is sampled.
+  /// `origin`; where `layers` are of a reduced photograph, of the whole one. `resting`: the frame
+  /// (grey, resized) of all that rests, if the background does: it is taken where nothing moves.
+  /// Else empty, and all is sampled.
   ScaledLayers(const StillLayers& layers, const Placement& placement, cv::Point origin,
-               cv::Mat resting = {});
+               int reduced_by = 1, cv::Mat resting = {});
 
   /// The frame: [y, x] uint8 of placement.scaled; maps as StillLayers::frame has them, and what is
   /// said to rest has none. Thread safe.
   cv::Mat frame(const AffineMap& background, const std::vector<AffineMap>& objects) const;
 
  private:
-  /// Of one of StillLayers::layers, with its border as far as a kernel reaches: [y, x] int16.
+  /// Of one of StillLayers::layers.
   struct Planes {
-    cv::Mat covering;  ///< grey levels times what it covers, 128 a level
-    cv::Mat cover;     ///< how much of what is behind it cannot be seen: as a grey level, 255 all
+    SampledPlane covering;  ///< grey levels times what it covers
+    SampledPlane cover;     ///< how much of what is behind it cannot be seen, 255 all of it
   };
   /// The columns or the rows of the resized frame in the photograph, each made of two pixels.
   struct Axis {
@@ -41,14 +44,14 @@ class ScaledLayers {
   };
   class Sampler;
 
-  static Axis axis(int begin, int cut, int scaled);
+  static Axis axis(double begin, double cut, int scaled);
   cv::Rect seen_in(const StillLayers::Layer& layer, const AffineMap& map) const;
 
   const StillLayers& layers_;
   Axis columns_, rows_;
   int half_level_;  ///< of a row, to round with
   cv::Mat resting_;
-  cv::Mat background_;  ///< as Planes, 128 a level
+  std::optional<SampledPlane> background_;
   std::vector<Planes> planes_;
 };
 

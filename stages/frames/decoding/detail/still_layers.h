@@ -9,6 +9,11 @@
 
 namespace eventgan {
 
+inline constexpr int kMostStillSide = 32766;  ///< OpenCV counts pixels in 16 bits
+
+/// But for rounding.
+bool is_identity(const AffineMap& map);
+
 /// What is to move on its own in a photograph.
 struct StillObject {
   std::size_t box;  ///< its number among the annotation's

@@ -52,6 +52,12 @@ TEST_P(JpegKinds, DecodesToTheSamePixelsAsOpenCv) {
 
   EXPECT_TRUE(same_pixels(with_open(file, decode_jpeg), opencv_read(file)));
   EXPECT_EQ(with_open(file, jpeg_size), GetParam().size);
+  for (const auto& [by, flag] : {std::pair{2, cv::IMREAD_REDUCED_COLOR_2},
+                                 {4, cv::IMREAD_REDUCED_COLOR_4},
+                                 {8, cv::IMREAD_REDUCED_COLOR_8}}) {
+    const auto reduced = [&](std::FILE* open) { return decode_reduced_jpeg(open, by, 1); };
+    EXPECT_TRUE(same_pixels(with_open(file, reduced), cv::imread(file.string(), flag))) << by;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -103,6 +109,57 @@ TEST(JpegImage, MoreScansThanAnyEncoderWritesAreRefused) {
   EXPECT_EQ(why_jpeg_refused(folder / "few.jpg"), "");
   EXPECT_EQ(why_jpeg_refused(folder / "many.jpg"),
             "expected a JPEG of at most 500 scans, got more");
+}
+
+TEST(JpegImage, AReducedPixelIsTheMeanOfThoseItStandsFor) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.jpg";
+  for (const ImageSize size : {ImageSize{64, 96}, {61, 83}}) {
+    cv::Mat image(size.height, size.width, CV_8UC3);
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) {
+        const auto grey = static_cast<std::uint8_t>(20 + x + y);
+        image.at<cv::Vec3b>(y, x) = {grey, grey, grey};
+      }
+    }
+    cv::imwrite(file.string(), image, {cv::IMWRITE_JPEG_QUALITY, 100});
+    for (const int by : {2, 4, 8}) {
+      const ColourFrame frame =
+          decode_image(open_image_file(file), ImageOrientation::kStored, {}, by);
+      const int width = (size.width + by - 1) / by;
+      ASSERT_EQ(frame.size, (ImageSize{(size.height + by - 1) / by, width}));
+      for (int y = 0; y < size.height / by; ++y) {
+        for (int x = 0; x < size.width / by; ++x) {
+          ASSERT_NEAR(frame.bgr[3 * (y * width + x)], 20 + by * (x + y) + (by - 1), 1.5);
+        }
+      }
+    }
+  }
+}
+
+TEST(JpegImage, WhatIsTurnedIsReducedWhereNothingIsRoundedUp) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.jpg";
+  for (const ImageSize size : {ImageSize{64, 96}, {64, 92}, {62, 96}}) {
+    cv::imwrite(file.string(), gradient_image(size));
+    const std::string plain = read_file(file);
+    const auto decode = [&](ImageOrientation orientation) {
+      return decode_image(open_image_file(file), orientation, {}, 8);
+    };
+    for (const int orientation : {1, 3, 6, 8}) {
+      write_file(file, testing::with_orientation(plain, orientation));
+      const bool is_whole = orientation != 1 && size != ImageSize{64, 96};
+      const ColourFrame stored =
+          is_whole ? decode_image_file(file) : decode(ImageOrientation::kStored);
+      const ColourFrame expected = turned(stored, orientation);
+      const ColourFrame frame = decode(ImageOrientation::kUpright);
+      EXPECT_EQ(frame.size, expected.size) << orientation;
+      EXPECT_EQ(frame.bgr, expected.bgr) << orientation;
+    }
+  }
+  cv::imwrite((folder / "a.png").string(), gradient_image({64, 96}));
+  EXPECT_EQ(decode_image(open_image_file(folder / "a.png"), ImageOrientation::kStored, {}, 8).size,
+            (ImageSize{64, 96}));
 }
 
 TEST(JpegImage, EveryTruncationIsRefused) {

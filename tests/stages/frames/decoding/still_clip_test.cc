@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "stages/frames/decoding/detail/still_layers.h"
 #include "tests/testing/texts.h"
 
 namespace eventgan {
