@@ -1,10 +1,12 @@
 """What a pair of a photograph whose objects move on their own takes, by stage: with objects that are cut out of their
-boxes meanwhile, with outlines that `eventgan outline` has made before, and of clips."""
+boxes meanwhile, with outlines that `eventgan outline` has made before, of clips, and of a photograph of a telephone."""
 
 import csv
 import dataclasses
 import json
 import subprocess
+
+import PIL.Image
 
 from measuring.bench import DATA
 from measuring.calibration import NotCalibrated, calibrated
@@ -21,13 +23,14 @@ SIZE = (192, 320)
 class Settings:
     rounds: int
     most: int        # photographs
+    large: int       # of these, made large
     weights: str
 
 
 SETTINGS = {
-    "full": Settings(5, 100, "shipped:8"),
-    "quick": Settings(3, 100, "shipped:8"),
-    "trial": Settings(1, 2, "untrained:2"),
+    "full": Settings(5, 100, 10, "shipped:8"),
+    "quick": Settings(3, 100, 10, "shipped:8"),
+    "trial": Settings(1, 2, 1, "untrained:2"),
 }
 
 
@@ -74,6 +77,23 @@ def photographs(bench, most):
     return folder, f"{len(names)} photographs of Pascal VOC, {len(rows)} boxes" if names else ""
 
 
+def enlarged(bench, folder, count):
+    """The first photographs with as many pixels as a telephone's, JPEGs 4000 wide."""
+    large = bench.folder("large")
+    (large / "images").mkdir()
+    with (folder / "boxes.csv").open(encoding="utf-8", newline="") as file:
+        header, *rows = csv.reader(file)
+    lines = [header]
+    for name in [*dict.fromkeys(row[0] for row in rows)][:count]:
+        image = PIL.Image.open(folder / "images" / name).convert("RGB")
+        scale = 4000 / image.width
+        copy = f"{name.partition('.')[0]}.jpg"
+        image.resize((4000, round(scale * image.height)), PIL.Image.BICUBIC).save(large / "images" / copy, quality=90)
+        lines += [[copy, kind, *(scale * float(edge) for edge in edges)] for own, kind, *edges in rows if own == name]
+    (large / "boxes.csv").write_text("".join(",".join(map(str, line)) + "\n" for line in lines))
+    return large
+
+
 def measure(bench):
     settings = SETTINGS[bench.effort]
     folder, frames = photographs(bench, settings.most)
@@ -92,8 +112,10 @@ def measure(bench):
     subprocess.run([bench.program, "outline", manifest, "--out", masks, "--progress", "none"], check=True,
                    capture_output=True)
     kinds = {"cut out meanwhile": {}, "outlines made before": {"outlines": str(masks)},
-             "clips of 5 frames": {"frames_of_clip": 5}}
-    jobs = {(name, kind): Photographs(str(folder), *SIZE, generator=generator, **options)
+             "clips of 5 frames": {"frames_of_clip": 5},
+             "12 megapixels": {"frames": str(enlarged(bench, folder, settings.large))}}
+    jobs = {(name, kind): Photographs(**{"frames": str(folder), **options}, height=SIZE[0], width=SIZE[1],
+                                      generator=generator)
             for name, generator in generators.items() for kind, options in kinds.items()}
     times = {key: [] for key in jobs}
     for turn in range(settings.rounds):
