@@ -1,5 +1,6 @@
 """What a pair of a photograph whose objects move on their own takes, by stage: with objects that are cut out of their
-boxes meanwhile, with outlines that `eventgan outline` has made before, of clips, and of a photograph of a telephone."""
+boxes meanwhile, with outlines that `eventgan outline` has made before, of clips, and of what a
+telephone takes."""
 
 import csv
 import dataclasses
@@ -78,7 +79,7 @@ def photographs(bench, most):
 
 
 def enlarged(bench, folder, count):
-    """The first photographs with as many pixels as a telephone's, JPEGs 4000 wide."""
+    """The first photographs with as many pixels as a telephone's: JPEGs whose longer side is 4000."""
     large = bench.folder("large")
     (large / "images").mkdir()
     with (folder / "boxes.csv").open(encoding="utf-8", newline="") as file:
@@ -86,9 +87,10 @@ def enlarged(bench, folder, count):
     lines = [header]
     for name in [*dict.fromkeys(row[0] for row in rows)][:count]:
         image = PIL.Image.open(folder / "images" / name).convert("RGB")
-        scale = 4000 / image.width
+        width, height = (8 * round(500 * side / max(image.size)) for side in image.size)
+        scale = width / image.width
         copy = f"{name.partition('.')[0]}.jpg"
-        image.resize((4000, round(scale * image.height)), PIL.Image.BICUBIC).save(large / "images" / copy, quality=90)
+        image.resize((width, height), PIL.Image.BICUBIC).save(large / "images" / copy, quality=90)
         lines += [[copy, kind, *(scale * float(edge) for edge in edges)] for own, kind, *edges in rows if own == name]
     (large / "boxes.csv").write_text("".join(",".join(map(str, line)) + "\n" for line in lines))
     return large

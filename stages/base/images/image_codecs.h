@@ -24,10 +24,10 @@ namespace eventgan {
 
 /// Grey, YCbCr and RGB.
 ColourFrame decode_jpeg(std::FILE* file);
-/// 1/2, 1/4 or 1/8 of its size (`by` 2, 4, 8), rounded up: from the lowest frequencies alone, so
-/// that a pixel is the mean of those it stands for. Whole if its `orientation` turns it and a side
-/// is no multiple of `by`: what is rounded up would come first.
-ColourFrame decode_reduced_jpeg(std::FILE* file, int by, int orientation);
+/// 1/2, 1/4 or 1/8 of its size (`by` 2, 4, 8), if both sides are multiples of `by`, else whole: of
+/// the lowest frequencies alone. At 1/8 a pixel is the mean of those it stands for; always it lies
+/// in their middle.
+ColourFrame decode_reduced_jpeg(std::FILE* file, int by);
 ImageSize jpeg_size(std::FILE* file);
 int jpeg_orientation(std::FILE* file);
 

@@ -69,7 +69,7 @@ const Format* format_of(const InputFile& file) {
   return format == kFormats.end() ? nullptr : format;
 }
 
-/// What `read(format, stream, orientation)` makes of the file, turned as is wanted; with its errors
+/// What `read(format, stream)` makes of the file, turned as is wanted; with its errors
 /// completed.
 template <class Read>
 auto read_by_format(const InputFile& file, const Read& read, ImageOrientation wanted,
@@ -81,13 +81,13 @@ auto read_by_format(const InputFile& file, const Read& read, ImageOrientation wa
   }
   const InputFile::Stream stream = file.stream(block_bytes);
   int orientation = 1;
-  decltype(read(*format, stream.get(), orientation)) result;
+  decltype(read(*format, stream.get())) result;
   try {
     if (wanted == ImageOrientation::kUpright && format->orientation != nullptr) {
       orientation = format->orientation(stream.get());
       std::rewind(stream.get());
     }
-    result = read(*format, stream.get(), orientation);
+    result = read(*format, stream.get());
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(std::string("expected a whole ") + format->name + ", got " +
                              error.what());
@@ -137,12 +137,12 @@ bool is_image(const InputFile& file) { return format_of(file) != nullptr; }
 
 ColourFrame decode_image(const InputFile& file, ImageOrientation orientation,
                          const std::optional<ValueRange>& range, int reduced_by) {
-  const auto decode = [&](const Format& format, std::FILE* stream, int turn) {
+  const auto decode = [&](const Format& format, std::FILE* stream) {
     if (range && format.wide != nullptr) {
       if (const auto wide = format.wide(stream)) return narrowed(*wide, *range);
       std::rewind(stream);
     }
-    return format.decode == decode_jpeg ? decode_reduced_jpeg(stream, reduced_by, turn)
+    return format.decode == decode_jpeg ? decode_reduced_jpeg(stream, reduced_by)
                                         : format.decode(stream);
   };
   return read_by_format(file, decode, orientation, kPixelsBlock);
@@ -190,7 +190,7 @@ WideFrame decode_wide_image(const InputFile& file) {
 
 bool count_wide_values(const InputFile& file, std::span<std::int64_t> histogram) {
   bool is_wide = false;
-  const auto count = [&](const Format& format, std::FILE* stream, int) {
+  const auto count = [&](const Format& format, std::FILE* stream) {
     const auto wide = format.wide == nullptr ? std::nullopt : format.wide(stream);
     if (!wide) return ImageSize{};
     is_wide = true;
@@ -202,9 +202,7 @@ bool count_wide_values(const InputFile& file, std::span<std::int64_t> histogram)
 }
 
 ImageSize image_size(const InputFile& file, ImageOrientation orientation) {
-  const auto size = [](const Format& format, std::FILE* stream, int) {
-    return format.size(stream);
-  };
+  const auto size = [](const Format& format, std::FILE* stream) { return format.size(stream); };
   return read_by_format(file, size, orientation, kHeaderBlock);
 }
 

@@ -71,8 +71,8 @@ enum class ImageOrientation { kStored, kUpright };
 /// becomes round(255 (v - low) / (high - low)), at least 0 and at most 255. Others have no use for
 /// the range.
 ///
-/// `reduced_by` 2, 4 or 8: a JPEG is decoded to so small a part of its size (decode_reduced_jpeg),
-/// which takes a fraction of the time; other formats whole.
+/// `reduced_by` 2, 4 or 8: a JPEG whose sides are multiples of it is decoded to that part of its
+/// size (decode_reduced_jpeg), which takes a fraction of the time; all else whole.
 ColourFrame decode_image(const InputFile& file, ImageOrientation orientation,
                          const std::optional<ValueRange>& range = {}, int reduced_by = 1);
 ColourFrame decode_image_file(const std::filesystem::path& file,

@@ -118,19 +118,20 @@ class JpegFile {
     return 1;
   }
 
-  ColourFrame read(int reduced_by = 1, int orientation = 1) {
+  ColourFrame read(int reduced_by = 1) {
     ColourFrame frame{read_header(), {}};
     if (codec_.num_components != 1 && codec_.num_components != 3) {
       throw std::runtime_error(std::to_string(codec_.num_components) + " colour channels");
     }
     ImageSize& size = frame.size;
-    if (orientation == 1 || (size.width % reduced_by == 0 && size.height % reduced_by == 0)) {
+    if (size.width % reduced_by == 0 && size.height % reduced_by == 0) {
       codec_.scale_num = 1;
       codec_.scale_denom = static_cast<unsigned>(reduced_by);
-      size = {(size.height - 1) / reduced_by + 1, (size.width - 1) / reduced_by + 1};
     }
-    frame.bgr.resize(3 * size.pixel_count());
     codec_.out_color_space = JCS_EXT_BGR;
+    run_guarded(escape_, [&] { jpeg_calc_output_dimensions(&codec_); });
+    size = {static_cast<int>(codec_.output_height), static_cast<int>(codec_.output_width)};
+    frame.bgr.resize(3 * size.pixel_count());
     const std::size_t row_bytes = 3 * static_cast<std::size_t>(frame.size.width);
     run_guarded(escape_, [&] {
       jpeg_start_decompress(&codec_);
@@ -154,9 +155,7 @@ class JpegFile {
 
 ColourFrame decode_jpeg(std::FILE* file) { return JpegFile(file).read(); }
 
-ColourFrame decode_reduced_jpeg(std::FILE* file, int by, int orientation) {
-  return JpegFile(file).read(by, orientation);
-}
+ColourFrame decode_reduced_jpeg(std::FILE* file, int by) { return JpegFile(file).read(by); }
 
 ImageSize jpeg_size(std::FILE* file) { return JpegFile(file).read_header(); }
 

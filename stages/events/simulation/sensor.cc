@@ -628,10 +628,6 @@ class RowRuns {
   std::vector<float> logs_;  ///< of a pixel, by image
 };
 
-}  // namespace
-
-namespace {
-
 std::vector<Event> events_of(SeenRow& seen, const SensorSpec& spec, ImageSize size,
                              std::span<const double> times_s, const CounterRandom& random) {
   double before_s = std::numeric_limits<double>::lowest();

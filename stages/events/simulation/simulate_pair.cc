@@ -1,7 +1,5 @@
 #include "stages/events/simulation/simulate_pair.h"
 
-#include <algorithm>
-#include <cstdint>
 #include <span>
 #include <stdexcept>
 #include <utility>

@@ -7,6 +7,7 @@
 #include <functional>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "manifests/values/outlines.h"
@@ -318,8 +319,12 @@ int still_reduction(ImageSize whole, const ImageSpec& spec, const FramePair& pai
   return unless_refused([&] {
     const Placement placement = place(whole, spec, pair);
     const ImageSize cut = placement.cut(), scaled = placement.scaled;
-    int by = 8;
-    while (by > 1 && (by * scaled.width > cut.width || by * scaled.height > cut.height)) by /= 2;
+    const auto suffices = [&](int by) {
+      return whole.width % by == 0 && whole.height % by == 0 &&
+             cut.width / (2 * by) >= scaled.width && cut.height / (2 * by) >= scaled.height;
+    };
+    int by = std::max(whole.width, whole.height) > kMostStillSide ? 1 : 8;
+    while (by > 1 && !suffices(by)) by /= 2;
     return by;
   });
 }
@@ -345,6 +350,8 @@ MovingStill::MovingStill(StillImage image, const FramePair& pair, const ImageSpe
           state.placement = place(image.size, spec, pair);
           state.pair = std::make_shared<const PairMotion>(std::move(image), pair, spec, boxes,
                                                           state.placement);
+        } else if (image.reduced_by > 1) {
+          throw std::invalid_argument("expected the whole image of a clip, got a reduced one");
         } else {
           state.placement = place(clip_window(image.size).size, spec);
           state.clip = std::make_shared<const ClipLayers>(std::move(image.pixels), spec, boxes,

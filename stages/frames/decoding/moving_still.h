@@ -14,12 +14,12 @@ namespace eventgan {
 
 /// Of a plan's fingerprint: another one wherever stills' frames would have other pixels.
 inline constexpr const char* kStillSampling =
-    "in the volume's size, bicubic; JPEGs at 1/2, 1/4, 1/8 where that is no less";
+    "in the volume's size, bicubic; JPEGs at 1/2, 1/4, 1/8 where that is twice as much";
 
 using SharedImage = std::shared_ptr<const ColourFrame>;
 
-/// An image that pairs are made of; perhaps reduced (decode_image), which nobody else need know:
-/// all places are those of the whole image.
+/// An image that pairs are made of, whole or reduced (decode_image): motions, labels, and places
+/// are those of the whole image.
 struct StillImage {
   SharedImage pixels;
   ImageSize size;  ///< of the whole image
@@ -30,26 +30,29 @@ struct StillImage {
       : pixels(std::move(image)), size(whole), reduced_by(by) {}
 };
 
-/// By how much, 8, 4, 2 or 1, the still of a pair with a motion may be reduced and still have a
-/// pixel for each that the volume shows. Throws as MovingStill. Thread safe.
+/// By how much, 8, 4, 2 or 1, the still of a pair with a motion is to be reduced: its sides are
+/// multiples of that, and on either axis it keeps two pixels for each that the volume shows. With
+/// fewer, events would be fewer than of an image that was as small. Throws as MovingStill. Thread
+/// safe.
 int still_reduction(ImageSize whole, const ImageSpec& spec, const FramePair& pair);
 
 /// A still whose image and objects move, taken apart (detail/still_layers.h) once for its pair
 /// (FramePair::motion), or for all pairs of a clip that is made of it (FramePair::poses).
 ///
-/// The labelled frame of a pair with a motion is the image itself, prepared as prepare_frame does,
-/// but sampled as all others if it is reduced.
-/// All other frames, of clips all, are sampled in the volume's size (detail/scaled_layers.h),
-/// bicubic (Keys with a = -0.75): the image where moved_to_labelled leads, or image_in_clip back;
-/// before it objects that move on their own (FramePair::objects) where object_to_labelled leads, or
-/// object_in_clip back, the farther ones first; what they uncover is filled. Where grey is made
-/// before resizing the grey image is moved. Of a pair the borders that only one of both images
-/// shows are left out (placement.h); of a clip, frames are what its window shows. Thread safe.
+/// The labelled frame of a pair with a motion is the image itself, prepared as prepare_frame does;
+/// of a reduced image it is sampled as all others. All other frames, of clips all, are sampled in
+/// the volume's size (detail/scaled_layers.h), bicubic (Keys with a = -0.75): the image where
+/// moved_to_labelled leads, or image_in_clip back; before it objects that move on their own
+/// (FramePair::objects) where object_to_labelled leads, or object_in_clip back, the farther ones
+/// first; what they uncover is filled. Where grey is made before resizing the grey image is moved.
+/// Of a pair the borders that only one of both images shows are left out (placement.h); of a clip,
+/// frames are what its window shows. Thread safe.
 class MovingStill {
  public:
   /// `boxes`: of the still; those without an outline do not move on their own. Of a clip, `pair` is
   /// any one. Throws std::runtime_error "expected X, got Y" if the image cannot be placed, resized,
-  /// or moved, if a side is beyond 32,766 pixels, and if too little of it would be left.
+  /// or moved, if a side is beyond 32,766 pixels, if too little of it would be left, and of a clip
+  /// if it is reduced.
   MovingStill(StillImage image, const FramePair& pair, const ImageSpec& spec,
               const std::vector<Box>& boxes = {});
 

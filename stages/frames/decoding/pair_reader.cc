@@ -149,16 +149,15 @@ Outcome<SharedImage> PairReader::still_image(const FrameRef& still, ImageOrienta
 /// The image of a still's one pair, which is settled.
 Outcome<StillImage> PairReader::settled_image(FramePair& pair, ImageOrientation orientation,
                                               std::int64_t stride, const Settle& settle) const {
-  const FramePair planned = pair;
   if (pair.next.video_frame >= 0) {
     Outcome<SharedImage> image = still_image(pair.next, orientation, stride);
     if (is_fault(image)) return image.fault();
-    if (settle) pair = settle(planned, (*image)->size);
+    if (settle) pair = settle(pair, (*image)->size);
     return StillImage(*std::move(image));
   }
   const InputFile file = files_->take(base_ / pair.next.path);
   const ImageSize size = image_size(file, orientation);
-  if (settle) pair = settle(planned, size);
+  if (settle) pair = settle(pair, size);
   const int by = still_reduction(size, spec_, pair);
   auto image =
       std::make_shared<const ColourFrame>(decode_image(file, orientation, spec_.range, by));

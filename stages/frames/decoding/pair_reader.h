@@ -53,10 +53,11 @@ class FilesAhead {
 /// last are kept, so that each is opened and decoded once. A file that changes meanwhile may be
 /// seen as it was.
 ///
-/// A still's pair (FramePair::motion) is made of its one image (MovingStill), a JPEG decoded no
-/// larger than it needs (still_reduction); of a video, besides,
-/// as many whole colour frames are kept as prepared ones, and of clips' stills (FramePair::poses)
-/// the last image of a file, so that it is decoded and taken apart once for all of its clip.
+/// A still's pair (FramePair::motion) is made of its one image (MovingStill). A JPEG is decoded no
+/// larger than that needs (still_reduction), and objects are cut out of it as it is decoded. Of
+/// videos, besides, as many whole colour frames are kept as prepared ones; of clips' stills
+/// (FramePair::poses) the last image of a file, so that it is decoded and taken apart once for all
+/// of its clip.
 ///
 /// The two frames must have one size. Thread safety: `read` may be called from several threads;
 /// images are decoded in parallel, videos one frame after another under a lock.

@@ -184,11 +184,12 @@ void StillLayers::fill_background(const cv::Mat& owner) {
   cv::Mat wanted = hole.clone();
   for (std::size_t i = 0; i < layers_.size(); ++i) {
     const Layer& layer = layers_[i];
+    // What it covers however it moves. Beyond half of its size that is little or nothing.
     const int reach = static_cast<int>(std::ceil(layer.reach_px + kSlack_px));
     if (!can_be_seen(i, owner) || 2 * reach >= std::max(layer.area.width, layer.area.height)) {
       continue;
     }
-    cv::Mat covered;  // however it moves
+    cv::Mat covered;
     cv::erode(layer.mask, covered,
               cv::getStructuringElement(cv::MORPH_RECT, {2 * reach + 1, 2 * reach + 1}));
     wanted(layer.area).setTo(0, covered);

@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core/hal/intrin.hpp>
-#include <opencv2/imgproc.hpp>
-
-#include "stages/base/processor_clones.h"
 
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -14,9 +11,7 @@
 namespace eventgan {
 namespace {
 
-constexpr int kPlaceBits = 5;  // of 1/32 px
 constexpr int kWeightBits = 14;
-constexpr int kShareBits = 11;
 constexpr int kBefore = 4;  // beyond the border: where all that is seen is the border's pixel
 constexpr int kBehind = 8;
 // Products, and what follows, are rounded down: by 1/2 at a time, that many times.
@@ -64,14 +59,14 @@ struct Block {
 inline __attribute__((always_inline)) void find_places(const SampledPlane& plane,
                                                        const SampledPlaces& places,
                                                        std::size_t first, Block& block) {
-  constexpr int kShift = kSampleFineBits - kPlaceBits, kRound = 1 << (kShift - 1);
+  constexpr int kShift = kSampleFineBits - kSamplePartBits, kRound = 1 << (kShift - 1);
   const int stride = static_cast<int>(plane.stride);
   for (std::size_t i = 0; i < block.count; ++i) {
     const int x = std::clamp((places.row_x + places.x[first + i] + kRound) >> kShift,
                              -3 * kSampleParts, (plane.width + 1) * kSampleParts);
     const int y = std::clamp((places.row_y + places.y[first + i] + kRound) >> kShift,
                              -3 * kSampleParts, (plane.height + 1) * kSampleParts);
-    block.from[i] = ((y >> kPlaceBits) - 1) * stride + (x >> kPlaceBits) - 1;
+    block.from[i] = ((y >> kSamplePartBits) - 1) * stride + (x >> kSamplePartBits) - 1;
     block.right[i] = x & (kSampleParts - 1);
     block.down[i] = y & (kSampleParts - 1);
   }
@@ -84,7 +79,7 @@ inline __attribute__((always_inline)) void join_columns(const Block& block,
   for (std::size_t i = 0; i < block.count; ++i) {
     const int sum =
         lower(block.columns[i]) * lower(shares[i]) + (block.columns[i] >> 16) * (shares[i] >> 16);
-    row[i] = static_cast<std::int16_t>(sum >> kShareBits);
+    row[i] = static_cast<std::int16_t>(sum >> kSampleShareBits);
   }
 }
 
@@ -114,7 +109,7 @@ inline __attribute__((always_inline)) void sample(const SampledPlane& plane,
         (cv::v_combine_low(left, right) + cv::v_combine_high(left, right)) >> kWeightBits;
     const cv::v_int16x8 seen =
         cv::v_min(cv::v_max(cv::v_pack(four, four), cv::v_setzero_s16()), white);
-    const cv::v_int32x4 two = cv::v_dotprod(seen, shares_y) >> kShareBits;
+    const cv::v_int32x4 two = cv::v_dotprod(seen, shares_y) >> kSampleShareBits;
     block.columns[i] = cv::v_reinterpret_as_s32(cv::v_pack(two, two)).get0();
   }
 }
@@ -166,7 +161,7 @@ EVENTGAN_AVX2 void sample_by_two(const SampledPlane& plane, const SampleKernel& 
         kWeightBits);
     const __m256i seen =
         _mm256_min_epi16(_mm256_max_epi16(_mm256_packs_epi32(four, four), black), white);
-    const __m256i two = _mm256_srai_epi32(_mm256_madd_epi16(seen, shares_y), kShareBits);
+    const __m256i two = _mm256_srai_epi32(_mm256_madd_epi16(seen, shares_y), kSampleShareBits);
     const __m256i columns = _mm256_packs_epi32(two, two);
     block.columns[i] = _mm_cvtsi128_si32(_mm256_castsi256_si128(columns));
     block.columns[other] =

@@ -11,10 +11,12 @@ namespace eventgan {
 // How a resized photograph's pixels are sampled where they lie in a plane [y, x] int16.
 
 inline constexpr int kSampleFineBits = 10;  // places are summed in 1/1024 px,
-inline constexpr int kSampleParts = 32;     // and rounded to 1/32, as OpenCV does
-inline constexpr int kSampleTaps = 4;       // pixels of the photograph in a row
+inline constexpr int kSamplePartBits = 5;   // and rounded to 1/32, as OpenCV does
+inline constexpr int kSampleParts = 1 << kSamplePartBits;
+inline constexpr int kSampleTaps = 4;  // pixels of the photograph in a row
 
-inline constexpr int kSampleShare = 2048;  // of both pixels of a resized one
+inline constexpr int kSampleShareBits = 11;
+inline constexpr int kSampleShare = 1 << kSampleShareBits;  // of both pixels of a resized one
 
 inline constexpr int kPlaneLevel = 128;            // of a plane, to a grey level
 inline constexpr int kRowLevel = kPlaneLevel / 4;  // of a row: the upper half of a product is kept
@@ -22,7 +24,7 @@ inline constexpr int kRowWhite = 255 * kRowLevel;
 
 /// The plane with its border repeated as far as a kernel reaches.
 struct SampledPlane {
-  explicit SampledPlane(const cv::Mat& values);
+  explicit SampledPlane(const cv::Mat& plane);
 
   cv::Mat values;  ///< with its border
   const std::int16_t* first;
@@ -52,7 +54,7 @@ struct SampledPlaces {
 void sample_row(const SampledPlane& plane, const SampleKernel& kernel, const SampledPlaces& places,
                 std::span<std::int16_t> row);
 
-/// The same with any processor's instructions.
+/// The same without AVX2.
 void sample_row_anywhere(const SampledPlane& plane, const SampleKernel& kernel,
                          const SampledPlaces& places, std::span<std::int16_t> row);
 

@@ -42,9 +42,9 @@ TEST(StillSamples, AreTheSameWithAllInstructions) {
     const SampledPlane plane(random_plane(size, random));
     for (const std::size_t count : {0, 1, 2, 63, 64, 65, 131}) {
       Row row;
-      row.row_x = between(-2000, 2000);
-      row.row_y = between(-1'000'000'000, 1'000'000'000);  // far beyond, in most
-      if (between(0, 3) > 0) row.row_y = between(-5000, 1024 * size.height + 5000);
+      const int far = between(0, 3) == 0 ? 1'000'000'000 : 5000;  // one row in four
+      row.row_x = between(-far, far);
+      row.row_y = between(-far, 1024 * size.height + far);
       row.shares_y = shares_of(between(0, kSampleShare));
       for (std::size_t i = 0; i < count; ++i) {
         row.x.push_back(between(-9000, 1024 * size.width + 9000));
