@@ -72,32 +72,47 @@ std::vector<float> values_from(std::span<const ValueScan> scans, float bound) {
 
 namespace {
 
-/// A row of a block; GCC's and Clang's vectors, since loops over lanes that keep maximum and
-/// minimum do not become vector instructions by themselves.
-typedef float Row __attribute__((vector_size(kLanes * sizeof(float))));
-typedef double DoubleRow __attribute__((vector_size(kLanes * sizeof(double))));
-typedef std::int32_t CountRow __attribute__((vector_size(kLanes * sizeof(std::int32_t))));
+/// Parts of a block's row, no wider than AVX2's registers, since GCC takes wider ones apart value
+/// by value; GCC's and Clang's vectors, since loops over lanes that keep maximum and minimum do not
+/// become vector instructions by themselves.
+constexpr std::size_t kWide = 8, kNarrow = 4;
+typedef float Wide __attribute__((vector_size(kWide * sizeof(float))));
+typedef float Narrow __attribute__((vector_size(kNarrow * sizeof(float))));
+typedef double Sums __attribute__((vector_size(kNarrow * sizeof(double))));
+typedef std::int32_t Counts __attribute__((vector_size(kWide * sizeof(std::int32_t))));
 
 struct LaneScan {
-  Row max{}, min{};
-  DoubleRow sum{};
-  CountRow nonzero{};
+  Wide max[kLanes / kWide]{}, min[kLanes / kWide]{};
+  Sums sum[kLanes / kNarrow]{};
+  Counts nonzero[kLanes / kWide]{};
 };
+
+template <class Part>
+inline Part part_at(const float* values) {
+  Part part;
+  std::memcpy(&part, values, sizeof part);
+  return part;
+}
 
 EVENTGAN_CLONES void scan_lanes(std::span<const float> values, LaneScan& lanes,
                                 float* group_maxima) {
   LaneScan found;
   for_each_block(values, [&](std::size_t block, const float* numbers) {
-    Row maxima{};
-    for (std::size_t row = 0; row < kRows; ++row) {
-      Row value;
-      std::memcpy(&value, numbers + row * kLanes, sizeof value);
-      maxima = value > maxima ? value : maxima;
-      found.min = value < found.min ? value : found.min;
-      found.sum += __builtin_convertvector(value, DoubleRow);
-      found.nonzero -= value != 0;  // true is -1
+    Wide maxima[kLanes / kWide]{};
+    for (std::size_t row = 0; row < kRows; ++row, numbers += kLanes) {
+      for (std::size_t i = 0; i < kLanes / kWide; ++i) {
+        const auto value = part_at<Wide>(numbers + i * kWide);
+        maxima[i] = value > maxima[i] ? value : maxima[i];
+        found.min[i] = value < found.min[i] ? value : found.min[i];
+        found.nonzero[i] -= value != 0;  // true is -1
+      }
+      for (std::size_t i = 0; i < kLanes / kNarrow; ++i) {
+        found.sum[i] += __builtin_convertvector(part_at<Narrow>(numbers + i * kNarrow), Sums);
+      }
     }
-    found.max = maxima > found.max ? maxima : found.max;
+    for (std::size_t i = 0; i < kLanes / kWide; ++i) {
+      found.max[i] = maxima[i] > found.max[i] ? maxima[i] : found.max[i];
+    }
     std::memcpy(group_maxima + block * kLanes, &maxima, sizeof maxima);
   });
   lanes = found;
@@ -113,10 +128,11 @@ ValueScan scan_values(std::span<const float> values) {
   scan_lanes(values, lanes, scan.group_maxima.data());
   float min = 0;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    scan.sum += lanes.sum[lane];
-    scan.nonzero += static_cast<std::uint32_t>(lanes.nonzero[lane]);
-    scan.max = std::max(scan.max, lanes.max[lane]);
-    min = std::min(min, lanes.min[lane]);
+    const std::size_t wide = lane / kWide, place = lane % kWide;
+    scan.sum += lanes.sum[lane / kNarrow][lane % kNarrow];
+    scan.nonzero += static_cast<std::uint32_t>(lanes.nonzero[wide][place]);
+    scan.max = std::max(scan.max, lanes.max[wide][place]);
+    min = std::min(min, lanes.min[wide][place]);
   }
   // NaN and infinity stay in a sum; floats that are finite cannot overflow one in double precision.
   scan.sound = std::isfinite(scan.sum) && min >= 0;
