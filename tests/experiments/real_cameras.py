@@ -114,7 +114,8 @@ class Row:
     images: int | None = None  # so many, drawn by the seed; None: all
     norm: str = "batch"
     signed: bool = True        # or the volume
-    base: Row | None = None    # it begins with that row's weights and learns its last layer, or with `windows` all
+    base: Row | None = None    # it begins with that row's weights,
+    last_layer: bool = False   # and learns its last layer, or all
     # so many real windows, drawn by the seed: a row with a base is tuned on these, one without sees nothing else
     windows: int | None = None
 
@@ -152,17 +153,19 @@ def in_layers() -> list[Row]:
 
 def task_rows(task: Task) -> list[Row]:
     """Of a task other than persons: its methods; where it has windows to learn from, a network that has learnt from
-    these alone, and those that have been tuned on them: on some windows all layers, on all of a recording's the last
-    one."""
+    these alone, and those that have been tuned on them: on some windows all layers, of joints' also the last one
+    alone; on all of a recording's the last one."""
     found = [Row(f"{name}, augmented, {task.steps} steps", (name,), steps=task.steps) for name in task.methods]
     if task.windows:
         base, real = found[0], tuple(f"real {name}" for name in task.learnt)
-        found += [Row(f"{base.name}, tuned on {count} windows", base.sources + real * (count > 0), base=base,
-                      steps=training.TUNING_STEPS, windows=count) for count in (0, *task.windows)]
+        found += [Row(f"{base.name}, {what}tuned on {count} windows", base.sources + real * (count > 0), base=base,
+                      last_layer=bool(what), steps=training.TUNING_STEPS, windows=count)
+                  for what in ("", "last layer ")[:1 + task.joints] for count in (0, *task.windows)]
         return found + [Row(f"{count} windows alone", real, windows=count) for count in task.windows]
     for real in (f"real {name}" for name in task.learnt):
         found += [Row(f"{real}, augmented, {task.steps} steps", (real,), steps=task.steps),
-                  *(Row(row.name + TUNED, (real,), steps=LAST_LAYER_STEPS, base=row) for row in found)]
+                  *(Row(row.name + TUNED, (real,), steps=LAST_LAYER_STEPS, base=row, last_layer=True)
+                    for row in found)]
     return found
 
 
@@ -201,11 +204,11 @@ def train(args: argparse.Namespace, row: Row, seed: int) -> nn.Module:
         items = [item for part in parts for item in part]
         items = [_float(args, items[i]) for i in np.random.default_rng(seed).permutation(len(items))[:row.images]]
         folder.mkdir(parents=True, exist_ok=True)
-        rate = RATE if row.windows is None or not row.base else RATE * training.TUNING_RATE
+        rate = RATE if row.last_layer or not row.base else RATE * training.TUNING_RATE
         run = argparse.Namespace(out=str(folder), batch=BATCH, lr=rate, steps=args.steps or row.steps, epochs=None,
                                  minutes=None, every=10_000, seed=seed, workers=0, device="cpu",
                                  pretrained=str(_run_folder(args, row.base, seed) / "weights.pt") if row.base else None,
-                                 classes=task.classes, last_layer=row.base is not None and row.windows is None,
+                                 classes=task.classes, last_layer=row.last_layer,
                                  bfloat16=row.norm == "batch" and training.has_bfloat16())
         augmentation = row.augmentation if task.polarity else Unsigned(**dataclasses.asdict(row.augmentation))
         task.network.train(run, items, augmentation, norm)

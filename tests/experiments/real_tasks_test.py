@@ -306,7 +306,7 @@ def test_only_the_last_layer_is_tuned_and_parts_are_what_they_say(tmp_path, monk
     changed = {name for name in before if not torch.equal(before[name], after[name])}
     assert changed == {"maps.weight", "maps.bias"}
 
-    on_windows = dataclasses.replace(tuned, name="on windows", windows=2)
+    on_windows = dataclasses.replace(tuned, name="on windows", windows=2, last_layer=False)
     real_cameras.train(args, on_windows, 0)
     after = torch.load(real_cameras._run_folder(args, on_windows, 0) / "weights.pt")
     assert all(not torch.equal(before[name], after[name]) for name in before if name.endswith("weight"))
@@ -335,6 +335,9 @@ def test_windows_of_the_first_clips_are_learnt_and_the_others_tested(tmp_path, m
             torch.save(model.state_dict(), pathlib.Path(run.out, name))
 
     args.task = dataclasses.replace(args.task, network=dataclasses.replace(args.task.network, train=train))
+    of_joints = real_cameras.task_rows(dataclasses.replace(args.task, joints=True))
+    assert [(row.windows, row.last_layer) for row in of_joints if row.base] == [
+        (count, last) for last in (False, True) for count in (0, 2, 3)]
     base, *tuned, two_alone, three_alone = real_cameras.task_rows(args.task)
     assert [row.windows for row in tuned] == [0, 2, 3] and all(row.base == base for row in tuned)
     for row in (base, *tuned, two_alone, three_alone):
