@@ -31,9 +31,8 @@ struct StillImage {
 };
 
 /// By how much, 8, 4, 2 or 1, the still of a pair with a motion is to be reduced: its sides are
-/// multiples of that, and on either axis it keeps two pixels for each that the volume shows. With
-/// fewer, events would be fewer than of an image that was as small. Throws as MovingStill. Thread
-/// safe.
+/// multiples of that, and on either axis it keeps two pixels for each that the volume shows, so
+/// that its frames are as sharp as a smaller photograph's. Throws as MovingStill. Thread safe.
 int still_reduction(ImageSize whole, const ImageSpec& spec, const FramePair& pair);
 
 /// A still whose image and objects move, taken apart (detail/still_layers.h) once for its pair
