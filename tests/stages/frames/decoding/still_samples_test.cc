@@ -13,7 +13,7 @@ namespace eventgan {
 namespace {
 
 /// Places in 1/1024 px of samples along a row, and the share of each one's second column.
-struct Row {
+struct Samples {
   std::vector<int> x, y;
   std::vector<std::int32_t> shares_x;
   int row_x = 0, row_y = 0;
@@ -41,7 +41,7 @@ TEST(StillSamples, AreTheSameWithAllInstructions) {
   for (const ImageSize size : {ImageSize{1, 1}, {1, 7}, {9, 2}, {40, 53}}) {
     const SampledPlane plane(random_plane(size, random));
     for (const std::size_t count : {0, 1, 2, 63, 64, 65, 131}) {
-      Row row;
+      Samples row;
       const int far = between(0, 3) == 0 ? 1'000'000'000 : 5000;  // one row in four
       row.row_x = between(-far, far);
       row.row_y = between(-far, 1024 * size.height + far);
@@ -64,7 +64,7 @@ TEST(StillSamples, AreTheSameWithAllInstructions) {
 TEST(StillSamples, AreThePlaneWhereNothingIsBetween) {
   const cv::Mat values = random_plane({6, 80}, CounterRandom(6));
   const SampledPlane plane(values);
-  Row row;
+  Samples row;
   row.row_y = 2 * 1024;
   row.shares_y = shares_of(0);
   for (int x = -3; x < 83; ++x) {
@@ -92,7 +92,7 @@ TEST(StillSamples, OfARampLieOnItAndAreJoinedByTheirShares) {
     }
   }
   const SampledPlane plane(values);
-  Row row;
+  Samples row;
   row.row_x = 512;
   row.row_y = 7 * 1024 + 256;
   row.shares_y = shares_of(kSampleShare / 2);
