@@ -213,13 +213,18 @@ OutlineMasksReport make_outline_masks(const JobManifest& manifest,
     if (fs::is_directory(folder)) remove_stale_temporaries(folder);
   }
   const FrameDecoder decoder(manifest.directory);
-  const auto progress = options.make_progress ? options.make_progress(std::ssize(works)) : nullptr;
+  // Masks that are kept take no time: counted, they would make the others look fast.
+  const std::int64_t to_make = std::ranges::count_if(works, [](const MaskWork& work) {
+    return !work.fault.empty() || !fs::exists(work.mask);
+  });
+  const auto progress =
+      options.make_progress && to_make > 0 ? options.make_progress(to_make) : nullptr;
   for_each_index(works.size(), thread_count(options.threads), [&](std::size_t i) {
     if (options.stop && options.stop()) return;
     MaskWork& work = works[i];
     if (work.fault.empty()) make_mask(manifest, decoder, work);
     work.is_done = true;
-    if (progress) progress->advance(!work.fault.empty(), /*bytes=*/0);
+    if (progress && !work.is_kept) progress->advance(!work.fault.empty(), /*bytes=*/0);
   });
   if (progress) progress->finish();
 

@@ -16,7 +16,7 @@ namespace eventgan {
 struct OutlineMasksOptions {
   std::filesystem::path out;  ///< folder for the masks, made if absent
   int threads = 0;            ///< 0: all cores
-  /// Called with the number of images; shows progress. None: silent.
+  /// Called with the number of masks to make, if there are any; shows progress. None: silent.
   std::function<std::unique_ptr<Progress>(std::int64_t)> make_progress;
   std::function<bool()> stop = {};  ///< asked before each image; none: nobody asks
 };

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 #include <string>
 
 #include "manifests/documents/job_manifest.h"
@@ -22,6 +24,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// Two photographs, and a text with their boxes.
 class OutlineMasks : public ::testing::Test {
@@ -120,6 +123,20 @@ TEST_F(OutlineMasks, AreTheSameBytesForAnyNumberOfThreads) {
     EXPECT_EQ(testing::read_file(folder_.path() / "one/some" / name),
               testing::read_file(folder_.path() / "eight/some" / name));
   }
+}
+
+TEST_F(OutlineMasks, ProgressCountsWhatIsMade) {
+  std::ostringstream shown;
+  OutlineMasksOptions options{.out = folder_.path() / "masks", .threads = 1};
+  options.make_progress = [&](std::int64_t total) {
+    return std::make_unique<Progress>(shown, ProgressStyle::kLines, nullptr, total);
+  };
+  testing::write_file(folder_.path() / "masks/some/a.png", "mended");
+  make_outline_masks(manifest(), options);
+  EXPECT_THAT(shown.str(), AllOf(HasSubstr("1/1 "), Not(HasSubstr("1/2 "))));
+  shown.str("");
+  EXPECT_EQ(make_outline_masks(manifest(), options).kept, 2);
+  EXPECT_EQ(shown.str(), "");
 }
 
 TEST_F(OutlineMasks, ThatAreThereAreKept) {
