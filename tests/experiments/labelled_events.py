@@ -161,12 +161,12 @@ LAYERS = {
 CLIPS = {f"{name}, clips": Source(generator, layers=True, rests=1, clips=True)
          for name, generator in (("EventGAN 16", SHIPPED[16]), ("EventGAN 8", SHIPPED[8]), ("ESIM", {"kind": "esim"}),
                                  ("difference", {"kind": "difference"}))}
-OF_TASKS = {  # but persons
+OF_TASKS = CLIPS | {  # but persons
     "EventGAN 8, layers, rests 0": Source(SHIPPED[8], layers=True, rests=0),        # as `--camera moves`
     "EventGAN 8, layers, rests 0.25": Source(SHIPPED[8], layers=True, rests=0.25),  # as `--camera both`
     "EventGAN 8, layers, motion": Source({**SHIPPED[8], "scope": "motion"}, layers=True),
 }
-SOURCES = METHODS | SENSORS | LAYERS | CLIPS | OF_TASKS | {
+SOURCES = METHODS | SENSORS | LAYERS | OF_TASKS | {
     "EventGAN 16, finer": Source(SHIPPED[16], finer=2),
     "EventGAN 16, eta98": Source(SHIPPED[16], normalize="eta98"),
     "difference, eta98": Source({"kind": "difference"}, normalize="eta98"),
