@@ -43,6 +43,7 @@ sys.path.append(str(EXAMPLES))  # the trainers, which find the package if it is 
 import training
 from eventgan import Shards, read_description
 from eventgan.evaluate import PAPER_COLUMNS, Samples, evaluate_detections, evaluate_poses, table
+from kept_settings import require_same
 
 SIZE = {"width": 346, "height": 260}
 GENERATORS = {"EventGAN": {"weights": "shipped"}, "log difference": {"kind": "difference"}, "ESIM": {"kind": "esim"}}
@@ -87,7 +88,7 @@ def read_args() -> argparse.Namespace:
     real = kinds.add_parser("real", parents=[shared])
     real.add_argument("--task", default="persons",
                       choices=["persons", "cars", "joints", "cars_motion", "persons_scope", "cars_scope",
-                               "joints_scope", "dhp19", "dhp19_bright", "tuning", "joints_tuning"],
+                               "joints_scope", "dhp19", "tuning", "joints_tuning"],
                       help="what is learnt (default: %(default)s); results of the others are in OUT/TASK")
     real.add_argument("--frames", required=True, type=pathlib.Path,
                       help="folder of photographs and clips with boxes.csv and frames.csv")
@@ -99,7 +100,7 @@ def read_args() -> argparse.Namespace:
     real.add_argument("--trainer", help="folder of ultralytics/yolov3, for the rows of YOLOv3-tiny")
     real.add_argument("--seeds", type=int, default=5)
     real.add_argument("--quick", action="store_true",
-                      help="one row, one seed, 60 steps; fails unless it finds more than an untrained network")
+                      help="first rows alone, one seed, 60 steps; fails unless it finds more than an untrained network")
     args = parser.parse_args()
     if getattr(args, "small", False):
         args.scenes, args.seeds, args.steps = 8, 1, 1
@@ -320,6 +321,8 @@ def main() -> None:
 
         real_cameras.run(args)
         return
+    require_same(args.out, args.program, {"scenes": args.scenes, "steps": args.steps, "truth": args.truth,
+                                          "poses": args.what == "pose"})
     columns = {"detection": PAPER_COLUMNS, "pose": POSE_COLUMNS, "trade": TRADE_COLUMNS}[args.what]
     scores = pose(args) if args.what == "pose" else detection(args)
     rows = {name: {key: [each[key] for each in of_seeds] for key in columns} for name, of_seeds in scores.items()}

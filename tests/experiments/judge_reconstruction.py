@@ -47,6 +47,7 @@ from recordings import METHODS, frames_of, real_volumes  # first: it finds the p
 
 import training
 from eventgan.drawing import write
+from kept_settings import require_same
 from reconstruction import load_firenet, reconstruct, robust_normalized, ssim, ssim_map
 
 LONGEST_PX = 346  # a DAVIS346's
@@ -215,12 +216,9 @@ def main() -> None:
     except (OSError, ValueError) as error:
         raise SystemExit(str(error))
     file = args.out / "results.json"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    judge = hashlib.sha256(args.judge.read_bytes()).hexdigest()
-    kept: dict[str, Any] = (json.loads(file.read_text(encoding="utf-8")) if file.exists()
-                            else {"judge": judge, "recordings": {}})
-    if kept["judge"] != judge:
-        raise SystemExit(f"expected results of the judge {judge}, got those of {kept['judge']}, in {file}")
+    require_same(args.out, args.program, {"judge": hashlib.sha256(args.judge.read_bytes()).hexdigest(),
+                                          **{path.stem: path.stat().st_size for path in args.recordings}})
+    kept: dict[str, Any] = (json.loads(file.read_text(encoding="utf-8")) if file.exists() else {"recordings": {}})
     rows = [*CONTROLS, *args.methods]
     for path in args.recordings:
         done = kept["recordings"].setdefault(path.stem, {})

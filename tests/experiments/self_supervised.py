@@ -36,6 +36,7 @@ import numpy as np
 import recordings
 import torch
 import training
+from kept_settings import require_same
 from torch import nn
 from torch.nn import functional
 from train_flow import UNet, begin_at_rest, error_at_events, in_colour, moved, normalized
@@ -425,11 +426,9 @@ def main() -> None:
     halves = halves_of(args.recordings)
     (args.out / "networks").mkdir(parents=True, exist_ok=True)
     file = args.out / "results.json"
-    settings = {"steps": args.steps, "recordings": [[path.stem for path in half] for half in halves]}
-    results = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {"settings": settings, "runs": {}}
-    if results["settings"] != settings:
-        raise SystemExit(f"expected the settings {results['settings']}, as when this run started, got {settings}, "
-                         f"in {file}")
+    require_same(args.out, args.program, {
+        "steps": args.steps, "recordings": [{path.stem: path.stat().st_size for path in half} for half in halves]})
+    results = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {"runs": {}}
     runs, tests = results["runs"], {path.stem: read_pairs(args, REAL, path) for half in halves for path in half}
     if "controls" not in results:
         results["controls"] = {control: {name: [control_scores(control, pairs)] for name, pairs in tests.items()}

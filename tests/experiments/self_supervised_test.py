@@ -192,4 +192,4 @@ def test_a_small_run_fills_the_table_and_goes_on(recording_folder, tmp_path):
     assert "real 0 0" not in second and "real 0 1" in second
     assert (json.loads((tmp_path / "out" / "results.json").read_text())["runs"]["real 0 0"]
             == results["runs"]["real 0 0"])
-    assert "expected the settings" in run("--steps", "3", expect=1)
+    assert "expected steps 2, as when" in run("--steps", "3", expect=1)

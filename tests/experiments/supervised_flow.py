@@ -32,6 +32,7 @@ import self_supervised
 import torch
 import train_flow
 import training
+from kept_settings import require_same
 from self_supervised import CONTROLS, REAL, Pair
 
 TRAINER = pathlib.Path(train_flow.__file__)
@@ -141,6 +142,8 @@ def main() -> None:
     args = read_args()
     torch.set_num_threads(args.threads)
     paths = [path for half in self_supervised.halves_of(args.recordings) for path in half]
+    require_same(args.out, args.program, {"frames": [frames.resolve() for frames in args.frames],
+                                          "recordings": {path.stem: path.stat().st_size for path in paths}})
     tests = {path.stem: self_supervised.read_pairs(args, REAL, path) for path in paths}
     file = args.out / "results.json"
     results = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
