@@ -31,7 +31,7 @@ from eventgan.detection_scores import overlapping
 from eventgan.outlines import mask
 from eventgan.torch import DetectionDataset
 from labelled_recordings import (JOINTS, SIZE, Item, file_name, frame_channel, halved, kept, normalized, recordings_in,
-                                 shown_in, smaller, test_items)
+                                 replace, shown_in, smaller, test_items)
 
 MOTION_PX = 8  # of stills, at most
 
@@ -192,7 +192,6 @@ def manifest_of(args: argparse.Namespace, name: str, source: Source) -> dict[str
         path, kind = args.frames / folder / "person_keypoints.json", "coco"
         if not path.exists():
             path, kind = labels / f"{folder}.csv", "csv"
-        if not path.exists():
             _write_boxes(args.frames / folder, path, args.task.clips.get(folder, 1))
         found = {"dataset": "frames", "root": str(args.frames / folder / "images"),
                  "labels": {"format": kind, "path": str(path)},
@@ -239,7 +238,6 @@ def _outlines(args: argparse.Namespace, folder: str) -> pathlib.Path:
     labels = args.frames / folder / "person_keypoints.json"
     if not labels.exists():
         labels = args.out / "labels" / f"{folder}.json"
-    if not labels.exists():
         _write_coco(args.frames / folder, labels)
     manifest = {"format": "eventgan-manifest", "version": 1, "name": folder, "seed": 7,
                 "sources": [{"dataset": "frames", "root": str(args.frames / folder / "images"),
@@ -316,15 +314,16 @@ def fitted_threshold(args: argparse.Namespace) -> float:
             model = Generator(kind="difference", sensor={"positive_threshold": middle, "negative_threshold": middle})
             share = np.mean([(model(previous, following) > 0).any(0).mean() for previous, following in pairs])
             low, high = (middle, high) if share > wanted else (low, middle)
-        path.write_text(json.dumps({"threshold": middle, "active_pixels": share, "of_camera": wanted}) + "\n",
-                        encoding="utf-8")
+        text = json.dumps({"threshold": middle, "active_pixels": share, "of_camera": wanted}) + "\n"
+        replace(path, lambda new: new.write_text(text, encoding="utf-8"))
     return json.loads(path.read_text(encoding="utf-8"))["threshold"]
 
 
 def items_of(args: argparse.Namespace, name: str, signed: bool = True) -> list[Item]:
     """The items of a source, or of "real NAME"."""
     if name.startswith("real "):
-        return test_items(args, args.real / name.removeprefix("real "), SIZE, signed)
+        recording = next(each for each in recordings_in(args, args.real) if each.name == name.removeprefix("real "))
+        return test_items(args, recording, SIZE, signed)
     source = SOURCES[name]
 
     def make() -> list[Item]:

@@ -237,9 +237,12 @@ def _boxes(labels: pathlib.Path, size: tuple[int, int]) -> np.ndarray:
     return edges.clip(0, 1) * np.tile(size[::-1], 2)
 
 
+@functools.cache
 def key_of(path: pathlib.Path) -> str:
-    """Of a folder of recordings, for the names of what is made of it."""
-    return f"{path.name}-{zlib.crc32(str(path).encode()):08x}"
+    """Of a folder of recordings, for the names of what is made of it: another one once files have changed."""
+    files = [(str(each), each.stat().st_size, each.stat().st_mtime_ns)
+             for each in sorted(path.rglob("*")) if each.is_file()]
+    return f"{path.name}-{zlib.crc32(repr((str(path), files)).encode()):08x}"
 
 
 def file_name(name: str) -> str:

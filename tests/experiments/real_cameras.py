@@ -22,6 +22,7 @@ import multiprocessing
 import os
 import pathlib
 import platform
+import shlex
 import subprocess
 import sys
 import warnings
@@ -38,6 +39,7 @@ import training
 from eventgan import Shards, drawing
 from eventgan.evaluate import Samples, evaluate_detections
 from eventgan.torch import EventAugmentation
+from kept_settings import require_same
 from labelled_events import CLIPS, LAYERS, METHODS, OF_TASKS, SENSORS, SOURCES, items_of
 from labelled_recordings import (PERSON, SIZE, Item, Task, file_name, key_of, recordings_in, replace, test_items,
                                  windows_folder, windows_of)
@@ -238,16 +240,14 @@ def train_and_test(args: argparse.Namespace, row: Row, seed: int) -> dict[str, A
 def parts_of(args: argparse.Namespace, row: Row) -> dict[str, list[Item]]:
     """What the row is tested on: of each recording it has not learnt from, the windows behind the first ones; these
     ("development"); its grey frames; and, where rows may learn from its first windows, those behind these
-    ("others"). Of cars also all recordings together."""
+    ("others"). Of several recordings also all together."""
     found: dict[str, list[Item]] = {ALL: []}
-    recordings = recordings_in(args, args.test)
+    recordings, own = recordings_in(args, args.test), recordings_in(args, args.real)
     for recording in recordings:
         name = recording.name
         windows = [_float(args, item) for item in test_items(args, recording, row.size(), row.signed)]
-        kept, seen = development_windows(args, recording), 0
-        if args.test == args.real:
-            seen = args.task.learnt.get(name, 0)
-        if args.test != args.real or f"real {name}" not in row.sources:
+        kept, seen = development_windows(args, recording), args.task.learnt.get(name, 0) if recording in own else 0
+        if recording not in own or f"real {name}" not in row.sources:
             found |= {name: windows[kept:], f"{name}, development": windows[:kept]}
             # few in each; of tuned rows they would be others than of the rest
             if args.task.methods and len(recordings) > 1 and not args.task.windows:
@@ -264,7 +264,7 @@ def parts_of(args: argparse.Namespace, row: Row) -> dict[str, list[Item]]:
 
 def development_windows(args: argparse.Namespace, recording: pathlib.Path) -> int:
     """How many of the recording's first windows are in no table."""
-    return args.task.development.get(recording.name, 0) if args.test == args.real else 0
+    return args.task.development.get(recording.name, 0) if recording in recordings_in(args, args.real) else 0
 
 
 def _as_bright(windows: list[Item], training_items: list[Item]) -> list[Item]:
@@ -347,12 +347,24 @@ def write_table(path: pathlib.Path, lines: Sequence[Mapping[str, Any]]) -> None:
         print(path.read_text(encoding="utf-8"))
 
 
-def conditions(args: argparse.Namespace, task: str, images: int) -> dict[str, Any]:
-    """What the tables were computed with."""
+def settings_of(args: argparse.Namespace, learnt: Sequence[Row]) -> dict[str, Any]:
+    """What decides the results that are kept in OUT."""
+    apart = ("network", "columns", "methods", "windows", "steps")  # what of it decides results is in rows
+    sources = {name: dataclasses.replace(SOURCES[name], of_pair=None)
+               for row in learnt for name in row.sources if name in SOURCES}
+    return {"frames": args.frames, "real": args.real,
+            "task": {each.name: getattr(args.task, each.name) for each in dataclasses.fields(args.task)
+                     if each.name not in apart},
+            **{f"source {name}": str(source) for name, source in sources.items()},
+            **{f"row {row.name}": str(row) for row in learnt}}
+
+
+def conditions(args: argparse.Namespace, images: Mapping[str, int]) -> dict[str, Any]:
+    """What the tables were computed with; `images`: how many each source has."""
     with open("/proc/cpuinfo", encoding="utf-8") as file:
         found = {name.strip(): value.strip() for name, _, value in (line.partition(":") for line in file)}
     version = subprocess.run([args.program, "--version"], capture_output=True, text=True, check=True).stdout
-    return {"command": f"experiment.py real --task {task} --frames labelled_frames --real real_labels --peers peers",
+    return {"command": shlex.join([pathlib.Path(sys.argv[0]).name, *sys.argv[1:]]),
             "processor": found.get("model name", platform.machine()), "amx": "amx_tile" in found.get("flags", ""),
             "cores": len(os.sched_getaffinity(0)), "program": version.splitlines()[0], "pytorch": torch.__version__,
             "images": images, "steps": args.task.steps or STEPS, "batch": BATCH}
@@ -400,9 +412,12 @@ def draw(args: argparse.Namespace, drawn: Sequence[Row]) -> None:
 
 def _run(task: tuple[argparse.Namespace, Row | str, int]) -> tuple[str, int, dict[str, Any]]:
     args, row, seed = task
-    if isinstance(row, str):
-        return f"YOLOv3-tiny, {row}", seed, yolo(args, row, seed)
-    return row.name, seed, train_and_test(args, row, seed)
+    try:
+        if isinstance(row, str):
+            return f"YOLOv3-tiny, {row}", seed, yolo(args, row, seed)
+        return row.name, seed, train_and_test(args, row, seed)
+    except SystemExit as error:  # of a trainer: it would end the pool's process alone, and the others would wait for it
+        raise RuntimeError(str(error)) from error
 
 
 @dataclasses.dataclass(frozen=True)
@@ -419,7 +434,7 @@ def sections(args: argparse.Namespace) -> list[Section]:
     task = args.task
     if task.methods:
         found = task_rows(task)
-        quick = found[:1] + [row for row in found if row.base and row.windows][-1:]
+        quick = found[:1] + [row for row in found if row.base == found[0] and row.windows][-1:]
         return [Section("", quick if args.quick else found, found[0].name)]
     main = rows([folder.name for folder in recordings_in(args, args.real)])
     if args.quick:
@@ -450,17 +465,17 @@ def run(args: argparse.Namespace) -> None:
     args.task = TASKS[task]
     args.out.mkdir(parents=True, exist_ok=True)
     parts = sections(args)
-    # those with a base come last, when it has been trained
     tasks = sorted(((args, row, seed) for part in parts for seed in range(min(args.seeds, part.seeds))
-                    for row in part.rows), key=lambda each: (each[1].base is not None, each[2]))
+                    for row in part.rows), key=lambda each: each[2])
     tasks = [*{(row.name, seed): (args, row, seed) for args, row, seed in tasks}.values()]
     if args.trainer and not args.task.methods and not args.quick:
         tasks += [(args, name, seed) for seed in range(min(args.seeds, ABLATION_SEEDS)) for name in SOURCES
                   if name.endswith(", eta98")]
-    # What several processes read is made before there are several; the program uses all cores itself.
     learnt = [row for _, row, _ in tasks if isinstance(row, Row)]
-    for name, signed in dict.fromkeys((name, row.signed) for row in learnt for name in row.sources):
-        items_of(args, name, signed)
+    require_same(args.out, args.program, settings_of(args, learnt))
+    # What several processes read is made before there are several; the program uses all cores itself.
+    images = {name: len(items_of(args, name, signed))
+              for name, signed in dict.fromkeys((name, row.signed) for row in learnt for name in row.sources)}
     for row in {(row.size(), row.signed): row for row in learnt}.values():
         parts_of(args, dataclasses.replace(row, sources=row.sources[:1]))
     if len(learnt) < len(tasks):
@@ -472,11 +487,14 @@ def run(args: argparse.Namespace) -> None:
             for name, items in parts_of(args, Row(CONSTANT, ())).items()}
     results: Results = collections.defaultdict(list, {CONSTANT: [same] * args.seeds})
     with multiprocessing.get_context("fork").Pool(len(os.sched_getaffinity(0))) as pool:
-        for done, (name, seed, scores) in enumerate(pool.imap(_run, tasks), 1):
+        # those with a base come last: two processes would train it at once
+        in_turn = [[each for each in tasks if bool(getattr(each[1], "base", None)) == tuned] for tuned in (False, True)]
+        finished = itertools.chain.from_iterable(pool.imap(_run, each) for each in in_turn)
+        for done, (name, seed, scores) in enumerate(finished, 1):
             results[name].append(scores)
             print(f"{done} of {len(tasks)}: {name}, seed {seed}: "
                   + ", ".join(f"{key} {value[first]:.2f}" for key, value in scores.items()), flush=True)
-    found = conditions(args, task, len(items_of(args, learnt[0].sources[0])))
+    found = conditions(args, images)
     (args.out / "conditions.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     for part in parts:
         write_table(args.out / f"{'_'.join(filter(None, (task, part.title)))}.csv",
@@ -504,6 +522,6 @@ def run(args: argparse.Namespace) -> None:
     else:
         first = {row.name.split(",")[0]: row for row in reversed(drawn)}
         shown = [first[name] for name in ("EventGAN 16", "difference", "grey frames") if name in first]
-        draw(args, shown or drawn[:3])
+        draw(args, shown if len(shown) > 1 else drawn[:3])
     if not args.task.methods:
-        draw_curves(args, results, len(items_of(args, "EventGAN 16")))
+        draw_curves(args, results, images["EventGAN 16"])

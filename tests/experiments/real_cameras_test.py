@@ -177,10 +177,40 @@ def test_trained_once_and_never_on_what_it_is_tested_on(args, monkeypatch):
     network = real_cameras.train_and_test(args, real_cameras.Row("difference", ("difference",), images=5), 0)
     assert [*network] == ["drawn", "windows", "windows, development", "walking"]  # none has grey frames
     assert all(0 <= value <= 1 for score in network.values() for value in score.values())
+    args.test = labelled_recordings.recordings_in(args, args.real)[1]  # "windows": a part of what was learnt from
+    assert [*real_cameras.parts_of(args, real_cameras.Row("difference", ("difference",)))] == [
+        "windows", "windows, development"]
+    assert real_cameras.parts_of(args, row) == {}
     args.test = args.real.rename(args.real.with_name("others"))
     args.real.symlink_to(args.test)
     monkeypatch.setattr(train_detector, "train", None)  # it would fail
     assert [*real_cameras.train_and_test(args, row, 0)] == ["drawn", "windows", "walking"]
+
+
+def test_recordings_to_learn_from_may_lie_deeper(args):
+    args.out.mkdir()
+    [item] = labelled_events.items_of(args, "real walking")
+    assert item["id"] == labelled_recordings.test_items(
+        args, labelled_recordings.recordings_in(args, args.real)[2], labelled_recordings.SIZE)[0]["id"]
+
+
+def test_a_trainer_that_ends_does_not_end_its_process_alone(monkeypatch):
+    def refused(*_):
+        raise SystemExit("expected a finite loss, got nan")
+
+    monkeypatch.setattr(real_cameras, "train_and_test", refused)
+    with pytest.raises(RuntimeError, match="expected a finite loss"):
+        real_cameras._run((None, real_cameras.Row("a", ()), 0))
+
+
+def test_what_is_made_of_a_folder_is_made_anew_once_its_files_change(tmp_path):
+    (tmp_path / "a.txt").write_text("0 0.5 0.5 0.1 0.1")
+    before = labelled_recordings.key_of(tmp_path)
+    labelled_recordings.key_of.cache_clear()
+    assert labelled_recordings.key_of(tmp_path) == before
+    (tmp_path / "b.txt").write_text("")
+    labelled_recordings.key_of.cache_clear()
+    assert labelled_recordings.key_of(tmp_path) != before
 
 
 def test_tables_compare_seed_by_seed():
