@@ -3,6 +3,7 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <string>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "manifests/files/csv_records.h"
+#include "manifests/files/input_file.h"
 #include "manifests/files/own_file.h"
 #include "manifests/values/text.h"
 #include "manifests/values/text_lines.h"
@@ -84,7 +86,9 @@ class UnreadFinder {
 
   UnreadLabels found;
 
-  void look_below(const fs::path& top, int depth) {
+  /// `is_inside`: in what was given, where a label file that cannot be read is told, too.
+  void look_below(const fs::path& top, int depth, bool is_inside = false) {
+    is_inside_ = is_inside;
     std::deque<std::pair<fs::path, int>> folders = {{top, depth}};
     for (; !folders.empty() && found.lines.size() < kMostLines; folders.pop_front()) {
       const auto [folder, levels] = folders.front();
@@ -145,11 +149,27 @@ class UnreadFinder {
         continue;
       }
       if (++opened_ > kMostFiles) return cut();
-      look_at({file, images_, files_, is_of_image, images_.is_sequence(stem.string()),
-               beginning_of(file)},
-              extension);
+      const LabelFile seen{file,
+                           images_,
+                           files_,
+                           is_of_image,
+                           images_.is_sequence(stem.string()),
+                           beginning_of(file)};
+      if (seen.text.empty() && is_inside_ && !has_labels_) {
+        tell_empty(seen, extension);
+      } else {
+        look_at(seen, extension);
+      }
     }
     found.are_more |= !are_all && found.others.size() > told_before;
+  }
+
+  /// A text may be empty, as YOLO's of an image without objects.
+  void tell_empty(const LabelFile& file, const std::string& extension) {
+    std::string reason = "it is empty";
+    const bool is_readable = InputFile::open(file.path, reason).has_value();
+    if (is_readable && extension == ".txt") return;
+    tell(file, file.path.string(), " is not read: " + reason);
   }
 
   /// Whether it has the labels that were found, or has been told of.
@@ -182,11 +202,16 @@ class UnreadFinder {
       if (said.has_words || said.has_numbers) found.others.push_back(file.path.string());
       return;
     }
-    tell(
-        file, extension + file.path.parent_path().string(),
-        std::string(said.names_images ? " names these images" : " has the name of one of these") +
-            " and is not read: no reader of its format; convert it to COCO, YOLO or Pascal VOC, or "
-            "to a table image,class,left,top,right,bottom");
+    const bool is_damaged =
+        extension == ".json" && !nlohmann::json::accept(InputFile(file.path).read_all(),
+                                                        /*ignore_comments=*/true);
+    tell(file, extension + file.path.parent_path().string(),
+         (said.names_images ? " names these images" : " has the name of one of these") +
+             std::string(is_damaged
+                             ? " and is not read: no JSON; it may have been cut short"
+                             : " and is not read: no reader of its format; convert it to COCO, "
+                               "YOLO or Pascal VOC, or to a table image,class,left,top,right,"
+                               "bottom"));
   }
 
   void tell(const LabelFile& file, const std::string& kind, const std::string& text) {
@@ -197,7 +222,7 @@ class UnreadFinder {
   WholeFiles& files_;
   ImageNames images_;
   const std::vector<FoundSource>& sources_;
-  bool has_labels_ = false;
+  bool has_labels_ = false, is_inside_ = false;
   std::set<fs::path> image_folders_, known_;
   std::set<std::string> own_extensions_;  ///< of files that the labels are, one an image
   std::set<std::string> told_, kinds_;
@@ -258,7 +283,7 @@ UnreadLabels unread_labels(const std::vector<FoundFrames>& places, const fs::pat
   if (places.empty()) return {};
   UnreadFinder finder(places, sources);
   const fs::path top = has_folder(given) ? given : given.parent_path();
-  finder.look_below(top, has_folder(given) ? kDepth : 0);
+  finder.look_below(top, has_folder(given) ? kDepth : 0, /*is_inside=*/has_folder(given));
   // Beside it, and where a tree of labels stands beside that of images.
   constexpr int kLevels = 4;
   fs::path rest, folder = top;

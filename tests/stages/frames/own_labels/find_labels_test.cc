@@ -230,6 +230,33 @@ TEST_F(FindLabels, WhatNamesTheImagesAndIsNotReadIsNamed) {
                           ", " + places[1] + ", " + places[2]));
 }
 
+TEST_F(FindLabels, FilesOfLabelsThatCannotBeReadAreNamed) {
+  write("gone/im1.jpg");
+  fs::create_symlink(at("nowhere.csv"), at("gone/boxes.csv"));
+  EXPECT_THAT(find("gone").unread, ElementsAre(at("gone/boxes.csv").string() +
+                                               " is not read: No such file or directory"));
+  for (const std::string name : {"boxes.csv", "annotations/instances.json"}) {
+    const std::string set = "empty_" + fs::path(name).stem().string();
+    write(set + "/images/im1.jpg");
+    write(set + "/" + name, "");
+    EXPECT_THAT(find(set).unread,
+                ElementsAre(at(set + "/" + name).string() + " is not read: it is empty"));
+  }
+  write("texts/im1.jpg");
+  write("texts/notes.txt", "");
+  EXPECT_THAT(find("texts").unread, IsEmpty());
+  write("texts/set/im2.jpg");
+  write("texts/beside.csv", "");  // another's, above what is given
+  EXPECT_THAT(find("texts/set").unread, IsEmpty());
+
+  write("cut/im1.jpg");
+  write("cut/all.json", R"({"images": [{"id": 1, "file_name": "im1.jpg", "size": [1, 2, 3, 4]})");
+  EXPECT_THAT(find("cut").unread,
+              ElementsAre(at("cut/all.json").string() +
+                          " names these images and is not read: no JSON; it may have been cut "
+                          "short"));
+}
+
 TEST_F(FindLabels, WhatNamesTheImagesAndIsNoLabelStopsNothing) {
   const std::pair<std::string, std::string> files[] = {
       {"IMG_0001.jpg.json",
