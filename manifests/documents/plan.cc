@@ -32,16 +32,20 @@ std::vector<std::string> notes_of(const std::vector<SourceSummary>& sources,
   return notes;
 }
 
-std::string notes_text(const std::vector<std::string>& notes) {
-  constexpr std::size_t kListed = 5;
-  if (notes.empty()) return "";
+std::string notes_text(const std::vector<std::string>& all) {
+  if (all.empty()) return "";
+  std::vector<std::string> notes = all;
+  const auto of_losses = std::ranges::stable_partition(
+      notes, [](const std::string& note) { return note.find("left out") != note.npos; });
+  const auto losses = static_cast<std::size_t>(of_losses.begin() - notes.begin());
+  const std::size_t listed = std::clamp<std::size_t>(losses, 5, 50);
   std::string text =
       std::to_string(notes.size()) + (notes.size() == 1 ? " note" : " notes") + " on the inputs:\n";
-  for (std::size_t i = 0; i < std::min(notes.size(), kListed); ++i) {
+  for (std::size_t i = 0; i < std::min(notes.size(), listed); ++i) {
     text += "  note: " + escape_controls(notes[i]) + "\n";
   }
-  if (notes.size() > kListed) {
-    text += "  ... and " + std::to_string(notes.size() - kListed) + " more (in plan.json)\n";
+  if (notes.size() > listed) {
+    text += "  ... and " + std::to_string(notes.size() - listed) + " more (in plan.json)\n";
   }
   return text;
 }

@@ -18,6 +18,7 @@ namespace eventgan {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 using testing::small_plan;
 
 TEST(PlanJson, RoundTripsByteForByte) {
@@ -80,6 +81,12 @@ TEST(Notes, OfAllSourcesAndOfVeryManyTheFirst) {
   const std::string many = notes_text(std::vector<std::string>(1000, "x"));
   EXPECT_THAT(many, HasSubstr("1000 notes on the inputs:\n  note: x\n"));
   EXPECT_THAT(many, HasSubstr("... and 995 more"));
+  std::vector<std::string> losses(8, "x");
+  for (const char* loss : {"1 box left out: a", "2 boxes left out: b"}) losses.emplace_back(loss);
+  EXPECT_EQ(notes_text(losses),
+            "10 notes on the inputs:\n  note: 1 box left out: a\n  note: 2 boxes left out: b\n"
+            "  note: x\n  note: x\n  note: x\n  ... and 5 more (in plan.json)\n");
+  EXPECT_THAT(notes_text(std::vector<std::string>(7, "1 box left out")), Not(HasSubstr("more")));
 }
 
 TEST(PlanJson, OfNoShardsRoundTrips) {
