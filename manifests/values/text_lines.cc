@@ -48,6 +48,15 @@ std::string in_quotes(std::string_view text) {
   return "'" + shown + (text.size() > kMaxLength ? "...'" : "'");
 }
 
+std::string shell_word(std::string_view path) {
+  constexpr std::string_view kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./+:,=@%";
+  if (!path.empty() && path.find_first_not_of(kPlain) == path.npos) return std::string(path);
+  std::string word = "'";
+  for (const char c : path) word += c == '\'' ? "'\\''" : std::string(1, c);
+  return word + "'";
+}
+
 std::string place_in_file(const std::string& path, int line) {
   return path + ":" + std::to_string(line);
 }

@@ -59,6 +59,10 @@ std::optional<std::int64_t> parse_whole(std::string_view token);
 /// Foreign text for a message: in quotes, cut to 40 characters, all but printable ASCII as '?'.
 std::string in_quotes(std::string_view text);
 
+/// A path as a word of a command line that a message prints: in single quotes where a shell would
+/// take its blanks or marks for something else.
+std::string shell_word(std::string_view path);
+
 /// "PATH:LINE".
 std::string place_in_file(const std::string& path, int line);
 

@@ -9,6 +9,7 @@
 
 #include "manifests/values/job.h"
 #include "manifests/values/text.h"
+#include "manifests/values/text_lines.h"
 #include "pipeline/command_line/given_job.h"
 #include "pipeline/command_line/options.h"
 #include "pipeline/command_line/standard_streams.h"
@@ -51,7 +52,7 @@ std::string trial_text(const ConvertArguments& arguments, const ConversionReport
   const JobOptions& job = arguments.job;
   return fmt::format("trial run: {} of the job. For all pairs{}:  eventgan convert {}{}{}\n",
                      count_text(report.plan_pairs, "pair"),
-                     job.output ? ", into another folder" : "", job.manifest,
+                     job.output ? ", into another folder" : "", shell_word(job.manifest),
                      arguments.wishes.text(), job.output ? " --output DIR" : "");
 }
 

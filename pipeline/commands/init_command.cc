@@ -17,6 +17,7 @@
 #include "manifests/files/atomic_file.h"
 #include "manifests/values/datasets.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text_lines.h"
 #include "pipeline/command_line/given_job.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/planning/draft_manifest.h"
@@ -102,7 +103,7 @@ int run(const InitArguments& arguments) {
     std::cout << "note: " << escape_controls(note) << "\n";
   std::cout << "manifest written to " << out.string() << "\n"
             << (draft.has_samples ? "next:  " : "no samples can be made yet; once that is fixed:  ")
-            << "eventgan plan " << out.string() << std::endl;
+            << "eventgan plan " << shell_word(out.string()) << std::endl;
   return kComplete;
 }
 

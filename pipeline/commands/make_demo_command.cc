@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/text_lines.h"
 #include "pipeline/command_line/options.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/runtime/errors.h"
@@ -34,7 +35,7 @@ int run(const DemoOptions& options) {
   }
   std::cout << "a small KITTI, MPII and Human3.6M dataset is in " << folder
             << "\nnext:  eventgan convert "
-            << (std::filesystem::path(folder) / "manifest.json").string() << std::endl;
+            << shell_word((std::filesystem::path(folder) / "manifest.json").string()) << std::endl;
   return kComplete;
 }
 

@@ -7,6 +7,7 @@
 #include "manifests/documents/commit_record.h"
 #include "manifests/documents/report.h"
 #include "manifests/values/text.h"
+#include "manifests/values/text_lines.h"
 
 namespace eventgan {
 namespace {
@@ -130,7 +131,7 @@ Report table_of(const ConversionReport& report) {
           {"finalized", report.finalized},
           report.quarantined.empty()
               ? ""
-              : "next, once the inputs are fixed:  eventgan retry " + report.folder};
+              : "next, once the inputs are fixed:  eventgan retry " + shell_word(report.folder)};
 }
 
 }  // namespace

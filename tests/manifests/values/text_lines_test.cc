@@ -82,6 +82,13 @@ TEST(ParseNumber, WhatIsTooSmallIsZero) {
   EXPECT_FALSE(parse_number<double>("1" + std::string(400, '0')));
 }
 
+TEST(ShellWord, IsQuotedWhereAShellWouldSplitIt) {
+  EXPECT_EQ(shell_word("out/job_1.json"), "out/job_1.json");
+  EXPECT_EQ(shell_word("my photos/job.json"), "'my photos/job.json'");
+  EXPECT_EQ(shell_word("Jo's $HOME"), "'Jo'\\''s $HOME'");
+  EXPECT_EQ(shell_word(""), "''");
+}
+
 TEST(InQuotes, ShowsForeignBytesAsOneLineOfPlainText) {
   EXPECT_EQ(in_quotes("Car"), "'Car'");
   EXPECT_EQ(in_quotes(std::string_view("a\0\xff\nb", 5)), "'a???b'");
