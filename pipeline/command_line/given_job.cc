@@ -68,6 +68,10 @@ void require_kept(const DraftWishes& wishes, const JobManifest& manifest, const 
   if (!wishes.classes.empty() && !std::ranges::all_of(manifest.sources, has_classes)) {
     refuse("--classes");
   }
+  const auto has_own_labels = [](const SourceSpec& source) { return source.labels.has_value(); };
+  if (wishes.no_labels && std::ranges::any_of(manifest.sources, has_own_labels)) {
+    refuse(kNoLabelsOption);
+  }
 }
 
 /// A labelled set that becomes samples without a box is worse than none.

@@ -160,6 +160,8 @@ class WithoutManifest(program.InFolder):
             self.assertEqual([*shard["labels/boxes/class_id"].attrs["class_names"]], ["dog", "car"])
         _, err = convert("photos", "out", "--camera", "both", expect=64)
         self.assertIn("--camera: expected what was given when the job began", err)
+        _, err = convert("photos", "out", "--no-labels", expect=64)
+        self.assertIn("--no-labels: expected what was given when the job began", err)
         _, err = convert("manifest.json", "new", *wanted, expect=64)
         self.assertIn("--camera moves --classes dog,car: expected a folder, video or recording, got a manifest", err)
         _, err = convert("photos", "new", "--classes", "dgo", expect=66)
