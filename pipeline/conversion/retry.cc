@@ -376,7 +376,8 @@ Report table_of(const RetryReport& report) {
        count_text(report.shards_missing, "shard") + " not made yet: run eventgan convert"},
       {"changed_inputs", report.changed_inputs,
        fmt::format("inputs changed since the plan was frozen ({}): recorded, eventgan convert will "
-                   "accept them",
+                   "accept them; samples that are done keep the old ones, and new images are in no "
+                   "plan: for all of them, convert to another --output",
                    fmt::join(report.changed_inputs, ", "))},
       {"shards_renamed", report.shards_renamed,
        "classes were added: named in " + count_text(report.shards_renamed, "shard")},
