@@ -121,7 +121,8 @@ void add_export_command(CLI::App& app, int& exit_code) {
                   "keep or drop boxes to ignore (DontCare). YOLO keeps them as a class of their "
                   "own (default: drop), COCO as crowds (default: keep)"),
               kIgnored);
-  add("--full-scale", options.full_scale, "volume value that becomes 255; default: 1")
+  add("--full-scale", options.full_scale,
+      "volume value, with --images png a pixel's sum of them, that becomes 255; default: 1")
       ->check(finite_range(1e-6, 1e6))
       ->option_text("VALUE");
   take_one_of(

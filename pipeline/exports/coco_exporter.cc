@@ -263,6 +263,10 @@ class CocoExporter : public Exporter {
     }
   }
 
+  std::optional<double> full_scale() const override {
+    return as_images_ ? std::optional(full_scale_) : std::nullopt;
+  }
+
   void account(const OutgoingSample& sample, LeftOut& left_out) const override {
     for_each_box(
         sample, numbers_, keep_ignored_, [](const auto&, const auto&) {},

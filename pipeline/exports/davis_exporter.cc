@@ -92,6 +92,12 @@ class DavisExporter : public Exporter {
   bool works_by_shard() const override { return false; }
 
   void check(const ExportInput& input, const std::function<void()>& check_stop) const override {
+    const auto has_joints = [&](const ExportShard& shard) {
+      return input.source_of(shard).has_joints();
+    };
+    if (std::ranges::all_of(input.shards(), has_joints)) {
+      require_listed_person(input, "davis", check_stop);
+    }
     for (const ExportSet& set : input.sets(/*joints_only=*/false, /*by_size=*/true)) {
       const ExportSource& source = input.source_of(*set.shards[0]);
       if (source.has_joints()) continue;

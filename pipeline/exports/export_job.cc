@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "manifests/documents/report.h"
@@ -45,6 +46,7 @@ class Description {
     const char* before = "\n";
     work_.walk(shards, [&](const OutgoingSample& sample) {
       exporter_.account(sample, left_out_);
+      account_full_scale(sample);
       lines += std::exchange(before, ",\n") +
                dump_json(nlohmann::ordered_json{{"sample_id", sample.labels.sample_id},
                                                 {"name", sample.name},
@@ -67,18 +69,40 @@ class Description {
     }
     for (const auto& [what, count] : exporter_.whole_samples_left_out()) left_out_[what] += count;
     lines += "],\n\"left_out\": " + dump_json(nlohmann::ordered_json(left_out_)) +
-             ",\n\"notes\": " + dump_json(nlohmann::ordered_json(exporter_.notes())) + "}\n";
+             ",\n\"notes\": " + dump_json(nlohmann::ordered_json(notes())) + "}\n";
     file.write(lines);
     file.publish();
   }
 
   LeftOut& left_out() { return left_out_; }
 
+  /// Those of the exporter, and what was cut; once it is written.
+  std::vector<std::string> notes() const {
+    std::vector<std::string> notes = exporter_.notes();
+    if (cut_ > 0) {
+      notes.push_back(fmt::format(
+          "values above the full scale of {} were cut to it in {}; the largest is {:.3g} "
+          "(--full-scale sets another)",
+          exporter_.full_scale().value(), count_text(cut_, "sample"), largest_));
+    }
+    return notes;
+  }
+
  private:
+  void account_full_scale(const OutgoingSample& sample) {
+    const std::optional<double> full_scale = exporter_.full_scale();
+    const float largest = largest_value(sample);
+    if (!full_scale || largest <= *full_scale) return;
+    ++cut_;
+    largest_ = std::max(largest_, largest);
+  }
+
   const ExportWork& work_;
   const Exporter& exporter_;
   std::string identity_;
   LeftOut left_out_;
+  std::int64_t cut_ = 0;  ///< samples with values above the full scale
+  float largest_ = 0;     ///< of them
 };
 
 bool has_use_for(LabelNeed need, const ExportSource& source) {
@@ -158,7 +182,7 @@ ExportReport run_export(const std::filesystem::path& folder, const ExportOptions
     description.write(shards, step.file(kExportDescription));
     step.finish();
     report.left_out = description.left_out();
-    report.notes = exporter->notes();
+    report.notes = description.notes();
   }
   report.notes.insert(report.notes.end(), edited.begin(), edited.end());
   if (progress) progress->finish();

@@ -113,12 +113,36 @@ void write_polarity_image(const OutgoingSample& sample, const std::string& folde
                                 full_scale));
 }
 
-void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut& left_out) {
+float largest_value(const OutgoingSample& sample) {
   // Normalised values end at 1; the statistics are of the values before that.
   const bool is_normalized = sample.reader.header().normalization == Normalization::kEta98;
-  const double largest = is_normalized ? 1.0 : sample.labels.statistics.max;
-  if (largest > full_scale)
-    ++left_out["samples with values above the full scale, cut to it (--full-scale)"];
+  return is_normalized ? 1.0f : sample.labels.statistics.max;
+}
+
+void require_listed_person(const ExportInput& input, std::string_view format,
+                           const std::function<void()>& check_stop) {
+  LeftOut reasons;
+  for (const ExportShard& shard : input.shards()) {
+    if (!input.source_of(shard).has_joints()) continue;
+    const ShardReader reader = input.open(shard);
+    const JointChoice choice = choose_joints(reader.header().label_schema);
+    for (int slot = 0; slot < reader.header().sample_count; ++slot) {
+      check_stop();
+      const ShardSample sample = reader.sample(slot);
+      if (!sample.valid) continue;
+      for (const VolumePerson& person : sample.labels.persons) {
+        const std::string why = why_not_listed(person, choice);
+        if (why.empty()) return;
+        ++reasons[why];
+      }
+    }
+  }
+  std::string text;
+  for (const auto& [why, count] : reasons) text += fmt::format("persons: {}: {}; ", why, count);
+  throw UsageError(
+      fmt::format("expected samples that --to {} can use, got none, in {} ({})", format,
+                  input.folder().string(),
+                  reasons.empty() ? "no persons" : text + "--to coco keeps their joints"));
 }
 
 Outline shown_outline(const ShardSample& sample, const VolumeBox& box, ImageSize volume) {

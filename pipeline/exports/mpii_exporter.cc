@@ -14,6 +14,10 @@ class MpiiExporter : public Exporter {
 
   std::string settings() const override { return fmt::format("full scale {}\n", full_scale_); }
 
+  void check(const ExportInput& input, const std::function<void()>& check_stop) const override {
+    require_listed_person(input, "mpii", check_stop);
+  }
+
   void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
                    ExportFolder::Step& step) const override {
     work.for_each_sample(shard, reader, [&](const OutgoingSample& sample) {
@@ -27,12 +31,13 @@ class MpiiExporter : public Exporter {
     }
   }
 
+  std::optional<double> full_scale() const override { return full_scale_; }
+
   std::vector<std::string> notes() const override {
     return {"MMPose's MpiiDataset reads numbers as the images' names alone: for MMPose --to coco"};
   }
 
   void account(const OutgoingSample& sample, LeftOut& left_out) const override {
-    account_full_scale(sample, full_scale_, left_out);
     const JointChoice choice = choose_joints(sample.reader.header().label_schema);
     PckhTruth truth(choice.names);
     for (const VolumePerson& person : sample.labels.labels.persons) {

@@ -98,6 +98,8 @@ class YoloExporter : public Exporter {
     for (const auto& [folder, of_it] : of_folder) write_lists(work, folder, of_it);
   }
 
+  std::optional<double> full_scale() const override { return full_scale_; }
+
   /// Ultralytics' trainer stops where one is missing.
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes;
@@ -114,7 +116,6 @@ class YoloExporter : public Exporter {
   }
 
   void account(const OutgoingSample& sample, LeftOut& left_out) const override {
-    if (!as_images_) account_full_scale(sample, full_scale_, left_out);
     const ShardHeader& header = sample.reader.header();
     const auto take = [&](const auto&, const VolumeBox& box) {
       if (lines == Lines::kBoxes) return;

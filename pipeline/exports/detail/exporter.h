@@ -84,6 +84,9 @@ class Exporter {
   /// What of whole samples is not exported, as far as `finish` alone can tell.
   virtual LeftOut whole_samples_left_out() const { return {}; }
 
+  /// What larger values are cut to, in images of sums the sums; none where all stay.
+  virtual std::optional<double> full_scale() const { return std::nullopt; }
+
   /// What a user should know of what `finish` has made, a line each.
   virtual std::vector<std::string> notes() const { return {}; }
 };
@@ -119,8 +122,12 @@ void write_image_pair(const OutgoingSample& sample, const std::string& folder, d
 void write_polarity_image(const OutgoingSample& sample, const std::string& folder,
                           double full_scale, ExportFolder::Step& step);
 
-/// Counts a sample that has values above the full scale.
-void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut& left_out);
+/// The largest value of a sample's volume.
+float largest_value(const OutgoingSample& sample);
+
+/// Throws UsageError if no person can be listed (why_not_listed), saying why; for Exporter::check.
+void require_listed_person(const ExportInput& input, std::string_view format,
+                           const std::function<void()>& check_stop);
 
 /// What of a box's outline lies within what the volume shows of the image; empty without one.
 Outline shown_outline(const ShardSample& sample, const VolumeBox& box, ImageSize volume);

@@ -41,6 +41,7 @@ using ::testing::DoubleNear;
 using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::Pointwise;
 using ::testing::UnorderedElementsAre;
 
@@ -108,16 +109,21 @@ class Exporters : public ::testing::Test {
   }
   static void TearDownTestSuite() { converted_.reset(); }
 
-  /// The export's folder.
-  std::filesystem::path exported(std::string_view word, ExportOptions options = {},
-                                 const testing::ConvertedFolder& converted = *converted_) {
+  /// Into folder_ / word.
+  ExportReport reported(std::string_view word, ExportOptions options = {},
+                        const testing::ConvertedFolder& converted = *converted_) {
     options.to = &*std::ranges::find(export_formats(), word, &ExportFormat::word);
     options.out = folder_ / std::string(word);
     options.splits = {"val"};
     if (word != "webdataset" || options.representation) options.counts = EventCounts::kRounded;
     options.threads = 2;
-    run_export(converted.path(), options);
-    return options.out;
+    return run_export(converted.path(), options);
+  }
+
+  /// The export's folder.
+  std::filesystem::path exported(std::string_view word, const ExportOptions& options = {},
+                                 const testing::ConvertedFolder& converted = *converted_) {
+    return reported(word, options, converted).folder;
   }
 
   /// The same of samples of kTimes as many events whose frames are there, kLevel all over, and as
@@ -209,6 +215,43 @@ TEST_F(Exporters, YoloHasBoxesAndPosesInSharesOfTheVolume) {
   EXPECT_TRUE(std::filesystem::exists(out / "pose/labels/val/000004.txt"));
 }
 
+TEST_F(Exporters, SayInHowManySamplesValuesAreCutToTheFullScale) {
+  int above = 0;
+  float largest = 0;
+  for (const std::size_t slot : {0, 1, 3, 4}) {  // 2 is in quarantine
+    const float of_sample = std::ranges::max(volume(slot));
+    if (of_sample > 1) ++above;
+    largest = std::max(largest, of_sample);
+  }
+  ASSERT_EQ(above, 3);
+  std::ostringstream note;
+  note.precision(3);
+  note << "values above the full scale of 1 were cut to it in " << above
+       << " samples; the largest is " << largest << " (--full-scale sets another)";
+  const auto of_full_scale = HasSubstr("full scale");
+  for (const auto& [word, as_images] : {std::pair{"yolo", false},
+                                        {"yolo", true},
+                                        {"yolo-seg", true},
+                                        {"coco", true},
+                                        {"mpii", false}}) {
+    SCOPED_TRACE(std::string(word) + (as_images ? ", images" : ""));
+    ExportOptions options;
+    options.as_images = as_images;
+    options.overwrite = true;
+    for (int turn = 0; turn < 2; ++turn) {  // what is done already says it, too
+      const ExportReport report = reported(word, options);
+      EXPECT_THAT(report.notes, Contains(note.str()));
+      EXPECT_THAT(to_text(report), HasSubstr("\nnote: " + note.str()));
+      for (const auto& [what, count] : report.left_out) EXPECT_THAT(what, Not(of_full_scale));
+    }
+    options.full_scale = largest;
+    EXPECT_THAT(reported(word, options).notes, Not(Contains(of_full_scale)));
+  }
+  ExportOptions as_stored;
+  as_stored.overwrite = true;
+  EXPECT_THAT(reported("coco", as_stored).notes, Not(Contains(of_full_scale)));
+}
+
 TEST_F(Exporters, YoloSegHasTheOutlineWithItsHole) {
   const std::string line = testing::read_file(exported("yolo-seg") / "labels/val/000000.txt");
   std::istringstream words(line);
@@ -297,6 +340,50 @@ TEST_F(Exporters, DavisHasARowForEachPerson) {
   EXPECT_THAT(numbers(column("part")), ElementsAre(2.25, 2.875, 1, 3.25, 3.25, 1));
   EXPECT_THAT(numbers(column("views")), ElementsAre(10, 10, 12, 12, 12));
   EXPECT_EQ(column("imgname").text(0), "000000");
+}
+
+TEST_F(Exporters, ListsOfPersonsNeedOneWithCentreAndScale) {
+  const auto refused = [&](void (*change)(ShardSample&), const std::string& why) {
+    static void (*change_sample)(ShardSample&);
+    change_sample = change;
+    testing::ConvertedFolder converted(0);
+    for (int shard = 0; shard < 4; ++shard) {
+      converted.add(shard, [](testing::ExampleShard& example) {
+        example.header.manifest_text = kManifest;
+        for (ShardSample& sample : example.samples) change_sample(sample);
+      });
+    }
+    finalize(converted.path(), {});
+    for (const std::string_view word : {"mpii", "davis"}) {
+      EXPECT_THAT([&] { exported(word, {}, converted); },
+                  ::testing::ThrowsMessage<UsageError>(
+                      "expected samples that --to " + std::string(word) +
+                      " can use, got none, in " + converted.path().string() + " (" + why + ")"));
+      EXPECT_FALSE(std::filesystem::exists(folder_ / word));
+    }
+  };
+  // The split has three persons: two of 000000, of whom one has both, and 000004's without.
+  refused(
+      [](ShardSample& sample) {
+        for (Person& person : sample.annotation.persons) {
+          person.center = kMissingPoint;
+          person.scale = -1;
+        }
+        for (VolumePerson& person : sample.labels.persons) {
+          person.center = kMissingPoint;
+          person.scale = -1;
+        }
+      },
+      "persons: no centre or no scale: 3; --to coco keeps their joints");
+  refused(
+      [](ShardSample& sample) {
+        sample.annotation.persons.clear();
+        sample.labels.persons.clear();
+      },
+      "no persons");
+  for (const std::string_view word : {"mpii", "davis"}) {
+    EXPECT_EQ(reported(word).left_out.at("persons: no centre or no scale"), 2) << word;
+  }
 }
 
 TEST_F(Exporters, NameTheShardAndTheSampleThatTheyCannotExport) {
