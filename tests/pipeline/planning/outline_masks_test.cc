@@ -127,7 +127,8 @@ TEST_F(OutlineMasks, AreTheSameBytesForAnyNumberOfThreads) {
 
 TEST_F(OutlineMasks, ProgressCountsWhatIsMade) {
   std::ostringstream shown;
-  OutlineMasksOptions options{.out = folder_.path() / "masks", .threads = 1};
+  OutlineMasksOptions options;
+  options.out = folder_.path() / "masks";
   options.make_progress = [&](std::int64_t total) {
     return std::make_unique<Progress>(shown, ProgressStyle::kLines, nullptr, total);
   };
