@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <string_view>
@@ -108,7 +109,8 @@ class Draft {
   std::string text(const std::vector<SourceDraft>& sources) const {
     const bool is_events = has_events(sources.front().found.dataset);
     std::vector<std::string> written;
-    for (const SourceDraft& source : sources) written.push_back(source_text(source));
+    const bool is_reduced = has_many_shapes(sources) || has_large_stills(sources);
+    for (const SourceDraft& source : sources) written.push_back(source_text(source, is_reduced));
     return fmt::format(R"({{
   "format": "eventgan-manifest",
   "version": 1,
@@ -256,7 +258,7 @@ class Draft {
   // "volume": { "normalize": "eta98" },
 )";
 
-  std::string source_text(const SourceDraft& source) const {
+  std::string source_text(const SourceDraft& source, bool is_reduced) const {
     std::string text;
     for (const std::string& line : source.findings) {
       text += "    // " + escape_controls(line) + "\n";
@@ -264,7 +266,7 @@ class Draft {
     text += fmt::format("    {{\n      \"dataset\": \"{}\",\n", to_string(source.found.dataset));
     text += source_keys(source.found);
     text += has_events(source.found.dataset) ? window_text(source)
-            : source.is_stills               ? stills_text(source)
+            : source.is_stills               ? stills_text(source, is_reduced)
                                              : pairs_text(source);
     return text + "    }";
   }
@@ -316,9 +318,36 @@ class Draft {
     return wishes_.camera.value_or(CameraMotion::kRests) != CameraMotion::kRests;
   }
 
-  std::string stills_text(const SourceDraft& source) const {
-    const StillsSpec spec;
-    const ObjectMotionSpec object;
+  static bool has_many_shapes(const std::vector<SourceDraft>& sources) {
+    return std::ranges::any_of(sources, [&](const SourceDraft& source) {
+      return (source.is_stills && source.has_sizes) ||
+             source.habits.size != sources.front().habits.size;
+    });
+  }
+
+  static bool has_large_stills(const std::vector<SourceDraft>& sources) {
+    constexpr int kLongestSensor = 1280;
+    return std::ranges::any_of(sources, [](const SourceDraft& source) {
+      return source.is_stills &&
+             std::max(source.usual_size.width, source.usual_size.height) > kLongestSensor;
+    });
+  }
+
+  /// By how much more pixels an image moves than one of COCO or Pascal VOC, of some 500, for which
+  /// the defaults are, so that its volume of a DAVIS346's size shows as much motion.
+  static double motion_factor(ImageSize image) {
+    constexpr double kWidth = 346, kHeight = 260, kShown = 0.65;  // px of a volume to one of 500
+    constexpr double kMost = 12;                                  // 100 px is the manifest's bound
+    return std::clamp(std::round(kShown * std::max(image.width / kWidth, image.height / kHeight)),
+                      1.0, kMost);
+  }
+
+  std::string stills_text(const SourceDraft& source, bool is_reduced) const {
+    StillsSpec spec;
+    ObjectMotionSpec object;
+    const double factor = is_reduced ? motion_factor(source.usual_size) : 1;
+    for (double& most : spec.translation_px) most *= factor;
+    for (double& most : object.translation_px) most *= factor;
     const std::string image = fmt::format(
         R"("translation_px": [{}, {}], "rotation_deg": {}, "scale": {}, "frames": {})",
         spec.translation_px[0], spec.translation_px[1], spec.rotation_deg, spec.scale, spec.frames);
@@ -376,16 +405,15 @@ class Draft {
   /// One size and one preset serve all sources.
   static std::string image_text(const std::vector<SourceDraft>& sources) {
     const SourceDraft& first = sources.front();
-    const bool is_mixed = std::ranges::any_of(sources, [&](const SourceDraft& source) {
-      return (source.is_stills && source.has_sizes) || source.habits.size != first.habits.size;
-    });
     const bool has_presets = std::ranges::any_of(
         sources, [&](const SourceDraft& source) { return source.preset != first.preset; });
     std::vector<std::string> keys;
     std::string_view comment = first.habits.size_comment;
-    if (is_mixed) {
-      comment =
-          "Images come in many shapes; a DAVIS346 camera's size, with borders, keeps each one's.";
+    if (has_many_shapes(sources) || has_large_stills(sources)) {
+      comment = has_many_shapes(sources) ? "Images come in many shapes; a DAVIS346 camera's size, "
+                                           "with borders, keeps each one's."
+                                         : "Images are larger than any event camera's; a DAVIS346 "
+                                           "camera's size, with borders, keeps their shape.";
       keys.emplace_back(kDavisSize);
     } else if (!first.habits.size.empty()) {
       keys.emplace_back(first.habits.size);

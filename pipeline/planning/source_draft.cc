@@ -130,16 +130,18 @@ std::optional<double> likeness(const ColourFrame& first, const ColourFrame& seco
   return *middle;
 }
 
-/// Looks at the sizes of some images; a line if a sequence has several.
+/// Looks at the sizes of some images: the middle one, and a line if a sequence has several.
 void compare_sizes(const Dataset& dataset, const fs::path& folder, SourceDraft& draft) {
   constexpr std::size_t kMost = 200;
   const auto& frames = dataset.labelled_frames();
   std::map<std::string_view, std::pair<ImageSize, std::string_view>> first;  // of a sequence
+  std::vector<ImageSize> sizes;
   for (const std::size_t i : spread(kMost, frames.size())) {
     const std::string& path = frames[i].frame.path;
     const Outcome<ImageSize> probed = probe_image_size(folder / path, ImageOrientation::kUpright);
     if (is_fault(probed)) continue;
     const auto size = *probed;
+    sizes.push_back(size);
     const auto known = first.try_emplace(frames[i].sequence, size, path).first;
     draft.has_sizes |= first.begin()->second.first != size;
     if (draft.is_stills || known->second.first == size) continue;
@@ -148,6 +150,10 @@ void compare_sizes(const Dataset& dataset, const fs::path& folder, SourceDraft& 
         fmt::format("images of several sizes in one folder, {} in {} and {} in {}",
                     to_string(known->second.first), known->second.second, to_string(size), path));
   }
+  if (sizes.empty()) return;
+  const auto middle = sizes.begin() + std::ssize(sizes) / 2;
+  std::ranges::nth_element(sizes, middle, {}, &ImageSize::pixel_count);
+  draft.usual_size = *middle;
 }
 
 /// A line if images that are taken as neighbours have nothing to do with each other, as far as some

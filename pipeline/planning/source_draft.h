@@ -46,6 +46,7 @@ struct SourceDraft {
   std::vector<std::string> notes = {};     ///< Dataset::notes()
   bool is_stills = false;
   bool has_sizes = false;                 ///< the images that were looked at have several sizes
+  ImageSize usual_size = {};              ///< of these the middle one
   bool has_frames = false;                ///< recording
   bool are_windows = false;               ///< recordings, each a labelled window of its own
   bool needs_sensor = false;              ///< recording whose files do not tell the sensor's size

@@ -241,6 +241,21 @@ TEST_F(DraftManifest, OfSeveralSizesIsLetterboxedStills) {
   EXPECT_EQ(job.image.fit, ImageFit::kLetterbox);
 }
 
+TEST_F(DraftManifest, OfLargeStillsHasACamerasSizeAndMovesThemAsFarThere) {
+  const JobManifest job = read(draft({images("large", {{3000, 4000}})}));
+  const StillsSpec usual;
+  EXPECT_EQ(job.image.size, kDavis);
+  // 4000 / 346 = 11.6 px of the image to one of the volume, 0.65 of them to one of a usual image
+  const StillsSpec& stills = *job.sources[0].pairs.stills;
+  EXPECT_THAT(stills.translation_px,
+              ElementsAre(8 * usual.translation_px[0], 8 * usual.translation_px[1]));
+  EXPECT_EQ(stills.rotation_deg, usual.rotation_deg);
+  EXPECT_FALSE(read(draft({images("small", {{960, 1280}})})).image.size);
+  const JobManifest mixed =
+      read(draft({images("mixed", {{3200, 2000}, {3200, 2000}, {480, 640}})}));
+  EXPECT_EQ(mixed.sources[0].pairs.stills->translation_px[1], 8 * 8);  // 0.65 * 3200 / 260
+}
+
 TEST_F(DraftManifest, OfStillsInFoldersOfTheirOwnComparesAllSizes) {
   images("all/a", {kOneSize});
   images("all/b", {kOtherSize});
