@@ -54,6 +54,7 @@ class Source:
     layers: bool = False
     rests: float = 0.5
     clips: bool = False  # of CLIP frames each, of which networks see the surface that the events leave
+    all_poses: bool = False  # where the task has upright persons alone
 
 
 # of an object, on top of the image's motion
@@ -164,6 +165,9 @@ CLIPS = {f"{name}, clips": Source(generator, layers=True, rests=1, clips=True)
 OF_TASKS = CLIPS | {  # but persons
     "EventGAN 8, layers, rests 0": Source(SHIPPED[8], layers=True, rests=0),        # as `--camera moves`
     "EventGAN 8, layers, rests 0.25": Source(SHIPPED[8], layers=True, rests=0.25),  # as `--camera both`
+    "difference, layers, rests 0": Source({"kind": "difference"}, layers=True, rests=0),
+    "gradient, layers, rests 0": Source(of_pair=gradient, layers=True, rests=0),
+    "ESIM, clips, all poses": Source({"kind": "esim"}, layers=True, rests=1, clips=True, all_poses=True),
     "EventGAN 8, layers, motion": Source({**SHIPPED[8], "scope": "motion"}, layers=True),
 }
 SOURCES = METHODS | SENSORS | LAYERS | OF_TASKS | {
@@ -193,6 +197,8 @@ def manifest_of(args: argparse.Namespace, name: str, source: Source) -> dict[str
         if not path.exists():
             path, kind = labels / f"{folder}.csv", "csv"
             _write_boxes(args.frames / folder, path, args.task.clips.get(folder, 1))
+        if args.task.upright and not source.all_poses:
+            path = write_upright(path, labels / f"{folder}.upright.json")
         found = {"dataset": "frames", "root": str(args.frames / folder / "images"),
                  "labels": {"format": kind, "path": str(path)},
                  "pairs": {"gaps": [1, 2, 3], "side": "before", "choose": "one"}}
@@ -229,6 +235,29 @@ def _write_boxes(folder: pathlib.Path, path: pathlib.Path, every: int) -> None:
         table_of = csv.writer(file)
         table_of.writerow("image class left top right bottom".split())
         table_of.writerows([image, *box] for image in images for box in boxes[image] or [[""] * 5])
+
+
+def write_upright(labels: pathlib.Path, path: pathlib.Path) -> pathlib.Path:
+    """Of COCO's keypoints: those of persons whose trunk and legs are within 30 degrees of upright and whose hands are
+    below their shoulders, and their images."""
+    found = json.loads(labels.read_text(encoding="utf-8"))
+    names = {each["id"]: each["keypoints"] for each in found["categories"]}
+
+    def stands(annotation: Mapping[str, Any]) -> bool:
+        x, y, visible = np.array(annotation["keypoints"], float).reshape(-1, 3).T
+        places = np.where(visible > 0, (x, y), np.nan).T
+        right, left = ({name.partition("_")[2]: place for name, place in zip(names[annotation["category_id"]], places)
+                        if name.startswith(side)} for side in ("right", "left"))
+        shoulder, hip, knee, ankle = ((right[name] + left[name]) / 2 for name in ("shoulder", "hip", "knee", "ankle"))
+        return (all(side["wrist"][1] > side["shoulder"][1] for side in (right, left))
+                and all((low - high)[1] > math.cos(math.radians(30)) * np.linalg.norm(low - high)
+                        for high, low in ((shoulder, hip), (hip, knee), (hip, ankle))))
+
+    found["annotations"] = [each for each in found["annotations"] if stands(each)]
+    kept_images = {each["image_id"] for each in found["annotations"]}
+    found["images"] = [each for each in found["images"] if each["id"] in kept_images]
+    path.write_text(json.dumps(found), encoding="utf-8")
+    return path
 
 
 def _outlines(args: argparse.Namespace, folder: str) -> pathlib.Path:
@@ -327,7 +356,8 @@ def items_of(args: argparse.Namespace, name: str, signed: bool = True) -> list[I
     source = SOURCES[name]
 
     def make() -> list[Item]:
-        shards = shards_of(args, name if source.generator else f"EventGAN 16{', layers' if source.layers else ''}")
+        _, comma, motion = name.partition(",")
+        shards = shards_of(args, name if source.generator else f"EventGAN 16{comma}{motion}")
         if source.clips:
             # simulators' volumes are counts of events
             return surfaces_of(shards, "poisson" if "weights" in source.generator else "rounded")

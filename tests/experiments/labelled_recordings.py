@@ -66,12 +66,14 @@ class Task:
     least_px: float = 0  # boxes with a smaller side, in a volume's pixels, are neither right nor wrong in training
     joints: bool = False  # in place of boxes
     polarity: bool = True  # False: networks see events without it, as some of the recordings have them
-    # recordings are surfaces, which events raise and later ones around them lower (DHP19's); so is what networks learn
+    # recordings are surfaces, which events raise and later ones around them lower (DHP19's); networks learn from
+    # those of clips, or from frames
     surfaces: bool = False
-    bright: float | None = None  # networks see which pixels are above it, and nothing else
+    upright: bool = False  # of photographs with joints those of persons who stand, their hands below their shoulders
     # the first windows of a recording that rows may learn from, which are then tested on the others
     learnt: Mapping[str, int] = dataclasses.field(default_factory=dict)
-    windows: tuple[int, ...] = ()  # so many of these, on which a network of the first method is tuned
+    # so many of these: networks of the first method are tuned on each number, the others' on the last
+    windows: tuple[int, ...] = ()
     methods: tuple[str, ...] = ()  # of SOURCES, all with so many steps; (): those of persons
     steps: int = 0
 

@@ -40,7 +40,7 @@ from eventgan import Shards, drawing
 from eventgan.evaluate import Samples, evaluate_detections
 from eventgan.torch import EventAugmentation
 from kept_settings import require_same
-from labelled_events import CLIPS, LAYERS, METHODS, OF_TASKS, SENSORS, SOURCES, items_of
+from labelled_events import LAYERS, METHODS, OF_TASKS, SENSORS, SOURCES, items_of
 from labelled_recordings import (PERSON, SIZE, Item, Task, file_name, key_of, recordings_in, replace, test_items,
                                  windows_folder, windows_of)
 from torch import nn
@@ -76,16 +76,17 @@ TASKS = {
         columns={"pck": "PCK@0.2 of the torso", "pckh": "PCKh@0.5", "mpjpe": "MPJPE px"},
         methods=IN_LAYERS, steps=3000),
 }
-# the joints of the EventGAN paper's own benchmark, whose pictures are surfaces; and their pixels that are bright
+# the joints of the EventGAN paper's own benchmark, whose pictures are surfaces of somebody who stands
 TASKS["dhp19"] = dataclasses.replace(
-    TASKS["joints"], development={"dhp19": 48}, learnt={"dhp19": 48}, surfaces=True, steps=1500,
-    methods=(*CLIPS, "gradient, layers", "grey frames"))
-TASKS["dhp19_bright"] = dataclasses.replace(TASKS["dhp19"], bright=0.3)
+    TASKS["joints"], development={"dhp19": 48}, learnt={"dhp19": 48}, surfaces=True, upright=True, steps=600,
+    methods=("ESIM, clips", "ESIM, clips, all poses", "EventGAN 16, clips", "EventGAN 8, clips", "difference, clips",
+             "gradient, layers", "grey frames"),
+    windows=(5, 10, 20, 48))  # of the first of six clips
 # what photographs' motion teaches about cars before a camera that moves
 TASKS["cars_motion"] = dataclasses.replace(
     TASKS["cars"], steps=900,
     methods=(*(f"EventGAN 8{motion}" for motion in ("", ", layers", ", layers, rests 0.25", ", layers, rests 0")),
-             "ESIM, layers", "ESIM, layers, rests 0"))
+             "ESIM, layers", *(f"{name}, layers, rests 0" for name in ("ESIM", "difference", "gradient"))))
 # what is lost where the network generates only what moves
 TASKS |= {f"{name}_scope": dataclasses.replace(TASKS[name], steps=900,
                                                methods=("EventGAN 8, layers", "EventGAN 8, layers, motion"))
@@ -154,15 +155,17 @@ def in_layers() -> list[Row]:
 
 
 def task_rows(task: Task) -> list[Row]:
-    """Of a task other than persons: its methods; where it has windows to learn from, a network that has learnt from
-    these alone, and those that have been tuned on them: on some windows all layers, of joints' also the last one
-    alone; on all of a recording's the last one."""
+    """Of a task other than persons: its methods; where it has windows to learn from, networks that have learnt from
+    these alone, and those that have been tuned on them: the first method's on some, all layers and of joints' also the
+    last one alone, the others' on most; without numbers of windows on all of a recording's, the last layer."""
     found = [Row(f"{name}, augmented, {task.steps} steps", (name,), steps=task.steps) for name in task.methods]
     if task.windows:
-        base, real = found[0], tuple(f"real {name}" for name in task.learnt)
+        real, (first, *others) = tuple(f"real {name}" for name in task.learnt), found
+        tuned = [(first, what, count) for what in ("", "last layer ")[:1 + task.joints] for count in (0, *task.windows)]
+        tuned += [(base, "", task.windows[-1]) for base in others]
         found += [Row(f"{base.name}, {what}tuned on {count} windows", base.sources + real * (count > 0), base=base,
                       last_layer=bool(what), steps=training.TUNING_STEPS, windows=count)
-                  for what in ("", "last layer ")[:1 + task.joints] for count in (0, *task.windows)]
+                  for base, what, count in tuned]
         return found + [Row(f"{count} windows alone", real, windows=count) for count in task.windows]
     for real in (f"real {name}" for name in task.learnt):
         found += [Row(f"{real}, augmented, {task.steps} steps", (real,), steps=task.steps),
@@ -282,8 +285,6 @@ def _run_folder(args: argparse.Namespace, row: Row, seed: int) -> pathlib.Path:
 
 def _float(args: argparse.Namespace, item: Item) -> Item:
     volume = item["volume"].float()
-    if args.task.bright is not None:
-        volume = (volume > args.task.bright).float()
     return {**item, "volume": volume if args.task.polarity else volume.abs()}
 
 
