@@ -53,8 +53,8 @@ struct SourceSummary {
 std::vector<std::string> notes_of(const std::vector<SourceSummary>& sources,
                                   const std::set<std::string>& unknown = {});
 
-/// For a person, at the end of a report: how many notes there are, those of what is left out, and
-/// the first few of the others, a line each. Empty if there are none.
+/// For a person, at the end of a report: how many notes there are, those of what is left out (at
+/// most 50), and the first few of the others, a line each. Empty if there are none.
 std::string notes_text(const std::vector<std::string>& notes);
 
 /// The frozen plan: which pair becomes which slot of which shard, and the

@@ -14,6 +14,7 @@
 #include "manifests/documents/job_manifest.h"
 #include "manifests/files/atomic_file.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text_lines.h"
 #include "pipeline/command_line/standard_streams.h"
 #include "pipeline/command_line/usage.h"
 #include "stages/frames/sources/find_source.h"
@@ -41,7 +42,7 @@ JobManifest read_kept(const fs::path& file, const FoundSource& found, const fs::
     throw UsageError(fmt::format(
         "expected the manifest for {} ({}), got that of another job, in {} (--output names another "
         "folder; eventgan convert {} goes on with that job)",
-        found.root.string(), to_string(found.dataset), file.string(), file.string()));
+        found.root.string(), to_string(found.dataset), file.string(), shell_word(file.string())));
   }
   return manifest;
 }
@@ -112,7 +113,8 @@ std::string GivenWishes::text() const {
   for (const auto& [word, camera] : kCameras) {
     if (draft.camera == camera) text += " --camera " + word;
   }
-  if (!draft.classes.empty()) text += fmt::format(" --classes {}", fmt::join(draft.classes, ","));
+  if (!draft.classes.empty())
+    text += " --classes " + shell_word(fmt::format("{}", fmt::join(draft.classes, ",")));
   if (draft.no_labels) text += std::string(" ") + kNoLabelsOption;
   if (sensor) text += " --sensor " + *sensor;
   return text;

@@ -263,8 +263,9 @@ class CocoExporter : public Exporter {
     }
   }
 
-  std::optional<double> full_scale() const override {
-    return as_images_ ? std::optional(full_scale_) : std::nullopt;
+  std::optional<FullScale> full_scale() const override {
+    if (!as_images_) return std::nullopt;
+    return FullScale{full_scale_, /*is_of_sums=*/true};
   }
 
   void account(const OutgoingSample& sample, LeftOut& left_out) const override {

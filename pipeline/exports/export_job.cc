@@ -80,19 +80,22 @@ class Description {
   std::vector<std::string> notes() const {
     std::vector<std::string> notes = exporter_.notes();
     if (cut_ > 0) {
-      notes.push_back(fmt::format(
-          "values above the full scale of {} were cut to it in {}; the largest is {:.3g} "
-          "(--full-scale sets another)",
-          exporter_.full_scale().value(), count_text(cut_, "sample"), largest_));
+      const FullScale full_scale = exporter_.full_scale().value();
+      notes.push_back(
+          fmt::format("{} above the full scale of {} were cut to it in {}; the largest is {:.3g} "
+                      "(--full-scale sets another)",
+                      full_scale.is_of_sums ? "sums of values" : "values", full_scale.value,
+                      count_text(cut_, "sample"), largest_));
     }
     return notes;
   }
 
  private:
   void account_full_scale(const OutgoingSample& sample) {
-    const std::optional<double> full_scale = exporter_.full_scale();
-    const float largest = largest_value(sample);
-    if (!full_scale || largest <= *full_scale) return;
+    const std::optional<FullScale> full_scale = exporter_.full_scale();
+    if (!full_scale) return;
+    const double largest = largest_value(sample, full_scale->is_of_sums);
+    if (largest <= full_scale->value) return;
     ++cut_;
     largest_ = std::max(largest_, largest);
   }
@@ -102,7 +105,7 @@ class Description {
   std::string identity_;
   LeftOut left_out_;
   std::int64_t cut_ = 0;  ///< samples with values above the full scale
-  float largest_ = 0;     ///< of them
+  double largest_ = 0;    ///< of them
 };
 
 bool has_use_for(LabelNeed need, const ExportSource& source) {

@@ -31,7 +31,7 @@ class MpiiExporter : public Exporter {
     }
   }
 
-  std::optional<double> full_scale() const override { return full_scale_; }
+  std::optional<FullScale> full_scale() const override { return FullScale{full_scale_}; }
 
   std::vector<std::string> notes() const override {
     return {"MMPose's MpiiDataset reads numbers as the images' names alone: for MMPose --to coco"};

@@ -98,7 +98,9 @@ class YoloExporter : public Exporter {
     for (const auto& [folder, of_it] : of_folder) write_lists(work, folder, of_it);
   }
 
-  std::optional<double> full_scale() const override { return full_scale_; }
+  std::optional<FullScale> full_scale() const override {
+    return FullScale{full_scale_, /*is_of_sums=*/as_images_};
+  }
 
   /// Ultralytics' trainer stops where one is missing.
   std::vector<std::string> notes() const override {

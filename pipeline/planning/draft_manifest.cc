@@ -410,10 +410,11 @@ class Draft {
     std::vector<std::string> keys;
     std::string_view comment = first.habits.size_comment;
     if (has_many_shapes(sources) || has_large_stills(sources)) {
-      comment = has_many_shapes(sources) ? "Images come in many shapes; a DAVIS346 camera's size, "
-                                           "with borders, keeps each one's."
-                                         : "Images are larger than any event camera's; a DAVIS346 "
-                                           "camera's size, with borders, keeps their shape.";
+      comment = has_many_shapes(sources)
+                    ? "Images come in many shapes; a DAVIS346 camera's size, "
+                      "with borders, keeps each one's."
+                    : "Some images are larger than any event camera's; a DAVIS346 "
+                      "camera's size, with borders, keeps their shape.";
       keys.emplace_back(kDavisSize);
     } else if (!first.habits.size.empty()) {
       keys.emplace_back(first.habits.size);

@@ -243,7 +243,7 @@ def train_and_test(args: argparse.Namespace, row: Row, seed: int) -> dict[str, A
 def parts_of(args: argparse.Namespace, row: Row) -> dict[str, list[Item]]:
     """What the row is tested on: of each recording it has not learnt from, the windows behind the first ones; these
     ("development"); its grey frames; and, where rows may learn from its first windows, those behind these
-    ("others"). Of several recordings also all together."""
+    ("others"). Of tasks without numbers of windows also all recordings together."""
     found: dict[str, list[Item]] = {ALL: []}
     recordings, own = recordings_in(args, args.test), recordings_in(args, args.real)
     for recording in recordings:

@@ -56,6 +56,12 @@ inline constexpr char kDontCare[] = "DontCare";
 /// Counts what an export leaves out, by what it is and why.
 using LeftOut = std::map<std::string, std::int64_t>;
 
+/// What becomes 255: a value, or a pixel's sum of them over the bins.
+struct FullScale {
+  double value = 1;
+  bool is_of_sums = false;
+};
+
 /// One format.
 class Exporter {
  public:
@@ -85,7 +91,7 @@ class Exporter {
   virtual LeftOut whole_samples_left_out() const { return {}; }
 
   /// What larger values are cut to, in images of sums the sums; none where all stay.
-  virtual std::optional<double> full_scale() const { return std::nullopt; }
+  virtual std::optional<FullScale> full_scale() const { return std::nullopt; }
 
   /// What a user should know of what `finish` has made, a line each.
   virtual std::vector<std::string> notes() const { return {}; }
@@ -122,8 +128,8 @@ void write_image_pair(const OutgoingSample& sample, const std::string& folder, d
 void write_polarity_image(const OutgoingSample& sample, const std::string& folder,
                           double full_scale, ExportFolder::Step& step);
 
-/// The largest value of a sample's volume.
-float largest_value(const OutgoingSample& sample);
+/// The largest value of a sample's volume, or the largest sum of a pixel's over the bins.
+double largest_value(const OutgoingSample& sample, bool of_sums);
 
 /// Throws UsageError if no person can be listed (why_not_listed), saying why; for Exporter::check.
 void require_listed_person(const ExportInput& input, std::string_view format,

@@ -3,7 +3,6 @@
 #include <deque>
 #include <functional>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <string>
@@ -86,7 +85,8 @@ class UnreadFinder {
 
   UnreadLabels found;
 
-  /// `is_inside`: in what was given, where a label file that cannot be read is told, too.
+  /// `is_inside`: in what was given, or in a tree of labels beside it, where a label file that
+  /// cannot be read is told, too.
   void look_below(const fs::path& top, int depth, bool is_inside = false) {
     is_inside_ = is_inside;
     std::deque<std::pair<fs::path, int>> folders = {{top, depth}};
@@ -168,8 +168,24 @@ class UnreadFinder {
   void tell_empty(const LabelFile& file, const std::string& extension) {
     std::string reason = "it is empty";
     const bool is_readable = InputFile::open(file.path, reason).has_value();
-    if (is_readable && extension == ".txt") return;
-    tell(file, file.path.string(), " is not read: " + reason);
+    const bool is_of_labels = extension == ".csv" || extension == ".json" || extension == ".xml";
+    if (is_passed_through(file, extension) || (is_readable && !is_of_labels)) return;
+    tell(file, "empty" + extension + file.path.parent_path().string(), " is not read: " + reason);
+  }
+
+  /// An image's own JSON.
+  bool is_passed_through(const LabelFile& file, const std::string& extension) const {
+    return extension == ".json" && images_.is_stem(file.path.stem().string()) &&
+           image_folders_.contains(file.path.parent_path());
+  }
+
+  /// Whether a JSON file ends before its document does.
+  static bool is_cut_short(const fs::path& path) {
+    const InputFile file(path);
+    const std::uint64_t count = std::min<std::uint64_t>(file.size_bytes(), 4096);
+    const std::string end = file.read(file.size_bytes() - count, count);
+    const std::string_view last = trimmed(end);
+    return last.empty() || (last.back() != '}' && last.back() != ']');
   }
 
   /// Whether it has the labels that were found, or has been told of.
@@ -190,11 +206,9 @@ class UnreadFinder {
                   " looks like " + title + " labels of these images and is not read: " +
                       std::string(format->reason) + "; " + std::string(format->advice));
     }
-    const bool is_passed_through = extension == ".json" &&
-                                   images_.is_stem(file.path.stem().string()) &&
-                                   image_folders_.contains(file.path.parent_path());
     const std::string_view header = std::string_view(file.text).substr(0, file.text.find('\n'));
-    if (is_passed_through || is_of_cameras(file.text) || is_of_files(header)) return;
+    if (is_passed_through(file, extension) || is_of_cameras(file.text) || is_of_files(header))
+      return;
     const Said said = said_by(file, extension);
     const bool is_named = file.is_of_image || file.is_of_sequence;
     if (!said.names_images && !(is_named && said.has_numbers)) return;
@@ -202,13 +216,11 @@ class UnreadFinder {
       if (said.has_words || said.has_numbers) found.others.push_back(file.path.string());
       return;
     }
-    const bool is_damaged =
-        extension == ".json" && !nlohmann::json::accept(InputFile(file.path).read_all(),
-                                                        /*ignore_comments=*/true);
+    const bool is_damaged = extension == ".json" && is_cut_short(file.path);
     tell(file, extension + file.path.parent_path().string(),
          (said.names_images ? " names these images" : " has the name of one of these") +
              std::string(is_damaged
-                             ? " and is not read: no JSON; it may have been cut short"
+                             ? " and is not read: it ends before its JSON does"
                              : " and is not read: no reader of its format; convert it to COCO, "
                                "YOLO or Pascal VOC, or to a table image,class,left,top,right,"
                                "bottom"));
@@ -297,8 +309,8 @@ UnreadLabels unread_labels(const std::vector<FoundFrames>& places, const fs::pat
         continue;
       }
       const fs::path labels = rest.empty() ? above / name : above / name / rest;
-      if (has_folder(labels)) finder.look_below(labels, kDepth);
-      if (is_beside) finder.look_below(above / name, kDepth);
+      if (has_folder(labels)) finder.look_below(labels, kDepth, /*is_inside=*/true);
+      if (is_beside) finder.look_below(above / name, kDepth, /*is_inside=*/true);
     }
     rest = rest.empty() ? folder.filename() : folder.filename() / rest;
     folder = above;

@@ -250,11 +250,18 @@ TEST_F(FindLabels, FilesOfLabelsThatCannotBeReadAreNamed) {
   EXPECT_THAT(find("texts/set").unread, IsEmpty());
 
   write("cut/im1.jpg");
-  write("cut/all.json", R"({"images": [{"id": 1, "file_name": "im1.jpg", "size": [1, 2, 3, 4]})");
+  write("cut/all.json", R"({"images": [{"id": 1, "file_name": "im1.jpg", "size": [1, 2, 3, 4], "da)");
   EXPECT_THAT(find("cut").unread,
               ElementsAre(at("cut/all.json").string() +
-                          " names these images and is not read: no JSON; it may have been cut "
-                          "short"));
+                          " names these images and is not read: it ends before its JSON does"));
+  write("own/im1.jpg");
+  write("own/im1.json", "");  // an image's own, which is passed through
+  write("own/values.npy", "");
+  EXPECT_THAT(find("own").unread, IsEmpty());
+  write("beside/images/im1.jpg");
+  write("beside/annotations/all.json", "");
+  EXPECT_THAT(find("beside/images").unread, ElementsAre(at("beside/annotations/all.json").string() +
+                                                        " is not read: it is empty"));
 }
 
 TEST_F(FindLabels, WhatNamesTheImagesAndIsNoLabelStopsNothing) {
