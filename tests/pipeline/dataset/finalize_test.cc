@@ -149,7 +149,8 @@ TEST(Finalize, TheNotesOnTheInputsAreKept) {
   const std::string lost = "2 boxes of labels left out: why 2; why 3";
   const FinalizationReport report = finalize(folder.path(), {});
   EXPECT_EQ(report.notes, (std::vector<std::string>{"clip.mp4: 60 of 100 frames", lost}));
-  EXPECT_THAT(to_text(report), HasSubstr("2 notes on the inputs:\n  note: clip.mp4: 60 of 100"));
+  EXPECT_THAT(to_text(report),
+              HasSubstr("2 notes on the inputs:\n  note: " + lost + "\n  note: clip.mp4"));
   const auto json = nlohmann::json::parse(description(folder));
   EXPECT_EQ(json["sources"][0]["notes"], nlohmann::json::array());
   EXPECT_EQ(json["sources"][1]["notes"], nlohmann::json{"clip.mp4: 60 of 100 frames"});
