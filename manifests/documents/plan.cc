@@ -35,9 +35,10 @@ std::vector<std::string> notes_of(const std::vector<SourceSummary>& sources,
 std::string notes_text(const std::vector<std::string>& all) {
   if (all.empty()) return "";
   std::vector<std::string> notes = all;
-  const auto of_losses = std::ranges::stable_partition(
-      notes, [](const std::string& note) { return note.find("left out") != note.npos; });
-  const auto losses = static_cast<std::size_t>(of_losses.begin() - notes.begin());
+  const auto after_losses = std::stable_partition(
+      notes.begin(), notes.end(),
+      [](const std::string& note) { return note.find("left out") != note.npos; });
+  const auto losses = static_cast<std::size_t>(after_losses - notes.begin());
   const std::size_t listed = std::clamp<std::size_t>(losses, 5, 50);
   std::string text =
       std::to_string(notes.size()) + (notes.size() == 1 ? " note" : " notes") + " on the inputs:\n";

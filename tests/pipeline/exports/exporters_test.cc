@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/values/faults.h"
 #include "pipeline/dataset/finalize.h"
 #include "pipeline/exports/export_job.h"
 #include "stages/base/archives/hdf5_arrays.h"
