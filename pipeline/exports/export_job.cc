@@ -81,11 +81,11 @@ class Description {
     std::vector<std::string> notes = exporter_.notes();
     if (cut_ > 0) {
       const FullScale full_scale = exporter_.full_scale().value();
-      notes.push_back(
-          fmt::format("{} above the full scale of {} were cut to it in {}; the largest is {:.3g} "
-                      "(--full-scale sets another)",
-                      full_scale.is_of_sums ? "sums of values" : "values", full_scale.value,
-                      count_text(cut_, "sample"), largest_));
+      notes.push_back(fmt::format(
+          "{} above the full scale of {} were cut to it in {}; the largest value is {:.3g} "
+          "(--full-scale sets another)",
+          full_scale.is_of_sums ? "sums of values" : "values", full_scale.value,
+          count_text(cut_, "sample"), largest_));
     }
     return notes;
   }
@@ -93,19 +93,17 @@ class Description {
  private:
   void account_full_scale(const OutgoingSample& sample) {
     const std::optional<FullScale> full_scale = exporter_.full_scale();
-    if (!full_scale) return;
-    const double largest = largest_value(sample, full_scale->is_of_sums);
-    if (largest <= full_scale->value) return;
+    if (!full_scale || !is_cut(sample, *full_scale)) return;
     ++cut_;
-    largest_ = std::max(largest_, largest);
+    largest_ = std::max(largest_, largest_value(sample));
   }
 
   const ExportWork& work_;
   const Exporter& exporter_;
   std::string identity_;
   LeftOut left_out_;
-  std::int64_t cut_ = 0;  ///< samples with values above the full scale
-  double largest_ = 0;    ///< of them
+  std::int64_t cut_ = 0;  ///< samples that the full scale cuts
+  float largest_ = 0;     ///< value of them
 };
 
 bool has_use_for(LabelNeed need, const ExportSource& source) {

@@ -113,25 +113,18 @@ void write_polarity_image(const OutgoingSample& sample, const std::string& folde
                                 full_scale));
 }
 
-double largest_value(const OutgoingSample& sample, bool of_sums) {
-  const ShardHeader& header = sample.reader.header();
-  if (!of_sums) {
-    // Normalised values end at 1; the statistics are of the values before that.
-    const bool is_normalized = header.normalization == Normalization::kEta98;
-    return is_normalized ? 1.0 : sample.labels.statistics.max;
-  }
-  const std::vector<float> volume = sample.reader.volume(sample.slot);
-  const std::size_t pixels = header.volume.size.pixel_count();
-  const std::size_t of_polarity = volume.size() / 2;
-  double largest = 0;
-  for (std::size_t first = 0; first < 2 * of_polarity; first += of_polarity) {
-    for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
-      double sum = 0;
-      for (std::size_t at = pixel; at < of_polarity; at += pixels) sum += volume[first + at];
-      largest = std::max(largest, sum);
-    }
-  }
-  return largest;
+float largest_value(const OutgoingSample& sample) {
+  // Normalised values end at 1; the statistics are of the values before that.
+  const bool is_normalized = sample.reader.header().normalization == Normalization::kEta98;
+  return is_normalized ? 1.0f : sample.labels.statistics.max;
+}
+
+bool is_cut(const OutgoingSample& sample, const FullScale& full_scale) {
+  const double largest = largest_value(sample);
+  if (largest > full_scale.value || !full_scale.is_of_sums) return largest > full_scale.value;
+  const VolumeShape& shape = sample.reader.header().volume;
+  return shape.bins * largest > full_scale.value &&
+         largest_polarity_sum(sample.reader.volume(sample.slot), shape) > full_scale.value;
 }
 
 void require_listed_person(const ExportInput& input, std::string_view format,
@@ -156,7 +149,7 @@ void require_listed_person(const ExportInput& input, std::string_view format,
   bool have_joints = false;
   for (const auto& [why, count] : reasons) {
     text += fmt::format("{}persons: {}: {}", text.empty() ? "" : "; ", why, count);
-    have_joints |= why == "no centre or no scale";
+    have_joints |= why == kNoCentre;
   }
   throw UsageError(fmt::format("expected samples that --to {} can use, got none, in {} ({})",
                                format, input.folder().string(),

@@ -109,7 +109,7 @@ class Draft {
   std::string text(const std::vector<SourceDraft>& sources) const {
     const bool is_events = has_events(sources.front().found.dataset);
     std::vector<std::string> written;
-    const bool is_reduced = has_many_shapes(sources) || has_large_stills(sources);
+    const bool is_reduced = has_davis_size(sources);
     for (const SourceDraft& source : sources) written.push_back(source_text(source, is_reduced));
     return fmt::format(R"({{
   "format": "eventgan-manifest",
@@ -333,6 +333,11 @@ class Draft {
     });
   }
 
+  /// Volumes have a DAVIS346's size.
+  static bool has_davis_size(const std::vector<SourceDraft>& sources) {
+    return has_many_shapes(sources) || has_large_stills(sources);
+  }
+
   /// By how much more pixels an image moves than one of COCO or Pascal VOC, of some 500, for which
   /// the defaults are, so that its volume of a DAVIS346's size shows as much motion.
   static double motion_factor(ImageSize image) {
@@ -409,7 +414,7 @@ class Draft {
         sources, [&](const SourceDraft& source) { return source.preset != first.preset; });
     std::vector<std::string> keys;
     std::string_view comment = first.habits.size_comment;
-    if (has_many_shapes(sources) || has_large_stills(sources)) {
+    if (has_davis_size(sources)) {
       comment = has_many_shapes(sources)
                     ? "Images come in many shapes; a DAVIS346 camera's size, "
                       "with borders, keeps each one's."

@@ -30,7 +30,7 @@ JointChoice choose_joints(const LabelSchema& schema) {
 }
 
 std::string why_not_listed(const VolumePerson& person, const JointChoice& choice) {
-  if (person.center == kMissingPoint || person.scale <= 0) return "no centre or no scale";
+  if (person.center == kMissingPoint || person.scale <= 0) return kNoCentre;
   const bool has_joint = std::ranges::any_of(
       choice.indices, [&](std::size_t i) { return person.joints.at(i) != kMissingPoint; });
   return has_joint ? "" : "no joint annotated";

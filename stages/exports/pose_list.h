@@ -27,6 +27,8 @@ struct ListedPerson {
   std::optional<Rectangle> head_box;
 };
 
+inline constexpr char kNoCentre[] = "no centre or no scale";
+
 /// Why a list has no use for a person; empty if it has.
 std::string why_not_listed(const VolumePerson& person, const JointChoice& choice);
 

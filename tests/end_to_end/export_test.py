@@ -207,14 +207,15 @@ class Formats(Export):
             self.assertIn(f"left out: boxes of class {name}: {count}\n", out)
 
     def test_yolo_full_scale(self):
-        self.export("yolo", "--split", "val", "--full-scale", "4")
-        beyond = sum(sample["volume"].max() > 4 for sample in of("val").values())
-        told = [note for note in self.described()["notes"] if note.startswith("values above the full scale of 4 ")]
-        self.assertEqual([f"in {beyond} sample" in note for note in told], [True] * (beyond > 0))
+        self.export("yolo", "--split", "val", "--full-scale", "0.5")
+        beyond = sum(sample["volume"].max() > 0.5 for sample in of("val").values())
+        told = [note for note in self.described()["notes"] if note.startswith("values above the full scale of 0.5 ")]
+        self.assertGreater(beyond, 0)
+        self.assertEqual([f"in {beyond} sample" in note for note in told], [True])
         for key, sample in of("val").items():
             codes = np.load(self.out / "images" / "val" / f"{name_of(key)}.npy")
-            values = np.minimum(sample["volume"].astype(float), 4)
-            np.testing.assert_allclose(codes.transpose(2, 0, 1) / 255 * 4, values, atol=4 / 510 + 1e-6)
+            values = np.minimum(sample["volume"].astype(float), 0.5)
+            np.testing.assert_allclose(codes.transpose(2, 0, 1) / 255 * 0.5, values, atol=0.5 / 510 + 1e-6)
 
     def test_coco(self):
         self.out, _ = demo.exported("coco")

@@ -1,9 +1,8 @@
-"""The settings of an experiment's folder, whose results and networks are of these alone."""
+"""The settings of an experiment's folder, whose results and networks are of these alone; and files that are whole."""
 
 from __future__ import annotations
 
 import json
-import os
 import pathlib
 import subprocess
 import sys
@@ -23,6 +22,10 @@ def require_same(folder: pathlib.Path, program: str | pathlib.Path, settings: Ma
             sys.exit(f"error: expected {name} {known[name]}, as when this folder was begun, got {value}, in {path}: "
                      "choose another --out")
     folder.mkdir(parents=True, exist_ok=True)
-    new = path.with_name(f"{path.name}.{os.getpid()}")
-    new.write_text(json.dumps(known | given, indent=1) + "\n", encoding="utf-8")
-    new.replace(path)
+    write(path, json.dumps(known | given, indent=1) + "\n")
+
+
+def write(file: pathlib.Path, content: str) -> None:
+    new = file.with_name(file.name + ".new")
+    new.write_text(content, encoding="utf-8")
+    new.replace(file)

@@ -36,7 +36,7 @@ import numpy as np
 import recordings
 import torch
 import training
-from kept_settings import require_same
+from kept_settings import require_same, write
 from torch import nn
 from torch.nn import functional
 from train_flow import UNet, begin_at_rest, error_at_events, in_colour, moved, normalized
@@ -352,12 +352,6 @@ def halves_of(paths: Iterable[pathlib.Path]) -> tuple[list[pathlib.Path], list[p
         raise SystemExit(f"expected recordings of at least 2 groups, got {len(groups)}, in {' '.join(map(str, paths))}")
     even, odd = ([file for file in files if groups.index(file.stem.split("_")[0]) % 2 == half] for half in (0, 1))
     return even, odd
-
-
-def write(file: pathlib.Path, content: str) -> None:
-    new = file.with_name(file.name + ".new")
-    new.write_text(content, encoding="utf-8")
-    new.replace(file)
 
 
 def table_of(scores: dict[str, dict[str, list[dict[str, float]]]],

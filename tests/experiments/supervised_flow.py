@@ -32,7 +32,7 @@ import self_supervised
 import torch
 import train_flow
 import training
-from kept_settings import require_same
+from kept_settings import require_same, write
 from self_supervised import CONTROLS, REAL, Pair
 
 TRAINER = pathlib.Path(train_flow.__file__)
@@ -152,7 +152,7 @@ def main() -> None:
         """Errors by recording."""
         if name not in results:
             results[name] = {recording: measure(pairs) for recording, pairs in tests.items()}
-            self_supervised.write(file, json.dumps(results, indent=1) + "\n")
+            write(file, json.dumps(results, indent=1) + "\n")
         return results[name]
 
     rows = {name: [kept(name, lambda pairs, name=name: self_supervised.control_scores(name, pairs)["error"])]
@@ -176,7 +176,7 @@ def main() -> None:
         means = shares.mean(1)
         writer.writerow([row, args.steps if row in ROWS else 0, len(shares), f"{means.mean():.3f}",
                          f"{means.std():.3f}" if len(means) > 1 else "", *(f"{share:.2f}" for share in shares.mean(0))])
-    self_supervised.write(args.out / "table.csv", table.getvalue())
+    write(args.out / "table.csv", table.getvalue())
     print(table.getvalue())
 
 

@@ -128,8 +128,12 @@ void write_image_pair(const OutgoingSample& sample, const std::string& folder, d
 void write_polarity_image(const OutgoingSample& sample, const std::string& folder,
                           double full_scale, ExportFolder::Step& step);
 
-/// The largest value of a sample's volume, or the largest sum of a pixel's over the bins.
-double largest_value(const OutgoingSample& sample, bool of_sums);
+/// The largest value of a sample's volume.
+float largest_value(const OutgoingSample& sample);
+
+/// Whether some of its values, or sums, are cut. The volume is read where the largest value leaves
+/// that open.
+bool is_cut(const OutgoingSample& sample, const FullScale& full_scale);
 
 /// Throws UsageError if no person can be listed (why_not_listed), saying why; for Exporter::check.
 void require_listed_person(const ExportInput& input, std::string_view format,

@@ -535,25 +535,45 @@ std::string time_image_png(std::span<const float> volume, const VolumeShape& sha
   }
 }
 
-std::string polarity_image_png(std::span<const float> volume, const VolumeShape& shape,
-                               double full_scale) {
+namespace {
+
+/// Calls `take` with the sums of each pixel's positive and negative bins.
+template <class Take>
+void for_each_sum(std::span<const float> volume, const VolumeShape& shape, Take take) {
   const std::size_t pixels = shape.size.pixel_count();
   const std::size_t bins = static_cast<std::size_t>(shape.channels()) / 2;
-  const auto code = [](double share) {
-    return static_cast<std::uint8_t>(std::lround(255 * std::clamp(share, 0.0, 1.0)));
-  };
-  std::vector<std::uint8_t> bgr;
-  bgr.reserve(3 * pixels);
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
     double positive = 0, negative = 0;
     for (std::size_t bin = 0; bin < bins; ++bin) {
       positive += volume[bin * pixels + pixel];
       negative += volume[(bins + bin) * pixels + pixel];
     }
+    take(positive, negative);
+  }
+}
+
+}  // namespace
+
+double largest_polarity_sum(std::span<const float> volume, const VolumeShape& shape) {
+  double largest = 0;
+  for_each_sum(volume, shape, [&](double positive, double negative) {
+    largest = std::max({largest, positive, negative});
+  });
+  return largest;
+}
+
+std::string polarity_image_png(std::span<const float> volume, const VolumeShape& shape,
+                               double full_scale) {
+  const auto code = [](double share) {
+    return static_cast<std::uint8_t>(std::lround(255 * std::clamp(share, 0.0, 1.0)));
+  };
+  std::vector<std::uint8_t> bgr;
+  bgr.reserve(3 * shape.size.pixel_count());
+  for_each_sum(volume, shape, [&](double positive, double negative) {
     bgr.push_back(code(negative / full_scale));
     bgr.push_back(code(0.5 + (positive - negative) / full_scale / 2));
     bgr.push_back(code(positive / full_scale));
-  }
+  });
   return encode_png({shape.size, bgr.data()});
 }
 

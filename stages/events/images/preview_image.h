@@ -85,6 +85,9 @@ ColourFrame draw_sheet(std::span<const ColourFrame> tiles, int columns);
 std::string polarity_image_png(std::span<const float> volume, const VolumeShape& shape,
                                double full_scale);
 
+/// The largest P or N of a volume's pixels, with a full scale of 1. Thread safe.
+double largest_polarity_sum(std::span<const float> volume, const VolumeShape& shape);
+
 /// The average-timestamp image of a volume [2 bins, y, x] alone, coloured as above and of the
 /// volume's size, as the bytes of a PNG. Throws std::runtime_error if it cannot be encoded. Thread
 /// safe.

@@ -164,7 +164,8 @@ class UnreadFinder {
     found.are_more |= !are_all && found.others.size() > told_before;
   }
 
-  /// A text may be empty, as YOLO's of an image without objects.
+  /// Of empty files only those that labels would be in: a text is empty of an image without
+  /// objects.
   void tell_empty(const LabelFile& file, const std::string& extension) {
     std::string reason = "it is empty";
     const bool is_readable = InputFile::open(file.path, reason).has_value();

@@ -242,8 +242,9 @@ TEST_F(Exporters, SayInHowManySamplesValuesAreCutToTheFullScale) {
     std::ostringstream note;
     note.precision(3);
     note << (as_images ? "sums of values" : "values")
-         << " above the full scale of 1 were cut to it in " << above << " samples; the largest is "
-         << std::ranges::max(of_samples) << " (--full-scale sets another)";
+         << " above the full scale of 1 were cut to it in " << above
+         << " samples; the largest value is " << std::ranges::max(largest[false])
+         << " (--full-scale sets another)";
     ExportOptions options;
     options.as_images = as_images;
     options.overwrite = true;
