@@ -214,9 +214,8 @@ OutlineMasksReport make_outline_masks(const JobManifest& manifest,
   }
   const FrameDecoder decoder(manifest.directory);
   // Masks that are kept take no time: counted, they would make the others look fast.
-  const std::int64_t to_make = std::ranges::count_if(works, [](const MaskWork& work) {
-    return !work.fault.empty() || !fs::exists(work.mask);
-  });
+  const std::int64_t to_make = std::ranges::count_if(
+      works, [](const MaskWork& work) { return !work.fault.empty() || !fs::exists(work.mask); });
   const auto progress =
       options.make_progress && to_make > 0 ? options.make_progress(to_make) : nullptr;
   for_each_index(works.size(), thread_count(options.threads), [&](std::size_t i) {

@@ -250,7 +250,8 @@ TEST_F(FindLabels, FilesOfLabelsThatCannotBeReadAreNamed) {
   EXPECT_THAT(find("texts/set").unread, IsEmpty());
 
   write("cut/im1.jpg");
-  write("cut/all.json", R"({"images": [{"id": 1, "file_name": "im1.jpg", "size": [1, 2, 3, 4], "da)");
+  write("cut/all.json",
+        R"({"images": [{"id": 1, "file_name": "im1.jpg", "size": [1, 2, 3, 4], "da)");
   EXPECT_THAT(find("cut").unread,
               ElementsAre(at("cut/all.json").string() +
                           " names these images and is not read: it ends before its JSON does"));
