@@ -87,8 +87,9 @@ def read_args() -> argparse.Namespace:
                           help="8 sequences, one seed, a step: tests that it runs; the scores mean nothing")
     real = kinds.add_parser("real", parents=[shared])
     real.add_argument("--task", default="persons",
-                      choices=["persons", "cars", "joints", "cars_motion", "persons_scope", "cars_scope",
-                               "joints_scope", "dhp19", "tuning", "joints_tuning"],
+                      choices=["persons", "cars", "joints", "cars_motion", "cars_motion_longer",
+                               "persons_scope", "cars_scope", "joints_scope", "dhp19", "tuning",
+                               "joints_tuning"],
                       help="what is learnt (default: %(default)s); results of the others are in OUT/TASK")
     real.add_argument("--frames", required=True, type=pathlib.Path,
                       help="folder of photographs and clips with boxes.csv and frames.csv")

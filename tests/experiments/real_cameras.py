@@ -86,7 +86,10 @@ TASKS["dhp19"] = dataclasses.replace(
 TASKS["cars_motion"] = dataclasses.replace(
     TASKS["cars"], steps=900,
     methods=(*(f"EventGAN 8{motion}" for motion in ("", ", layers", ", layers, rests 0.25", ", layers, rests 0")),
-             "ESIM, layers", *(f"{name}, layers, rests 0" for name in ("ESIM", "difference", "gradient"))))
+             "ESIM, layers", *(f"{name}, layers, rests 0" for name in ("ESIM", "difference", "gradient")),
+             "difference", "gradient"))
+TASKS["cars_motion_longer"] = dataclasses.replace(
+    TASKS["cars_motion"], steps=3000, methods=("EventGAN 8, layers, rests 0", "ESIM, layers, rests 0"))
 # what is lost where the network generates only what moves
 TASKS |= {f"{name}_scope": dataclasses.replace(TASKS[name], steps=900,
                                                methods=("EventGAN 8, layers", "EventGAN 8, layers, motion"))
