@@ -159,12 +159,12 @@ def in_layers() -> list[Row]:
 
 def task_rows(task: Task) -> list[Row]:
     """Of a task other than persons: its methods; where it has windows to learn from, networks that have learnt from
-    these alone, and those that have been tuned on them: the first method's on some, all layers and of joints' also the
-    last one alone, the others' on most; without numbers of windows on all of a recording's, the last layer."""
+    these alone, and those that have been tuned on them: the first method's on some, all layers or the last one alone,
+    the others' on most; without numbers of windows on all of a recording's, the last layer."""
     found = [Row(f"{name}, augmented, {task.steps} steps", (name,), steps=task.steps) for name in task.methods]
     if task.windows:
         real, (first, *others) = tuple(f"real {name}" for name in task.learnt), found
-        tuned = [(first, what, count) for what in ("", "last layer ")[:1 + task.joints] for count in (0, *task.windows)]
+        tuned = [(first, what, count) for what in ("", "last layer ") for count in (0, *task.windows)]
         tuned += [(base, "", task.windows[-1]) for base in others]
         found += [Row(f"{base.name}, {what}tuned on {count} windows", base.sources + real * (count > 0), base=base,
                       last_layer=bool(what), steps=training.TUNING_STEPS, windows=count)

@@ -349,8 +349,7 @@ def test_windows_of_the_first_clips_are_learnt_and_the_others_tested(tmp_path, m
     seen = []
 
     def train(run, learnt, *_):
-        assert not run.last_layer
-        seen.append((run.steps, run.lr / real_cameras.RATE, run.pretrained is not None,
+        seen.append((run.last_layer, run.steps, run.lr / real_cameras.RATE, run.pretrained is not None,
                      [sum(item["id"].startswith(kind) for item in learnt) for kind in ("photograph", "window")],
                      len({item["id"] for item in learnt} & {f"window {i}" for i in range(3)})))
         model = real_boxes.make(1, torch.nn.BatchNorm2d)
@@ -358,20 +357,20 @@ def test_windows_of_the_first_clips_are_learnt_and_the_others_tested(tmp_path, m
             torch.save(model.state_dict(), pathlib.Path(run.out, name))
 
     args.task = dataclasses.replace(args.task, network=dataclasses.replace(args.task.network, train=train))
-    of_joints = real_cameras.task_rows(dataclasses.replace(args.task, joints=True))
-    assert [(row.windows, row.last_layer) for row in of_joints if row.base] == [
-        (count, last) for last in (False, True) for count in (0, 2, 3)]
     compared = real_cameras.task_rows(dataclasses.replace(args.task, methods=("ESIM, layers", "gradient, layers")))
     assert [(row.windows, row.base.sources[0]) for row in compared if row.base] == [
-        *((count, "ESIM, layers") for count in (0, 2, 3)), (3, "gradient, layers")]
+        *2 * [(count, "ESIM, layers") for count in (0, 2, 3)], (3, "gradient, layers")]
     base, *tuned, two_alone, three_alone = real_cameras.task_rows(args.task)
-    assert [row.windows for row in tuned] == [0, 2, 3] and all(row.base == base for row in tuned)
+    assert [(row.windows, row.last_layer) for row in tuned] == [
+        (count, last) for last in (False, True) for count in (0, 2, 3)]
+    assert all(row.base == base for row in tuned)
     for row in (base, *tuned, two_alone, three_alone):
         real_cameras.train(args, row, 0)
     steps, rate = real_cameras.training.TUNING_STEPS, real_cameras.training.TUNING_RATE
-    assert seen == [(600, 1, False, [20, 0], 0), (steps, rate, True, [20, 0], 0), (steps, rate, True, [20, 20], 2),
-                    (steps, rate, True, [20, 21], 3), (real_cameras.STEPS, 1, False, [0, 16], 2),
-                    (real_cameras.STEPS, 1, False, [0, 18], 3)]
+    on_windows = ([20, 0], 0), ([20, 20], 2), ([20, 21], 3)
+    assert seen == [(False, 600, 1, False, [20, 0], 0), *((False, steps, rate, True, *drawn) for drawn in on_windows),
+                    *((True, steps, 1, True, *drawn) for drawn in on_windows),
+                    (False, real_cameras.STEPS, 1, False, [0, 16], 2), (False, real_cameras.STEPS, 1, False, [0, 18], 3)]
     assert {name: [item["id"] for item in part] for name, part in real_cameras.parts_of(args, tuned[1]).items()} == {
         "clips, others": ["window 3", "window 4"]}
 

@@ -192,9 +192,15 @@ def train(args: argparse.Namespace, items: Iterable[dict[str, Any]], classes: Se
     model = Detector(len(data.items[0]["volume"]), len(classes), norm)
     training.load_fitting(model, args.pretrained)
     model = model.to(args.device).to(memory_format=torch.channels_last)
-    optimizer = torch.optim.AdamW(model.parameters(), args.lr, weight_decay=0.01)
+    if args.last_layer:
+        for layer in (model.requires_grad_(False).logits, model.edges):
+            layer.requires_grad_(True)
+    optimizer = torch.optim.AdamW([each for each in model.parameters() if each.requires_grad], args.lr,
+                                  weight_decay=0.01)
 
     def loss_of(batch: tuple, _: float) -> torch.Tensor:
+        if args.last_layer:
+            model.eval()  # nor do the other layers' means and variances change
         volumes, *targets = (each.to(args.device) for each in batch)
         with torch.autocast(args.device, torch.bfloat16, enabled=args.bfloat16):
             logits, edges = model(volumes.contiguous(memory_format=torch.channels_last))

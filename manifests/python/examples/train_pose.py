@@ -27,7 +27,6 @@ def read_args() -> argparse.Namespace:
                         help="standard deviation of the crops' angles in degrees; Simple Baselines uses 30")
     parser.add_argument("--sigma", type=float, default=1.5,
                         help="standard deviation of the heatmap peaks, in heatmap pixels")
-    parser.add_argument("--last-layer", action="store_true", help="train only the last layer, with --pretrained")
     training.add_tune(parser)
     return training.begin(parser)
 

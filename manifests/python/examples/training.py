@@ -100,6 +100,8 @@ def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
             sys.exit(f"expected --{name} of at least {least}, got {given[name]}")
     if given.get("steps") == 0 and not given.get("pretrained"):
         sys.exit("expected --pretrained weights, since --steps is 0, got none")
+    if given.get("last_layer") and not given.get("pretrained"):
+        sys.exit("expected --pretrained weights, since only the last layer is trained (--last-layer), got none")
     for name in ABOVE_0:
         if name in given and not 0 < given[name] < math.inf:
             sys.exit(f"expected --{name} above 0 and finite, got {given[name]:g}")
@@ -264,6 +266,7 @@ def items_of(shards: Shards, classes: Sequence[str], size: tuple[int, int], view
 
 
 def add_tune(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--last-layer", action="store_true", help="train only the last layer, with --pretrained")
     parser.add_argument("--tune", help="folder of shards of your camera's labelled recordings, to go on with once the "
                         f"training has ended: {TUNING_STEPS} steps, in which they are drawn as often as the samples of "
                         "--data; into OUT/tuned (from the weights of --pretrained alone: --steps 0)")

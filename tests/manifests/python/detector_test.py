@@ -361,6 +361,14 @@ def test_tuned_on_the_camera_s_own_windows(data, tmp_path, monkeypatch):
     assert all(torch.equal(first[name], then[name]) for name in first)
     said, code = run_script(*line[:-2], "--steps", "0", "--pretrained", out / "tuned" / "weights.pt", "--tune", own)
     assert code == 0 and "from weights/tuned: anew" in said and "step     4" in said, said
+    line[line.index("--out") + 1] = tmp_path / "last layer"
+    said, code = run_script(*line[:-2], "--steps", "0", "--pretrained", out / "weights.pt", "--tune", own,
+                            "--last-layer")
+    assert code == 0, said
+    then = torch.load(tmp_path / "last layer" / "tuned" / "weights.pt")
+    assert {name.split(".")[0] for name in first if not torch.equal(first[name], then[name])} == {"logits", "edges"}
+    said, code = run_script(*line, "--last-layer")
+    assert code == 1 and "expected --pretrained weights, since only the last layer is trained" in said, said
     line[line.index("--out") + 1] = out
     said, code = run_script(*line[:-2], "--steps", "0", "--pretrained", out / "weights.pt", "--tune", own)
     assert code == 1 and "expected no --pretrained, as when this run started, got" in said, said
