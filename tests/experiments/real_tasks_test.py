@@ -370,7 +370,7 @@ def test_windows_of_the_first_clips_are_learnt_and_the_others_tested(tmp_path, m
     on_windows = ([20, 0], 0), ([20, 20], 2), ([20, 21], 3)
     assert seen == [(False, 600, 1, False, [20, 0], 0), *((False, steps, rate, True, *drawn) for drawn in on_windows),
                     *((True, steps, 1, True, *drawn) for drawn in on_windows),
-                    (False, real_cameras.STEPS, 1, False, [0, 16], 2), (False, real_cameras.STEPS, 1, False, [0, 18], 3)]
+                    *((False, real_cameras.STEPS, 1, False, *alone) for alone in (([0, 16], 2), ([0, 18], 3)))]
     assert {name: [item["id"] for item in part] for name, part in real_cameras.parts_of(args, tuned[1]).items()} == {
         "clips, others": ["window 3", "window 4"]}
 
