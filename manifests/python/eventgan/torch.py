@@ -228,7 +228,7 @@ _SIDE = re.compile(r"left|Left|LEFT|right|Right|RIGHT|(?<![^\W_])[lrLR](?![^\W_]
 _PERHAPS_SIDES = re.compile("^[lrLR]"), re.compile("[lrLR]$")  # sides if the mirrored name is there
 _OTHER_SIDE = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
 _OTHER_SIDE |= {right: left for left, right in _OTHER_SIDE.items()}
-_NAMELESS = re.compile("joint_[0-9]+")  # eventgan's names for joints without names
+_NAMELESS = re.compile("(joint_)?[0-9]+")  # eventgan's names for joints without names
 
 
 def flip_pairs(names: Sequence[str]) -> list[tuple[int, int]]:
@@ -248,8 +248,8 @@ def flip_pairs(names: Sequence[str]) -> list[tuple[int, int]]:
     Raises
     ------
     ValueError
-        A name suggests a side and has no counterpart, or says nothing (joint_3), so that a mirror would leave it where
-        it is.
+        A name suggests a side and has no counterpart, or says nothing (joint_3, or 3) beside others, so that a mirror
+        would leave it where it is.
     """
     places, pairs, alone = {name: i for i, name in enumerate(names)}, [], []
     for name, place in places.items():
@@ -261,7 +261,7 @@ def flip_pairs(names: Sequence[str]) -> list[tuple[int, int]]:
                     pairs.append((place, places[other]))
                 break
         else:
-            if suggested or _NAMELESS.fullmatch(name):
+            if suggested or (len(names) > 1 and _NAMELESS.fullmatch(name)):
                 alone.append(name)
     if alone:
         raise ValueError("expected joints whose names come in pairs of left and right, to be mirrored, got "

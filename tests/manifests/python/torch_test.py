@@ -236,6 +236,9 @@ def test_names_that_suggest_no_side():
     assert flip_pairs(middle) == []
     with pytest.raises(ValueError, match="got joint_0, joint_1 without a counterpart"):  # of which nothing is known
         flip_pairs(["joint_0", "joint_1"])
+    with pytest.raises(ValueError, match="got 0, 1, 2 without a counterpart"):  # YOLO's, COCO's without names
+        flip_pairs(["0", "1", "2"])
+    assert flip_pairs(["0"]) == []  # one alone stays itself
     with pytest.raises(ValueError, match="got left_hip, RAnkle, kneeR without a counterpart .flip=0 mirrors nothing."):
         flip_pairs(["left_hip", "RAnkle", "kneeR", "l_knee", "r_knee"])
 
