@@ -309,6 +309,7 @@ void note_other_images(const std::vector<fs::path>& with_frames, const fs::path&
   if (!left_out.empty()) {
     found.remarks.push_back("warning: " + counted(left_out, "folder", " of images left out"));
   }
+  if (found.ids) return;  // a list says which
   const std::vector<std::string> folders = frames_in(found.root, files).folders;
   const auto is_train = [](const std::string& name) { return split_of(name) == "train"; };
   if (std::ranges::none_of(folders, is_train)) return;

@@ -301,6 +301,16 @@ TEST_F(FindSource, ImagesThatAreLeftOutAreWarnings) {
   EXPECT_EQ(find("b").root, at("b"));
   EXPECT_THAT(find("b").remarks,
               ElementsAre(HasSubstr("warning: images of val are in split train, too")));
+  // Lists of one folder have theirs apart.
+  for (const std::string split : {"train", "val"}) {
+    touch({"c/images/" + split + "/" + split + "1.jpg"});
+    write("c/labels/" + split + "/" + split + "1.txt", "0 0.5 0.5 0.5 0.5");
+    write("c/" + split + ".txt", "images/" + split + "/" + split + "1.jpg");
+  }
+  write("c/data.yaml", "names: [cat]\ntrain: train.txt\nval: val.txt");
+  const auto lists = find_sources(at("c"));
+  ASSERT_EQ(lists.size(), 2u);
+  EXPECT_THAT(lists[0].remarks, Not(Contains(HasSubstr("are in split train"))));
 }
 
 TEST_F(FindSource, FoldersOfSequencesMayBeTwoDeep) {
