@@ -105,12 +105,14 @@ FilePerImage::FilePerImage(const LabelSpec& spec, const fs::path& base, Labelled
   note_without_label(root_.written(""));
 }
 
-/// Names of the labels in a folder below `path`.
-std::vector<std::string> FilePerImage::files_in(const std::string& folder) const {
+/// Names of the labels in a folder below `path`. train.txt is one of train.jpg, if `images` have
+/// it.
+std::vector<std::string> FilePerImage::files_in(const std::string& folder,
+                                                const Stems& images) const {
   std::vector<std::string> names = root_.files_in(folder);
   std::erase_if(names, [&](const std::string& name) {
-    return lower_extension(name) != names_.extension || names_.is_other(name) ||
-           name.starts_with('.');
+    const bool is_other = names_.is_other(name) && !images.contains(fs::path(name).stem().string());
+    return lower_extension(name) != names_.extension || is_other || name.starts_with('.');
   });
   return names;
 }
@@ -141,7 +143,7 @@ std::string FilePerImage::in_label_folder(const std::string& images) const {
 }
 
 void FilePerImage::find_of_images() {
-  std::map<std::string, std::map<std::string, std::size_t>> folders;  // of images: stem to frame
+  std::map<std::string, Stems> folders;  // of images
   for (std::size_t i = 0; i < source().frames.size(); ++i) {
     const fs::path name(source().frames[i].name);
     folders[name.parent_path().generic_string()].emplace(name.stem().string(), i);
@@ -152,7 +154,7 @@ void FilePerImage::find_of_images() {
     used.insert(folder);
     // What an absent image is called nobody says: most likely as the others.
     const fs::path extension = fs::path(source().frames[stems.begin()->second].name).extension();
-    for (const std::string& name : files_in(folder)) {
+    for (const std::string& name : files_in(folder, stems)) {
       const std::string key = joined(folder, name);
       const std::string stem = fs::path(name).stem().string();
       annotation_files_.push_back(root_.written(key));

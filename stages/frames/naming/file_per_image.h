@@ -53,7 +53,9 @@ class FilePerImage : public OwnLabels {
   const SourceRoot& root() const { return root_; }
 
  private:
-  std::vector<std::string> files_in(const std::string& folder) const;
+  using Stems = std::map<std::string, std::size_t>;  ///< of images, with their frames
+
+  std::vector<std::string> files_in(const std::string& folder, const Stems& images = {}) const;
   std::string folder_of(const std::string& images) const;
   std::string in_label_folder(const std::string& images) const;
   void find_of_images();

@@ -246,6 +246,16 @@ TEST_F(YoloLabels, WhatIsOnOneSideAloneIsNotLost) {
                           "no label for 1 of 3 frames in d/labels: no samples of their own"));
 }
 
+TEST_F(YoloLabels, AnImageMayBeCalledAsAList) {
+  images({"d/images/train.png", "d/images/2.png"});
+  for (const char* name : {"d/labels/train.txt", "d/labels/2.txt"}) text(name);
+  text("d/labels/val.txt", "images/2.png");
+  text("d/labels/classes.txt", "cat");
+  const auto dataset = open();
+  EXPECT_THAT(ids_of(*dataset), ElementsAre("2", "train"));
+  EXPECT_THAT(annotation_of(*dataset, 1).boxes, SizeIs(1));
+}
+
 TEST_F(YoloLabels, ClassesAreInTheFolderAboveWhateverThePathIs) {
   images({"d/images/1.png"});
   text("d/labels/1.txt");
