@@ -1,8 +1,11 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -76,9 +79,46 @@ class YoloLabels : public FilePerImage {
       classes_ = parse_yolo_names(place.read_or_throw(name), path);
       schema_ = classes_.names;
       annotation_files_.push_back(path);
-      return;
+      if (classes_.are_joints_assumed) {
+        notes_.push_back("17 joints have COCO's names, since kpt_names names none, in " + path);
+      }
+      return warn_of_other_names(path);
     }
     number_classes();
+  }
+
+  /// Tools write their own list beside the labels: where two differ, only one is right.
+  void warn_of_other_names(const std::string& taken) {
+    std::set<std::string> folders = {""};
+    for (const FrameLabel& label : labels()) {
+      std::filesystem::path folder = label.key;
+      do folder = folder.parent_path();
+      while (!folder.empty() && folders.insert(folder.generic_string()).second);
+    }
+    for (const std::string& folder : folders) {
+      for (const std::string& name : yolo_names_files(root().on_disk(folder))) {
+        compare_names(taken, root(), folder.empty() ? name : folder + "/" + name);
+      }
+    }
+    const SourceRoot above = root().above();
+    for (const char* name : {"data.yaml", "data.yml", "classes.txt"}) {
+      if (above.has_file(name)) compare_names(taken, above, name);
+    }
+  }
+
+  void compare_names(const std::string& taken, const SourceRoot& place,
+                     const std::string& name) try {
+    const std::string path = place.written(name);
+    if (path == taken) return;
+    const YoloSchema other = parse_yolo_names(place.read_or_throw(name), path);
+    const std::vector<std::string>& ours = schema_.class_names;
+    const auto [our, their] = std::ranges::mismatch(ours, other.names.class_names);
+    if (our == ours.end() || their == other.names.class_names.end()) return;
+    warnings_.push_back(
+        fmt::format("class {} is \"{}\" in {}, whose names are taken, but \"{}\" in {}",
+                    our - ours.begin(), *our, taken, *their, path));
+  } catch (const InputError&) {
+    // Names that cannot be read, and that nobody needs, say nothing.
   }
 
   /// Without names these are the numbers, up to the highest that a text has.
@@ -146,10 +186,18 @@ std::optional<std::filesystem::path> find_yolo(const FoundFrames& frames,
   const std::filesystem::path labels = find_label_files(frames, kYoloFiles);
   if (labels.empty()) return std::nullopt;
   const bool is_beside = labels == frames.root;  // of texts there, folders above have none
-  std::filesystem::path folder = labels;
+  std::filesystem::path folder = labels, named;
+  bool is_above = false;  // the dataset, where a YAML file of another name may be another's
   for (int level = 0; level < (is_beside ? 2 : 3); ++level, folder = folder.parent_path()) {
-    if (!yolo_names_file(folder).empty()) return is_beside ? labels : folder;
+    const std::string file = yolo_names_file(folder);
+    const bool is_yaml = lower_extension(file).starts_with(".y");
+    const bool is_better =
+        is_yaml && (!is_above || file.starts_with("data."));  // than a text below
+    if (!file.empty() && (named.empty() || is_better)) named = folder;
+    if (is_yaml && named == folder) break;
+    is_above = is_above || *frames.root.lexically_relative(folder).begin() != "..";
   }
+  if (!named.empty()) return is_beside ? labels : named;
   if (has_yolo_texts(labels)) return labels;  // which tell that their classes are numbers
   if (!is_beside) {
     remarks.push_back("no data.yaml or classes.txt, so that YOLO's labels are left out: " +

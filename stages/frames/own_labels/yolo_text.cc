@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <set>
@@ -30,6 +31,7 @@ constexpr std::array<const char*, 17> kCocoJoints{
     "nose",           "left_eye",   "right_eye",   "left_ear",   "right_ear",   "left_shoulder",
     "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_hip",
     "right_hip",      "left_knee",  "right_knee",  "left_ankle", "right_ankle"};
+constexpr std::array<int, 17> kCocoFlip{0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15};
 
 /// Reads the few keys that are needed; throws InputError.
 class YoloYaml {
@@ -39,8 +41,8 @@ class YoloYaml {
     for (const auto& entry : document) {
       if (!entry.first.IsScalar()) continue;
       const std::string key = entry.first.Scalar();
-      const bool is_known =
-          key == "names" || key == "nc" || key == "kpt_shape" || key == "kpt_names";
+      const bool is_known = key == "names" || key == "nc" || key == "kpt_shape" ||
+                            key == "kpt_names" || key == "flip_idx";
       if (is_known && !keys_.emplace(key, entry.second).second) refuse(key + " once", "it twice");
     }
   }
@@ -120,8 +122,10 @@ class YoloYaml {
     schema.has_visibility = numbers == 3;
     std::vector<std::string>& joints = schema.names.joint_names;
     joints = joint_names();
-    if (joints.empty() && count == static_cast<int>(kCocoJoints.size())) {
+    const bool is_as_many = count == static_cast<int>(kCocoJoints.size());
+    if (keys_.count("kpt_names") == 0 && is_as_many && !flips_others()) {
       joints.assign(kCocoJoints.begin(), kCocoJoints.end());
+      schema.are_joints_assumed = true;
     }
     for (int i = 0;
          i < count && static_cast<int>(joints.size()) <= i && keys_.count("kpt_names") == 0; ++i) {
@@ -130,6 +134,16 @@ class YoloYaml {
     if (static_cast<int>(joints.size()) != count) {
       refuse("kpt_names of " + std::to_string(count) + " joints", std::to_string(joints.size()));
     }
+  }
+
+  /// Whether `flip_idx` has other joints on the left and right than COCO's 17, as animals' have.
+  bool flips_others() const {
+    const auto flip = keys_.find("flip_idx");
+    if (flip == keys_.end()) return false;
+    if (!flip->second.IsSequence()) refuse("a list of joints as flip_idx", "another value");
+    std::vector<int> mirrored;
+    for (const auto& joint : flip->second) mirrored.push_back(read_number("flip_idx", joint));
+    return !mirrored.empty() && !std::ranges::equal(mirrored, kCocoFlip);
   }
 
   /// None if the file has none.
@@ -286,20 +300,31 @@ YoloSchema parse_yolo_classes(std::string_view text, const std::string& path) {
   return schema;
 }
 
-std::string yolo_names_file(const std::filesystem::path& folder) {
-  for (const char* name :
-       {"data.yaml", "data.yml", "classes.txt", "obj.names", "_darknet.labels"}) {
-    if (has_file(folder / name)) return name;
-  }
-  std::vector<std::filesystem::path> others;
-  for (const char* extension : {".yaml", ".yml"}) {
-    for (const auto& name : names_with(look_into(folder), extension)) {
-      if (("\n" + beginning_of(folder / name)).find("\nnames:") != std::string::npos) {
-        others.push_back(name);
+std::vector<std::string> yolo_names_files(const std::filesystem::path& folder) {
+  std::vector<std::string> files;
+  const auto add = [&](std::initializer_list<const char*> names) {
+    for (const char* name : names) {
+      if (has_file(folder / name)) files.emplace_back(name);
+    }
+  };
+  add({"data.yaml", "data.yml"});
+  if (files.empty()) {
+    for (const char* extension : {".yaml", ".yml"}) {
+      for (const auto& name : names_with(look_into(folder), extension)) {
+        if (("\n" + beginning_of(folder / name)).find("\nnames:") != std::string::npos) {
+          files.push_back(name.string());
+        }
       }
     }
+    if (files.size() > 1) files.clear();
   }
-  return others.size() == 1 ? others.front().string() : "";
+  add({"classes.txt", "obj.names", "_darknet.labels"});
+  return files;
+}
+
+std::string yolo_names_file(const std::filesystem::path& folder) {
+  std::vector<std::string> files = yolo_names_files(folder);
+  return files.empty() ? "" : std::move(files.front());
 }
 
 YoloSchema parse_yolo_names(const std::string& text, const std::string& path) {

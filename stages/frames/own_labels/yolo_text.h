@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "manifests/values/faults.h"
 #include "manifests/values/frames.h"
@@ -14,21 +15,24 @@ namespace eventgan {
 /// What classes and joints a YOLO dataset has.
 struct YoloSchema {
   LabelSchema names;
-  bool has_visibility = false;  ///< of joints: kpt_shape [J, 3]
-  bool has_shape = false;       ///< kpt_shape is given; [0, 0] says that there are no joints
+  bool has_visibility = false;      ///< of joints: kpt_shape [J, 3]
+  bool has_shape = false;           ///< kpt_shape is given; [0, 0] says that there are no joints
+  bool are_joints_assumed = false;  ///< COCO's names of 17 that nothing names
 };
 
 /// Of data.yaml the keys `names` (a list, or a map from 0, 1, ...), `nc` (how many), `kpt_shape`
-/// ([J, 2] or [J, 3]; [0, 0] of outlines) and `kpt_names` (a list, or a map from classes to lists
-/// that are all one). Throws InputError if the text is no YAML, is longer than 1 MiB, or one of
-/// these is not so.
+/// ([J, 2] or [J, 3]; [0, 0] of outlines), `kpt_names` (a list, or a map from classes to lists that
+/// are all one) and `flip_idx`: 17 joints without names are COCO's unless it mirrors others. Throws
+/// InputError if the text is no YAML, is longer than 1 MiB, or one of these is not so.
 YoloSchema parse_yolo_yaml(const std::string& text, const std::string& path);
 
 /// classes.txt: a name a line. Throws InputError if there is none, one is empty or there twice.
 YoloSchema parse_yolo_classes(std::string_view text, const std::string& path);
 
-/// Which file of a folder names the classes: data.yaml, classes.txt, obj.names of CVAT,
-/// _darknet.labels of Roboflow, or the only other YAML file with names; empty if there is none.
+/// Which files of a folder name the classes, the best first: data.yaml, or the only other YAML file
+/// with names; classes.txt, obj.names of CVAT, _darknet.labels of Roboflow.
+std::vector<std::string> yolo_names_files(const std::filesystem::path& folder);
+/// The first of them; empty if there is none.
 std::string yolo_names_file(const std::filesystem::path& folder);
 
 /// Of such a file, by its extension.

@@ -28,6 +28,7 @@ TEST_F(FindLabels, LabelsOfOnesOwnLieBesideTheImages) {
                  {kCoco, "", "_annotations.coco.json", "1.jpg, _annotations.coco.json=coco"},
                  {kYolo, "images", "", "images/train/1.jpg, labels/train/1.txt, data.yaml"},
                  {kYolo, "images", "labels", "images/1.jpg, labels/1.txt, labels/classes.txt"},
+                 {kYolo, "images", "", "images/1.jpg, labels/1.txt, labels/classes.txt, data.yaml"},
                  {kYolo, "train/images", "", "train/images/1.jpg, train/labels/1.txt, data.yaml"},
                  {kYolo, "", "", "1.jpg, 1.txt, classes.txt"},
                  {kVoc, "JPEGImages", "Annotations",
@@ -302,6 +303,14 @@ TEST_F(FindLabels, WhatNamesTheImagesAndIsNoLabelStopsNothing) {
 TEST_F(FindLabels, TextsBesideTheImagesAreTakenWhereTheReaderLooks) {
   touch({"a/imgs/1.jpg", "a/imgs/1.txt", "a/data.yaml"});
   EXPECT_EQ(find("a/imgs").labels->path, at("a/imgs")) << "a has neither labels nor these texts";
+}
+
+TEST_F(FindLabels, ADatasetsYamlGoesBeforeTextsInIt) {
+  touch({"all/a/images/1.jpg", "all/a/labels/1.txt", "all/a/labels/classes.txt"});
+  write("all/other.yaml", "names: [x]");  // of another dataset, as far as anybody knows
+  EXPECT_EQ(find("all/a").labels->path, at("all/a/labels"));
+  write("all/a/my.yaml", "names: [x]");
+  EXPECT_EQ(find("all/a").labels->path, at("all/a"));
 }
 
 TEST_F(FindLabels, LabelsThatAreLeftOutAreRemarks) {

@@ -140,6 +140,16 @@ TEST(YoloYaml, NamesAreAListOrAMap) {
   EXPECT_EQ(pose.names.joint_names.size(), 17u);
   EXPECT_EQ(pose.names.joint_names[16], "right_ankle");
   EXPECT_TRUE(pose.has_visibility);
+  for (const auto& [flip, last] :
+       {std::pair("[0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]", "right_ankle"),
+        {"[]", "right_ankle"},
+        {"[1, 0, 2, 3, 4, 8, 9, 10, 5, 6, 7, 14, 15, 16, 11, 12, 13]",
+         "16"}}) {  // AP-10K's animals
+    const YoloSchema schema =
+        parse_yolo_yaml("names: [a]\nkpt_shape: [17, 3]\nflip_idx: "s + flip, "y");
+    EXPECT_EQ(schema.names.joint_names.at(16), last);
+    EXPECT_EQ(schema.are_joints_assumed, last != "16"s);
+  }
   EXPECT_THAT(parse_yolo_yaml("names: [x]\nkpt_shape: [2, 3]\nkpt_names: {0: [l, r]}", "y")
                   .names.joint_names,
               ElementsAre("l", "r"));
@@ -167,6 +177,7 @@ TEST(YoloYaml, AnythingElseIsRefused) {
       {"names: [a]\nkpt_shape: [17, 4]", "got [17, 4]"},
       {"names: [a]\nkpt_shape: [100000000, 3]", "got [100000000, 3]"},
       {"names: [a]\nkpt_shape: [2, 3]\nkpt_names: [l]", "expected kpt_names of 2 joints, got 1"},
+      {"names: [a]\nkpt_shape: [17, 3]\nflip_idx: no", "expected a list of joints as flip_idx"},
       {aliased, "expected at most 1,000,000 names in kpt_names, got more, in data.yaml"},
       {"names: [a", "expected YAML"},
       {"names: \"\\x1b[2J", "expected YAML"},
@@ -279,6 +290,27 @@ TEST_F(YoloLabels, ClassesAreInTheFolderAboveWhateverThePathIs) {
     EXPECT_THAT(dataset->annotation_files(), Contains(classes));
     EXPECT_TRUE(fs::exists(at(manifest) / classes));
   }
+}
+
+TEST_F(YoloLabels, NamesThatAreOthersElsewhereAreTold) {
+  images({"d/images/1.png"});
+  text("d/labels/1.txt");
+  text("d/data.yaml", "names: [cat, dog]\nkpt_shape: [0, 0]");
+  text("d/labels/classes.txt", "dog\ncat");
+  const auto warnings = [&](const char* path) { return open("d/images", path)->warnings(); };
+  EXPECT_THAT(warnings("d"),
+              ElementsAre("class 0 is \"cat\" in d/data.yaml, whose names are taken, "
+                          "but \"dog\" in d/labels/classes.txt"));
+  EXPECT_THAT(warnings("d/labels"),
+              ElementsAre("class 0 is \"dog\" in d/labels/classes.txt, whose names are taken, but "
+                          "\"cat\" in d/data.yaml"));
+  for (const char* fewer : {"cat", "cat\ndog\ncow", "cat\n\ndog"}) {
+    text("d/labels/classes.txt", fewer);
+    EXPECT_THAT(warnings("d"), IsEmpty()) << fewer;
+  }
+  text("d/data.yaml", "names: [person]\nkpt_shape: [17, 3]");
+  EXPECT_THAT(open("d/images", "d")->notes(),
+              Contains("17 joints have COCO's names, since kpt_names names none, in d/data.yaml"));
 }
 
 TEST_F(YoloLabels, JointsWithoutKptShapeAreNotTakenForCorners) {
