@@ -167,6 +167,7 @@ void FilePerImage::find_of_images() {
     }
   }
   note_unused(folder_of(""), used);
+  note_others(folders, used);
 }
 
 /// Tells of folders with labels beside those that have images.
@@ -179,6 +180,62 @@ void FilePerImage::note_unused(const std::string& folder, const std::set<std::st
   if (unused.empty()) return;
   notes_.push_back(
       counted(unused, "folder", " of labels without images left out in " + root_.written(folder)));
+}
+
+/// Tells of folders with a second label of the same images: labels_old beside labels, xml beside
+/// Annotations, labels_old/train beside labels/train.
+void FilePerImage::note_others(const std::map<std::string, Stems>& images,
+                               const std::set<std::string>& used) {
+  constexpr std::size_t kMostFolders = 3;  // of images: the others lie as these do
+  const auto has_images = [](const FolderListing& listing) {
+    return std::ranges::any_of(listing.folders, is_image_folder) ||
+           std::ranges::any_of(listing.files, [](const fs::path& file) {
+             const std::string extension = lower_extension(file);
+             return std::ranges::find(kImageExtensions, extension) != kImageExtensions.end();
+           });
+  };
+  const fs::path root = normal(root_.on_disk(""));
+  std::set<fs::path> known, others;
+  for (const std::string& folder : used) known.insert(normal(root / folder / "").parent_path());
+  for (auto entry = images.begin(); entry != images.end(); ++entry) {
+    if (std::distance(images.begin(), entry) == kMostFolders) break;
+    const auto is_label = [&](const fs::path& name) {
+      return lower_extension(name) == names_.extension && !names_.is_other(name.string()) &&
+             entry->second.contains(name.stem().string());
+    };
+    fs::path labels_at = normal(root_.on_disk(folder_of(entry->first)) / "").parent_path();
+    fs::path images_at = normal(source().root.on_disk(entry->first) / "").parent_path();
+    fs::path labels_below, images_below;
+    for (int level = 0; level < 2; ++level) {
+      const fs::path above = labels_at.parent_path(), images_above = images_at.parent_path();
+      for (const std::string& name : look_into(above).folders) {
+        const fs::path folder = level == 0 ? above / name : above / name / labels_below;
+        const fs::path theirs =
+            level == 0 ? images_above / name : images_above / name / images_below;
+        const bool is_of_others = theirs != folder && has_folder(theirs);  // of another split
+        if (is_of_others || name.starts_with("calib") || has_images(look_into(above / name)) ||
+            !known.insert(folder).second) {
+          continue;
+        }
+        const FolderListing listing = look_into(folder);
+        if (has_images(listing)) continue;
+        if (std::ranges::any_of(listing.files, is_label)) others.insert(folder);
+      }
+      labels_below = labels_at.filename();
+      images_below = images_at.filename();
+      labels_at = above;
+      images_at = images_above;
+    }
+  }
+  if (others.empty()) return;
+  std::vector<std::string> written;
+  for (const fs::path& folder : others) {
+    const fs::path way = root_.written(folder.lexically_relative(root).string());
+    written.push_back(way.lexically_normal().generic_string());
+  }
+  notes_.push_back(
+      counted(written, "folder",
+              " with more " + std::string(names_.extension) + " files of these images left out"));
 }
 
 void FilePerImage::find_of_videos() {

@@ -61,6 +61,7 @@ class FilePerImage : public OwnLabels {
   void find_of_images();
   void find_of_videos();
   void note_unused(const std::string& folder, const std::set<std::string>& used);
+  void note_others(const std::map<std::string, Stems>& images, const std::set<std::string>& used);
 
   SourceRoot root_;
   LabelFiles names_;

@@ -257,6 +257,23 @@ TEST_F(YoloLabels, WhatIsOnOneSideAloneIsNotLost) {
                           "no label for 1 of 3 frames in d/labels: no samples of their own"));
 }
 
+TEST_F(YoloLabels, SecondFilesOfTheSameImagesAreTold) {
+  images(
+      {"d/images/train/1.png", "d/images/val/1.png", "e/train/images/1.png", "e/val/images/1.png"});
+  for (const char* name : {"d/labels/train/1.txt", "d/labels/val/1.txt", "d/labels_old/train/1.txt",
+                           "d/calib/train/1.txt", "d/labels/other/1.txt", "e/train/labels/1.txt",
+                           "e/val/labels/1.txt", "e/train/calib/1.txt", "e/train/notes/2.txt"}) {
+    text(name);
+  }
+  EXPECT_THAT(open("d/images/train", "d")->notes(),
+              Contains("2 folders with more .txt files of these images left out: d/labels/other, "
+                       "d/labels_old/train"));
+  EXPECT_THAT(open("e/train/images", "e")->notes(), Not(Contains(HasSubstr("left out"))));
+  text("e/train/old/1.txt");
+  EXPECT_THAT(open("e/train/images", "e/train/labels")->notes(),
+              Contains("1 folder with more .txt files of these images left out: e/train/old"));
+}
+
 TEST_F(YoloLabels, AnImageMayBeCalledAsAList) {
   images({"d/images/train.png", "d/images/2.png"});
   for (const char* name : {"d/labels/train.txt", "d/labels/2.txt"}) text(name);
