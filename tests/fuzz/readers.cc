@@ -234,12 +234,12 @@ void read_coco_input(std::span<const std::uint8_t> input, const std::filesystem:
     };
     try {
       const CocoImage entry = read_coco_image(part(image.entry), image.id, "input");
+      const ImageSize size = entry.size.value_or(ImageSize{480, 640});
       for (std::size_t k = image.first_annotation; k < index.images[i + 1].first_annotation; ++k) {
-        add_coco_annotation(part(index.annotations[k]), image.id, entry.size, index, schema,
-                            "input", annotation);
+        add_coco_annotation(part(index.annotations[k]), image.id, size, index, schema, "input",
+                            annotation);
       }
-      if (!index.categories.empty())
-        add_ignored_regions(entry, entry.size, index, "input", annotation);
+      if (!index.categories.empty()) add_ignored_regions(entry, size, index, "input", annotation);
     } catch (const std::runtime_error&) {
     }
     check_annotation(annotation, schema);

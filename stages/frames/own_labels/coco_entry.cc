@@ -282,8 +282,11 @@ CocoImage read_coco_image(const std::string& text, std::int64_t id, const std::s
   constexpr int kLargest = 1'000'000;
   CocoEntry entry(text, path, "image");
   StrictObject object = entry.object();
-  CocoImage image{
-      {object.at("height").integer(1, kLargest), object.at("width").integer(1, kLargest)}};
+  CocoImage image;
+  if (object.find("height") || object.find("width")) {
+    image.size = ImageSize{object.at("height").integer(1, kLargest),
+                           object.at("width").integer(1, kLargest)};
+  }
   object.at("id").integer(id, id);  // another: the file has changed
   if (const auto lists_x = find_given(object, "ignore_regions_x")) {
     const StrictValue lists_y = object.at("ignore_regions_y");

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,7 @@ namespace eventgan {
 
 /// What an entry of `images` says of the image.
 struct CocoImage {
-  ImageSize size;
+  std::optional<ImageSize> size = {};  ///< scripts leave it out, the image has it
   /// PoseTrack's `ignore_regions_x` and `ignore_regions_y`, the corners of polygons.
   std::vector<std::vector<Point>> ignored = {};
 };

@@ -537,6 +537,8 @@ TEST_F(CocoLabels, AnotherSizeOfTheImageIsAFault) {
             "images/000001.png");
   write_coco(R"({"id": 7, "file_name": "000001.png", "width": 40})");
   EXPECT_THAT(fault(), HasSubstr("instances.json (image 7): $.height: expected"));
+  write_coco(R"({"id": 7, "file_name": "000001.png"})", box(1, 7, "[1, 2, 3, 4]"));
+  EXPECT_THAT(rectangles(annotation_of(*open())), ElementsAre(Rectangle{1, 2, 4, 6}));
 }
 
 TEST_F(CocoLabels, WhatIsNoImageOfThatSizeOrFormatIsNamed) {
