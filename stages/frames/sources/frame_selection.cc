@@ -28,13 +28,16 @@ std::set<std::string> read_ids(const SourceRoot& base, const std::string& path) 
 }
 
 /// A list of images in place of ids: the sample of "data/obj/a0.jpg" is "data/obj/a0", "obj/a0" or
-/// "a0", the first that there is. Takes images without one off the list, and counts them.
+/// "a0", the first that there is; as Windows writes it, too. Takes images without one off the list,
+/// and counts them.
 std::size_t name_samples(const std::vector<LabelledFrame>& frames, std::set<std::string>& ids) {
   std::set<std::string> known, named;
   for (const LabelledFrame& frame : frames) known.insert(frame.sample_id);
   std::size_t without = 0;
   for (const std::string& line : ids) {
-    const std::filesystem::path image = std::filesystem::path(line).lexically_normal();
+    std::string path = line;
+    std::ranges::replace(path, '\\', '/');
+    const std::filesystem::path image = std::filesystem::path(path).lexically_normal();
     if (known.contains(line) ||
         std::ranges::find(kImageExtensions, in_small_letters(image.extension().string())) ==
             kImageExtensions.end()) {
@@ -88,7 +91,7 @@ FrameSelection select_frames(const std::vector<LabelledFrame>& frames, const Sou
     std::set<std::string> ids = read_ids(SourceRoot("", base), *selection.ids);
     if (const std::size_t without = name_samples(selected, ids); without > 0) {
       result.notes.push_back(count_text(static_cast<std::int64_t>(without), "image",
-                                        " without a label in " + *selection.ids));
+                                        " of " + *selection.ids + " not here, or without a label"));
     }
     keep(
         selected, ids, [](const LabelledFrame& frame) { return frame.sample_id; }, "sample ids",
