@@ -504,6 +504,28 @@ void tell_unreadable(const JobManifest& manifest, const SourceSpec& source, cons
   for (const std::string& reason : reasons) warnings.push_back("left out: " + reason);
 }
 
+/// Splits of one dataset tell apart what one program has written: a pixel, which nobody would see.
+void warn_of_edges(const JobManifest& manifest,
+                   const std::vector<std::unique_ptr<Dataset>>& datasets,
+                   std::vector<std::string>& warnings) {
+  std::map<std::string, std::string> roots;  // a source of each beginning
+  bool any_unset = false;
+  for (std::size_t i = 0; i < datasets.size(); ++i) {
+    const std::optional<LabelSpec>& labels = manifest.sources[i].labels;
+    if (!labels || labels->format != LabelFormat::kVoc) continue;
+    const auto meanings = datasets[i]->label_meanings();
+    const auto edges = meanings.find("edges_from");
+    if (edges == meanings.end()) continue;
+    roots.emplace(edges->second, manifest.sources[i].root);
+    any_unset |= !labels->edges_from;
+  }
+  if (roots.size() < 2 || !any_unset) return;
+  warnings.push_back(fmt::format(
+      "edges count from {} in {} and from {} in {}: if one program has written both, "
+      "give both \"edges_from\" in the manifest's labels",
+      roots.begin()->first, roots.begin()->second, roots.rbegin()->first, roots.rbegin()->second));
+}
+
 void open_datasets(const JobManifest& manifest, const PlanningOptions& options,
                    std::vector<std::unique_ptr<Dataset>>& datasets) {
   Phase phase(options.show_phase, {"sources", /*has_bytes=*/false, "opening"},
@@ -559,6 +581,7 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
     annotation_files.insert(annotation_files.end(), files.begin(), files.end());
     if (const auto& ids = manifest.sources[i].selection.ids) annotation_files.push_back(*ids);
   }
+  warn_of_edges(manifest, job.datasets, job.warnings);
   job.plan.shards = layout.finish();
   note_unknown_sizes(job.plan);
   note_unknown_times(manifest.generator, job.plan);

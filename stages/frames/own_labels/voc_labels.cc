@@ -169,7 +169,7 @@ class VocLabels : public FilePerImage {
     ClassList classes;
     Remarks remarks;
     std::string at_0;  // a file with an edge there
-    bool has_boxes = false;
+    bool has_boxes = false, are_roboflows = false;
     for (const FrameLabel& label : labels()) {
       if (label.key.empty()) continue;
       const Outcome<ImageLabels> read = read_file(label.key);
@@ -177,6 +177,8 @@ class VocLabels : public FilePerImage {
       if (is_fault(read)) continue;
       remarks.add(*read, label_place(label.key));
       has_boxes = has_boxes || !read->boxes.empty();
+      are_roboflows =
+          are_roboflows || read->original.find("<database>roboflow.") != std::string::npos;
       const auto is_at_0 = [](const NamedBox& box) {
         const auto [left, top, right, bottom] = box.box.xyxy;
         return (left >= 0 && left < 1) || (top >= 0 && top < 1);
@@ -184,9 +186,9 @@ class VocLabels : public FilePerImage {
       if (at_0.empty() && std::ranges::any_of(read->boxes, is_at_0)) at_0 = label_place(label.key);
     }
     schema_.class_names = classes.names();
-    edges_from_ = spec.edges_from.value_or(at_0.empty() ? 1 : 0);
+    edges_from_ = spec.edges_from.value_or(at_0.empty() && !are_roboflows ? 1 : 0);
     if (has_boxes) meanings_["edges_from"] = std::to_string(edges_from_);
-    if (has_boxes && !spec.edges_from) note_edges(at_0);
+    if (has_boxes && !spec.edges_from) note_edges(at_0, are_roboflows);
     remarks.move_to(notes_);
     find_masks();
   }
@@ -234,11 +236,12 @@ class VocLabels : public FilePerImage {
   }
 
   /// A pixel is not much, and nobody would find out otherwise.
-  void note_edges(const std::string& at_0) {
+  void note_edges(const std::string& at_0, bool are_roboflows) {
     const std::string begin =
         "edges count from " + std::to_string(edges_from_) + " in " + root().written("");
     notes_.push_back(
-        at_0.empty()
+        are_roboflows ? begin + ", as Roboflow's do"
+        : at_0.empty()
             ? begin +
                   ", as Pascal VOC's do, since none is at 0 (CVAT's, VoTT's and Roboflow's "
                   "count from 0: \"edges_from\": 0 in the manifest's labels)"

@@ -245,6 +245,25 @@ TEST_F(MakePlan, LabelsWithoutImagesShareShards) {
   EXPECT_EQ(plan.shards[2].volume_size, (ImageSize{4, 6})) << "the guess stays";
 }
 
+TEST_F(MakePlan, SplitsWhoseEdgesCountFromOthersAreTold) {
+  for (const std::string folder : {"x", "y"}) {
+    const std::string left = folder == "x" ? "1" : "0";
+    testing::write_file(folder_ / folder / "f_01.xml",
+                        "<annotation><object><name>a</name><bndbox><xmin>" + left +
+                            "</xmin><ymin>1</ymin><xmax>3</xmax><ymax>3</ymax></bndbox></object>"
+                            "</annotation>");
+  }
+  manifest_.sources.push_back(manifest_.sources[0]);
+  manifest_.sources[1].split = "val";
+  manifest_.sources[0].labels = LabelSpec{LabelFormat::kVoc, "x"};
+  manifest_.sources[1].labels = LabelSpec{LabelFormat::kVoc, "y"};
+  EXPECT_THAT(make_plan(manifest_, "w", "e").warnings,
+              ::testing::ElementsAre(
+                  ::testing::StartsWith("edges count from 0 in clip and from 1 in clip: ")));
+  for (SourceSpec& source : manifest_.sources) source.labels->edges_from = 0;
+  EXPECT_THAT(make_plan(manifest_, "w", "e").warnings, ::testing::IsEmpty());
+}
+
 TEST_F(MakePlan, AMissingFrameThatWasAddedBecomesWhatItWouldBePlannedAsToday) {
   for (const PairChoice choice : {PairChoice::kOne, PairChoice::kAll}) {
     manifest_.sources[0].pairs.choose = choice;

@@ -129,6 +129,9 @@ TEST_F(NamedLabels, OneEdgeAt0TellsThatVocsCountFrom0) {
       EXPECT_THAT(notes, ElementsAre(HasSubstr(one.note)));
     }
   }
+  write("x/2.xml", cat("3", "5", "40", "<source><database>roboflow.com</database></source>"));
+  EXPECT_THAT(open(LabelFormat::kVoc, "i", "x")->notes(),
+              Contains("edges count from 0 in x, as Roboflow's do"));
 }
 
 TEST_F(NamedLabels, TheEdgesAt0MayBeLeftOrTop) {
