@@ -475,6 +475,7 @@ void require_one_job(const std::vector<FoundSource>& sources) {
       const FoundSource& other = sources[before];
       if (other.root != now.root && !fs::equivalent(other.root, now.root, unknown)) continue;
       if (other.ids && now.ids && *other.ids != *now.ids) continue;
+      if (other.labels && now.labels && other.labels->path != now.labels->path) continue;
       throw UsageError("expected each folder or video once, got it twice: " + now.root.string());
     }
   }

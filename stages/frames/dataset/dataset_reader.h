@@ -20,6 +20,7 @@ struct FoundLabels {
   LabelFormat format = LabelFormat::kCoco;
   std::filesystem::path path;
   std::optional<std::filesystem::path> outlines = {};  ///< index masks beside labels of boxes
+  std::vector<std::filesystem::path> more = {};        ///< files with labels of other images there
 };
 
 /// A dataset that was found by looking at a folder. Paths are absolute and normal.

@@ -39,6 +39,13 @@ const JsonGlimpse& WholeFiles::json(const fs::path& file) {
   return entry->second;
 }
 
+const std::vector<std::string>& WholeFiles::table_images(
+    const fs::path& file, const std::function<std::vector<std::string>()>& read) {
+  const auto [entry, is_new] = table_images_.try_emplace(file);
+  if (is_new) entry->second = read();
+  return entry->second;
+}
+
 fs::path WholeFiles::folder(const fs::path& above, std::string_view name) {
   const auto [entry, is_new] = folders_.try_emplace(above);
   if (is_new) {
@@ -107,24 +114,37 @@ FrameNames& names_of(const FoundFrames& frames) {
   return *frames.names;
 }
 
+/// Of a video the first frame stands for all: how many there are, only opening it tells.
+std::string standing_for(const FoundFrames& frames, const std::string& name) {
+  return frames.is_video ? first_frame_name(name) : name;
+}
+
 }  // namespace
+
+std::set<std::size_t> frames_among(const FoundFrames& frames,
+                                   const std::vector<std::string>& names) {
+  FrameNames& known = names_of(frames);
+  std::set<std::size_t> found;
+  for (const std::string& name : names) {
+    const std::size_t frame = known.find(standing_for(frames, name)).frame;
+    if (frame < FrameNames::kSeveral) found.insert(frame);
+  }
+  return found;
+}
 
 std::size_t count_among(const FoundFrames& frames, const std::vector<std::string>& names) {
   FrameNames& known = names_of(frames);
-  // Of a video the first frame stands for all: how many there are, only opening it tells.
-  const auto name_of = [&](const std::string& name) {
-    return frames.is_video ? first_frame_name(name) : name;
-  };
   const auto is_theirs = [&](const FrameNames::Match& match) {
     return match.frame < FrameNames::kSeveral ||
            (match.frame == FrameNames::kSeveral && !frames.is_video);
   };
   std::size_t count = 0;
-  for (const std::string& name : names) count += is_theirs(known.find_exactly(name_of(name)));
+  for (const std::string& name : names)
+    count += is_theirs(known.find_exactly(standing_for(frames, name)));
   constexpr std::size_t kMost = 1000;
   const std::size_t step = std::max<std::size_t>(1, names.size() / kMost);
   for (std::size_t i = 0; count == 0 && i < names.size(); i += step) {
-    count += is_theirs(known.find(name_of(names[i])));
+    count += is_theirs(known.find(standing_for(frames, names[i])));
   }
   return count;
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <initializer_list>
 #include <map>
 #include <memory>
@@ -37,6 +38,9 @@ class WholeFiles {
   const std::vector<std::filesystem::path>& in(const std::filesystem::path& folder,
                                                std::string_view extension);
   const JsonGlimpse& json(const std::filesystem::path& file);
+  /// What a table calls its images, by whoever reads it the first time.
+  const std::vector<std::string>& table_images(
+      const std::filesystem::path& file, const std::function<std::vector<std::string>()>& read);
   /// As the function folder_named.
   std::filesystem::path folder(const std::filesystem::path& above, std::string_view name);
 
@@ -45,6 +49,7 @@ class WholeFiles {
   std::map<std::filesystem::path, std::map<std::string_view, std::vector<std::filesystem::path>>>
       listed_;  ///< by extension
   std::map<std::filesystem::path, JsonGlimpse> json_;
+  std::map<std::filesystem::path, std::vector<std::string>> table_images_;
 };
 
 /// Images and folders of images, or videos, as a source has them.
@@ -78,6 +83,10 @@ bool is_image_folder(const std::string& name);
 /// How many of the names that a label file has for images are these frames'; of many that are
 /// theirs by no exact name (FrameNames) only some are looked up.
 std::size_t count_among(const FoundFrames& frames, const std::vector<std::string>& names);
+
+/// Which of these frames they are; of videos, the first frame of each.
+std::set<std::size_t> frames_among(const FoundFrames& frames,
+                                   const std::vector<std::string>& names);
 
 /// The folders in which a file with labels of all frames may lie: the root and the one above,
 /// `annotations` in them, and above a folder of images of a split.

@@ -83,7 +83,8 @@ bool JsonGlimpse::has_keys(std::initializer_list<const char*> wanted) const {
 bool JsonGlimpse::is_coco() const {
   if (!is_object || file_names.empty()) return false;
   // Captions and panoptic segments are no boxes.
-  const bool has_boxes = annotation_keys.empty() || has_all(annotation_keys, {"bbox"});
+  const bool has_boxes = annotation_keys.empty() || has_all(annotation_keys, {"bbox"}) ||
+                         has_all(annotation_keys, {"segmentation", "category_id"});
   return has_boxes && has_keys({"annotations"});
 }
 

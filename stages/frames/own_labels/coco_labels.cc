@@ -154,29 +154,35 @@ bool is_coco_of(const FoundFrames& frames, const std::filesystem::path& file) {
   return seen.is_coco() && count_among(frames, seen.file_names) > 0;
 }
 
-std::optional<std::filesystem::path> find_coco(const FoundFrames& frames,
-                                               std::vector<std::string>& remarks) {
+LabelSearch find_coco(const FoundFrames& frames) {
   std::vector<std::filesystem::path> files;
   for (const std::filesystem::path& folder : folders_around(frames)) {
     for (const std::filesystem::path& file : frames.files->in(folder, ".json")) {
       if (is_coco_of(frames, file)) files.push_back(file);
     }
   }
-  if (files.empty()) return std::nullopt;
+  if (files.empty()) return {};
   const std::string name = frames.root.filename().string();
   const auto rank = [&](const std::filesystem::path& file) {
     const std::string stem = file.stem().string();
     return std::pair(!stem.ends_with(name), !stem.starts_with("instances"));
   };
   std::ranges::stable_sort(files, {}, rank);
-  const std::string_view split = split_of(last_word(files.front()));
-  for (std::size_t i = 1; i < files.size(); ++i) {
-    const bool is_of_others = split_of(last_word(files[i])) != split;
-    remarks.push_back(
-        (is_of_others ? "warning: other COCO labels left out: " : "other COCO labels left out: ") +
-        files[i].string());
+  // COCO's own files label an image several times: instances_ has all objects.
+  const bool is_of_coco = files.front().stem().string().starts_with("instances");
+  const std::string word = last_word(files.front());
+  std::vector<ManyLabels> with_images;
+  std::vector<std::string> remarks;
+  for (const std::filesystem::path& file : files) {
+    if (is_of_coco && file != files.front() && last_word(file) == word) {
+      remarks.push_back("other COCO labels left out: " + file.string());
+    } else {
+      with_images.push_back({file, frames.files->json(file).file_names});
+    }
   }
-  return files.front();
+  LabelSearch search = take_files(frames, with_images);
+  search.remarks = std::move(remarks);
+  return search;
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <set>
 #include <utility>
@@ -13,6 +14,7 @@
 
 #include "manifests/documents/json_text.h"
 #include "manifests/files/csv_records.h"
+#include "manifests/files/input_file.h"
 #include "manifests/values/text.h"
 #include "manifests/values/text_lines.h"
 #include "stages/frames/dataset/label_name.h"
@@ -308,12 +310,30 @@ class CsvLabels : public ReadLabels {
   std::string path_;
 };
 
-std::optional<std::filesystem::path> find_csv(const FoundFrames& frames,
-                                              std::vector<std::string>& remarks) {
-  std::optional<std::filesystem::path> found;
+/// What a table calls its images, each once.
+std::vector<std::string> images_in(std::string_view table, std::size_t column) {
+  CsvReader reader(table, separator_of(table));
+  reader.next();
+  std::set<std::string, std::less<>> images;
+  while (const std::optional<CsvRecord> row = reader.next()) {
+    if (row->fields.size() > column) images.emplace(row->fields[column]);
+  }
+  return {images.begin(), images.end()};
+}
+
+/// A whole file, of which its beginning is known; that alone if the rest cannot be read.
+std::string whole_text(const std::filesystem::path& file, std::string beginning) try {
+  return InputFile(file).read_all();
+} catch (const InputError&) {
+  return beginning;
+}
+
+LabelSearch find_csv(const FoundFrames& frames) {
+  std::vector<ManyLabels> tables;
+  std::vector<std::string> remarks;
   for (const std::filesystem::path& folder : folders_around(frames)) {
     for (const std::filesystem::path& file : frames.files->in(folder, ".csv")) {
-      if (found && *found == file) continue;
+      if (std::ranges::find(tables, file, &ManyLabels::path) != tables.end()) continue;
       const std::string text = beginning_of(file);
       CsvReader reader(text, separator_of(text));
       const std::optional<CsvRecord> header = reader.next();
@@ -331,21 +351,19 @@ std::optional<std::filesystem::path> find_csv(const FoundFrames& frames,
       const std::size_t place =
           is_fault(columns) ? static_cast<std::size_t>(place_of(kImage) - header->fields.begin())
                             : *columns->places[kImage];
-      std::vector<std::string> images;
-      while (const std::optional<CsvRecord> row = reader.next()) {
-        if (row->fields.size() > place) images.emplace_back(row->fields[place]);
-      }
+      const std::vector<std::string>& images = frames.files->table_images(
+          file, [&] { return images_in(whole_text(file, text), place); });
       if (count_among(frames, images) == 0) continue;
       if (is_fault(columns)) {
         remarks.push_back("a table left out, " + columns.fault().reason + ": " + file.string());
-      } else if (found) {
-        remarks.push_back("another table of labels left out: " + file.string());
       } else {
-        found = file;
+        tables.push_back({file, images});
       }
     }
   }
-  return found;
+  LabelSearch search = take_files(frames, tables);
+  search.remarks = std::move(remarks);
+  return search;
 }
 
 }  // namespace

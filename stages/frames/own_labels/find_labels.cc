@@ -84,19 +84,25 @@ bool covers(const FoundLabels& voc, const fs::path& texts) {
   return !wanted.empty() && std::ranges::includes(stems(voc.path, ".xml"), wanted);
 }
 
-/// The first of the formats, but VOC's names before YOLO's numbers; masks beside boxes are their
-/// outlines, the others are remarks.
-std::optional<FoundLabels> find_any(const FoundFrames& frames, std::vector<std::string>& remarks) {
-  std::optional<FoundLabels> found;
+/// Gives a source the first of the formats, but VOC's names before YOLO's numbers; masks beside
+/// boxes are their outlines, the others are remarks.
+void find_any(const FoundFrames& frames, FoundSource& source) {
+  std::optional<FoundLabels>& found = source.labels;
+  found.reset();
+  source.unread.clear();
+  std::vector<std::string>& remarks = source.remarks;
   for (const LabelReader* const reader : kLabelReaders) {
-    const std::optional<fs::path> path = reader->find(frames, remarks);
-    if (!path) continue;
+    LabelSearch search = reader->find(frames);
+    std::ranges::move(search.remarks, std::back_inserter(remarks));
+    if (search.paths.empty()) continue;
     if (!found) {
-      found = FoundLabels{reader->format, *path};
+      found = FoundLabels{reader->format, search.paths.front()};
+      found->more.assign(search.paths.begin() + 1, search.paths.end());
+      source.unread = std::move(search.unread);
     } else if (reader->format == LabelFormat::kMasks) {
-      found->outlines = *path;
+      found->outlines = search.paths.front();
     } else {
-      FoundLabels other{reader->format, *path};
+      FoundLabels other{reader->format, search.paths.front()};
       const bool lacks_names = found->format == LabelFormat::kYolo && has_no_names(found->path);
       const bool is_better = lacks_names && covers(other, found->path);
       if (is_better) std::swap(*found, other);
@@ -105,7 +111,6 @@ std::optional<FoundLabels> find_any(const FoundFrames& frames, std::vector<std::
                         (lacks_names && !is_better ? ", which has the names of the classes" : ""));
     }
   }
-  return found;
 }
 
 /// The folders of images that labels may be of, those that are most likely first.
@@ -147,6 +152,11 @@ bool is_below(const fs::path& path, const fs::path& folder) {
   return !relative.empty() && *relative.begin() != "..";
 }
 
+/// Whether a folder's images are of a source: those below its root, unless some lie right in it.
+bool is_in(const fs::path& place, const fs::path& root, const std::set<fs::path>& with_images) {
+  return place == root || (is_below(place, root) && !with_images.contains(root));
+}
+
 /// A source for each split that has a folder of images with labels of its own, train first; none
 /// unless there are two. `found`: all of them in one folder, or one of them, whose own split is set
 /// where its folder below `given` states it.
@@ -178,7 +188,7 @@ std::vector<FoundSource> find_splits(FoundSource& found, const fs::path& given, 
     FoundSource source = found;
     source.root = root;
     source.remarks.clear();
-    source.labels = find_any(frames, source.remarks);
+    find_any(frames, source);
     source.split = place == kOrder.begin() ? "" : *place;
     if (source.labels) splits.emplace(place - kOrder.begin(), std::move(source));
   }
@@ -203,8 +213,10 @@ void note_overlaps(const FoundFrames& frames, const std::string& file,
   const auto word = [](const FoundSource& source) {
     return source.split.empty() ? "train" : std::string(source.split);
   };
-  std::map<std::string, std::string_view> listed;  // the splits of images, by their paths
-  std::set<std::string> names;                     // and these without their first folders
+  const std::vector<std::string>& images = image_names_of(frames);
+  const std::set<std::string> known(images.begin(), images.end());
+  std::map<std::string, std::string_view> listed;  // the splits of these
+  bool has_lists = false;
   std::size_t twice = 0;
   for (const FoundSource& source : sources) {
     for (const FoundSource& other : sources) {
@@ -214,23 +226,25 @@ void note_overlaps(const FoundFrames& frames, const std::string& file,
       remarks.push_back("warning: images of " + word(other) + " are in split " + word(source) +
                         ", too, as " + file + " says");
     }
-    for (const fs::path line :
-         source.ids ? images_of_list(*source.ids) : std::vector<std::string>()) {
-      const std::string image = line.lexically_normal().generic_string();
+    if (!source.ids) continue;
+    has_lists = true;
+    for (std::string line : images_of_list(*source.ids)) {
+      std::ranges::replace(line, '\\', '/');
+      std::string image = fs::path(line).lexically_normal().generic_string();
+      while (!known.contains(image) && image.find('/') != image.npos) {
+        image.erase(0, image.find('/') + 1);  // as the selection of samples does
+      }
+      if (!known.contains(image)) continue;
       const auto [entry, is_new] = listed.emplace(image, source.split);
       twice += !is_new && entry->second != source.split;
-      for (std::size_t at = 0; at != image.npos; at = image.find('/', at + 1)) {
-        names.insert(image.substr(at == 0 ? 0 : at + 1));
-      }
     }
   }
   if (twice > 0) {
     remarks.push_back("warning: " + count_text(static_cast<std::int64_t>(twice), "image") +
                       " in lists of two splits, as " + file + " says");
   }
-  if (listed.empty()) return;
-  const auto in_none = std::ranges::count_if(
-      image_names_of(frames), [&](const std::string& image) { return !names.contains(image); });
+  if (!has_lists) return;
+  const auto in_none = std::ssize(known) - std::ssize(listed);
   if (in_none > 0) {
     remarks.push_back("warning: " +
                       count_text(in_none, "image", " left out: in no list of " + file));
@@ -249,10 +263,15 @@ std::vector<FoundSource> find_said_splits(FoundSource& found, const fs::path& gi
     if (!known.insert(folder).second) continue;
     std::string file;
     std::vector<FoundSource> sources;
-    std::vector<std::string> remarks;
-    for (const auto& [split, place] : split_parts(folder, file)) {
+    std::vector<std::string> remarks, absent;
+    const std::vector<SplitPart> parts = split_parts(folder, file, absent);
+    if (!absent.empty()) {
+      remarks.push_back("warning: " + counted(absent, "list", " of " + file + " not there"));
+    }
+    for (const auto& [split, place] : parts) {
       FoundSource source = found;
       if (!sources.empty() || has_folder(place)) source.remarks.clear();
+      if (!sources.empty()) source.unread.clear();
       source.split = split == "train" ? "" : split;
       if (has_file(place)) {
         source.ids = place;
@@ -261,7 +280,7 @@ std::vector<FoundSource> find_said_splits(FoundSource& found, const fs::path& gi
         const bool has_frames = !frames.stems.empty() || !frames.folders.empty();
         if (!has_frames || !is_below(place, given)) continue;
         source.root = place;
-        source.labels = find_any(frames, source.remarks);
+        find_any(frames, source);
         if (!source.labels) continue;
       }
       const auto same = std::ranges::find_if(sources, [&](const FoundSource& other) {
@@ -288,9 +307,56 @@ std::vector<FoundSource> find_said_splits(FoundSource& found, const fs::path& gi
   return {};
 }
 
+/// Which split a file's name tells: "train" of train_labels.csv, "val" of instances_val2017.json.
+std::string_view split_in(const fs::path& file) {
+  const std::string stem = file.stem().string();
+  for (std::size_t begin = 0; begin < stem.size();) {
+    const std::size_t end = std::min(stem.find_first_of("_-. ", begin), stem.size());
+    const std::string_view split = split_of(stem.substr(begin, end - begin));
+    if (!split.empty()) return split;
+    begin = end + 1;
+  }
+  return {};
+}
+
+/// Gives each file with labels of other images of a source's folder a source of its own, with the
+/// split that its name tells. Where lists say which images are of a split, the files are unread.
+void add_other_files(std::vector<FoundSource>& sources) {
+  std::vector<FoundSource> all;
+  for (FoundSource& source : sources) {
+    const std::vector<fs::path> more =
+        source.labels ? std::exchange(source.labels->more, {}) : std::vector<fs::path>();
+    FoundSource& first = all.emplace_back(source);
+    if (source.ids) {
+      for (const fs::path& file : more) {
+        first.unread.push_back(file.string() + " is not read beside " +
+                               source.labels->path.filename().string() +
+                               ", since lists divide the images: join them in one file");
+      }
+      continue;
+    }
+    const auto take = [&](FoundSource& of_file, const fs::path& file) {
+      of_file.labels->path = file;
+      const std::string_view split = split_in(file);
+      if (source.split.empty() && split != "train") of_file.split = split;
+    };
+    if (more.empty()) continue;
+    take(first, source.labels->path);
+    for (const fs::path& file : more) {
+      FoundSource of_file = source;
+      of_file.remarks.clear();
+      of_file.unread.clear();
+      take(of_file, file);
+      all.push_back(std::move(of_file));
+    }
+  }
+  sources = std::move(all);
+}
+
 /// Tells of images that are no part of the sources that were chosen, or that are in one split with
 /// the first.
-void note_other_images(const std::vector<fs::path>& with_frames, const fs::path& given,
+void note_other_images(const std::vector<fs::path>& with_frames,
+                       const std::set<fs::path>& with_images, const fs::path& given,
                        WholeFiles& files, std::vector<FoundSource>& sources) {
   std::vector<std::string> left_out;
   fs::path last;
@@ -298,7 +364,7 @@ void note_other_images(const std::vector<fs::path>& with_frames, const fs::path&
     const bool is_of_source = std::ranges::any_of(sources, [&](const FoundSource& source) {
       const bool are_masks =
           source.labels && (source.labels->path == place || source.labels->outlines == place);
-      return are_masks || is_below(place, source.root) || is_below(source.root, place);
+      return are_masks || is_in(place, source.root, with_images) || is_below(source.root, place);
     });
     if (is_of_source) continue;
     if (!last.empty() && is_below(place, last)) continue;  // told with the folder that it is in
@@ -358,16 +424,18 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
     }
     with_frames.push_back(place);
     if (is_empty && !first_place) first_place = place;
-    std::vector<std::string> of_place;
-    const auto labels = find_any(frames, of_place);
+    FoundSource of_place;
+    find_any(frames, of_place);
+    const auto& labels = of_place.labels;
     if (labels && !found.labels) {
       found.labels = labels;
+      found.unread = std::move(of_place.unread);
       root = place;
-      remarks = std::move(of_place);
+      remarks = std::move(of_place.remarks);
     } else if (labels && labels->path != found.labels->path) {
       others.emplace_back(place, labels->path);
     } else if (!found.labels && remarks.empty()) {
-      remarks = std::move(of_place);
+      remarks = std::move(of_place.remarks);
     }
   }
   if (root || first_place) found.root = root ? *root : *first_place;
@@ -376,19 +444,24 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
   if (found.labels) sources = find_said_splits(found, given, files);
   if (found.labels && sources.empty()) sources = find_splits(found, given, files, with_frames);
   if (sources.empty()) sources.push_back(std::move(found));
+  add_other_files(sources);
+  std::set<fs::path> with_images;  // right in them
+  for (const FoundFrames& frames : places) {
+    if (!frames.stems.empty()) with_images.insert(frames.root);
+  }
   for (const auto& other : others) {
     const auto& [place, labels] = other;
     const bool is_of_source = std::ranges::any_of(sources, [&](const FoundSource& source) {
-      return is_below(other.first, source.root) ||
-             (is_below(source.root, other.first) && list_image_folder(other.first).frames.empty());
+      return is_in(other.first, source.root, with_images) ||
+             is_in(source.root, other.first, with_images);
     });
     if (is_of_source) continue;
     sources.front().remarks.push_back("labels of other images left out: " + labels.string() +
                                       " of " + place.string());
   }
-  note_other_images(with_frames, given, files, sources);
+  note_other_images(with_frames, with_images, given, files, sources);
   UnreadLabels unread = unread_labels(places, given, sources);
-  sources.front().unread = std::move(unread.lines);
+  std::ranges::move(unread.lines, std::back_inserter(sources.front().unread));
   std::vector<std::string>& remarks_of_all = sources.front().remarks;
   if (!unread.others.empty()) {
     constexpr std::string_view kRest = " with names of these images not read";

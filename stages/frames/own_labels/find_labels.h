@@ -17,8 +17,10 @@ struct SplitPart {
 };
 
 /// What the data.yaml or obj.data in a folder says of splits, else the lists autosplit_SPLIT.txt in
-/// it; train first. What is not there is left out. `file`: which one says so.
-std::vector<SplitPart> split_parts(const std::filesystem::path& folder, std::string& file);
+/// it; train first. What is not there is left out, and its lists are `absent`. `file`: which one
+/// says so.
+std::vector<SplitPart> split_parts(const std::filesystem::path& folder, std::string& file,
+                                   std::vector<std::string>& absent);
 
 /// The lines of a list that say anything, sorted, each once.
 std::vector<std::string> images_of_list(const std::filesystem::path& list);

@@ -3,7 +3,6 @@
 #include <array>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -17,16 +16,23 @@ namespace eventgan {
 
 struct FoundFrames;  // stages/frames/naming/found_frames.h
 
+/// Where a format's labels of some frames lie.
+struct LabelSearch {
+  /// LabelSpec::path of them, and behind it files that label other images of the same folders;
+  /// empty: there are none.
+  std::vector<std::filesystem::path> paths = {};
+  std::vector<std::string> remarks = {};  ///< on what is there and left out
+  std::vector<std::string> unread = {};   ///< of a file that labels the same images once more
+};
+
 /// What finds and reads a format of labels. Each format has its own file, which defines its reader.
 struct LabelReader {
   LabelFormat format;
   /// As the function open_own_labels.
   std::unique_ptr<OwnLabels> (*open)(const LabelSpec& spec, const std::filesystem::path& base,
                                      LabelledSource source);
-  /// LabelSpec::path of labels of these frames, as far as names and beginnings of files tell; adds
-  /// a remark on what is there and left out. Cannot fail: what cannot be read is not found.
-  std::optional<std::filesystem::path> (*find)(const FoundFrames& frames,
-                                               std::vector<std::string>& remarks);
+  /// As far as names and beginnings of files tell. Cannot fail: what cannot be read is not found.
+  LabelSearch (*find)(const FoundFrames& frames);
   std::string_view image_folder = {};  ///< in which a sequence's images may lie, in its own folder
   std::string_view extension = {};     ///< of its texts, where it has one an image or a sequence
 };
@@ -80,10 +86,10 @@ extern const LabelReader kCocoReader;
 /// A line is "class xc yc w h", shares of the image's width and height from its left and upper
 /// edge; with kpt_shape [J, 2 or 3] "class xc yc w h" and J times "px py [v]", v as COCO's; a joint
 /// at 0, 0 without v is not annotated. Joints are named by data.yaml's kpt_names, by COCO's names
-/// if there are 17, else "0", "1", ... "class x1 y1 x2 y2 ..." is an
-/// outline (segmentation), and the box is what is around it; it may stand among others. Where
-/// joints without kpt_shape may be meant (PoseEvidence), opening is an InputError with both
-/// readings; kpt_shape: [0, 0] says that there are none.
+/// (with a note) if there are 17 and flip_idx mirrors no others, else "0", "1", ... A line
+/// "class x1 y1 x2 y2 ..." is an outline (segmentation), and the box is what is around it; it may
+/// stand among others. Where joints without kpt_shape may be meant (PoseEvidence), opening is an
+/// InputError with both readings; kpt_shape: [0, 0] says that there are none.
 extern const LabelReader kYoloReader;
 
 /// Pascal VOC's XML files (parse_voc_labels): found as YOLO's texts are, with the last folder
@@ -91,9 +97,9 @@ extern const LabelReader kYoloReader;
 /// read at opening, since classes are numbered by their names' order, as with MOT's and tables'
 /// labels; an image without boxes has a file without <object>. Edges count from
 /// LabelSpec::edges_from; else from 0 where a box of the source begins there, as none of VOC's own
-/// can, and from 1 where none does. A note tells. Of a file in a folder beside SegmentationObject
-/// the mask there of its name, if there is one, has the outlines, number k that of the k-th
-/// <object> (give_outlines).
+/// can, or Roboflow has written one, and from 1 where not. A note tells. Of a file in a folder
+/// beside SegmentationObject the mask there of its name, if there is one, has the outlines, number
+/// k that of the k-th <object> (give_outlines).
 extern const LabelReader kVocReader;
 
 /// A table (parse_csv_labels): `path` is the file; images are named as by COCO's file_name. The
@@ -120,6 +126,16 @@ inline constexpr auto kLabelReaders =
                                           {LabelFormat::kMasks, &kMasksReader}});
 
 const LabelReader& label_reader(LabelFormat format);
+
+/// A file with labels of many images, and what it calls these.
+struct ManyLabels {
+  std::filesystem::path path;
+  std::vector<std::string> images;
+};
+
+/// Takes the first of the files, if there is one, and each that labels none of the images of those
+/// taken before it; the others are LabelSearch::unread.
+LabelSearch take_files(const FoundFrames& frames, const std::vector<ManyLabels>& files);
 
 /// LabelReader::open of a class of labels.
 template <class Labels>

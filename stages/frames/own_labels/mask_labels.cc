@@ -132,10 +132,10 @@ bool has_index_masks(const fs::path& masks, const FoundFrames& frames) {
   });
 }
 
-std::optional<fs::path> find_masks(const FoundFrames& frames, std::vector<std::string>&) {
+LabelSearch find_masks(const FoundFrames& frames) {
   const fs::path masks = find_label_files(frames, kMaskFiles);
-  if (masks.empty() || masks == frames.root || !has_index_masks(masks, frames)) return std::nullopt;
-  return masks;
+  if (masks.empty() || masks == frames.root || !has_index_masks(masks, frames)) return {};
+  return {{masks}};
 }
 
 }  // namespace

@@ -447,26 +447,25 @@ bool is_mot_table(const std::filesystem::path& file) {
          });
 }
 
-std::optional<std::filesystem::path> find_mot(const FoundFrames& frames,
-                                              std::vector<std::string>&) {
+LabelSearch find_mot(const FoundFrames& frames) {
   const std::filesystem::path above = frames.root.parent_path();
   const bool has_images = !frames.stems.empty() && !frames.is_video;
   if (has_images && has_file(above / "gt/gt.txt") && frames.root.filename() == "img1") {
-    return above;
+    return {{above}};
   }
-  if (has_images && has_file(frames.root / "gt/gt.txt")) return frames.root;
+  if (has_images && has_file(frames.root / "gt/gt.txt")) return {{frames.root}};
   std::vector<std::string> sequences = frames.folders;
   if (frames.is_video) sequences.assign(frames.stems.begin(), frames.stems.end());
   for (const std::filesystem::path& folder : {frames.root, above}) {
     for (const std::string& sequence : sequences) {
       for (const char* name : {"gt/gt.txt", "gt.txt"}) {
-        if (has_file(folder / sequence / name)) return folder;
+        if (has_file(folder / sequence / name)) return {{folder}};
       }
       const std::filesystem::path beside = folder / (sequence + ".txt");
-      if (has_file(beside) && is_mot_table(beside)) return folder;
+      if (has_file(beside) && is_mot_table(beside)) return {{folder}};
     }
   }
-  return std::nullopt;
+  return {};
 }
 
 }  // namespace

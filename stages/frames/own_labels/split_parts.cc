@@ -95,7 +95,8 @@ SaidSplits said_by_names(const fs::path& folder) {
 
 }  // namespace
 
-std::vector<SplitPart> split_parts(const fs::path& folder, std::string& file) {
+std::vector<SplitPart> split_parts(const fs::path& folder, std::string& file,
+                                   std::vector<std::string>& absent) {
   std::vector<fs::path> folders = {folder};
   const auto parts_of = [&](const SaidSplits& said) {
     std::vector<SplitPart> parts;
@@ -104,6 +105,8 @@ std::vector<SplitPart> split_parts(const fs::path& folder, std::string& file) {
         if (of != split) continue;
         if (fs::path place = resolved(path, folders); !place.empty()) {
           parts.push_back({split, (place / "").parent_path()});
+        } else if (lower_extension(path) == ".txt") {
+          absent.push_back(path);
         }
       }
     }
@@ -121,8 +124,12 @@ std::vector<SplitPart> split_parts(const fs::path& folder, std::string& file) {
     if (!below.empty()) folders.insert(folders.begin(), folder / below);
     if (auto parts = parts_of(said); !parts.empty()) return parts;
   }
-  file = (folder / "autosplit_*.txt").string();
-  return parts_of(said_by_names(folder));
+  std::vector<SplitPart> parts = parts_of(said_by_names(folder));
+  if (!parts.empty()) {
+    file = (folder / "autosplit_*.txt").string();
+    absent.clear();
+  }
+  return parts;
 }
 
 std::vector<std::string> images_of_list(const fs::path& list) {

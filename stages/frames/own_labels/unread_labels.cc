@@ -85,10 +85,13 @@ class UnreadFinder {
 
   UnreadLabels found;
 
-  /// `is_inside`: in what was given, or in a tree of labels beside it, where a label file that
-  /// cannot be read is told, too.
-  void look_below(const fs::path& top, int depth, bool is_inside = false) {
-    is_inside_ = is_inside;
+  enum class Place {
+    kGiven,
+    kLabelsBeside,  ///< a tree of labels: as in what was given, a file that is damaged is told, too
+    kBeside,
+  };
+  void look_below(const fs::path& top, int depth, Place place) {
+    place_ = place;
     std::deque<std::pair<fs::path, int>> folders = {{top, depth}};
     for (; !folders.empty() && found.lines.size() < kMostLines; folders.pop_front()) {
       const auto [folder, levels] = folders.front();
@@ -155,8 +158,10 @@ class UnreadFinder {
                            is_of_image,
                            images_.is_sequence(stem.string()),
                            beginning_of(file)};
-      if (seen.text.empty() && is_inside_ && !has_labels_) {
+      if (seen.text.empty() && place_ != Place::kBeside && !has_labels_) {
         tell_empty(seen, extension);
+      } else if (seen.text.starts_with("\xFF\xFE") || seen.text.starts_with("\xFE\xFF")) {
+        look_at_utf16(seen, extension);
       } else {
         look_at(seen, extension);
       }
@@ -172,6 +177,15 @@ class UnreadFinder {
     const bool is_of_labels = extension == ".csv" || extension == ".json" || extension == ".xml";
     if (is_passed_through(file, extension) || (is_readable && !is_of_labels)) return;
     tell(file, "empty" + extension + file.path.parent_path().string(), " is not read: " + reason);
+  }
+
+  void look_at_utf16(LabelFile file, const std::string& extension) {
+    file.text.erase(0, 2);
+    std::erase(file.text, '\0');
+    if (is_passed_through(file, extension)) return;
+    if (!file.is_of_image && !said_by(file, extension).names_images) return;
+    if (has_labels_) return found.others.push_back(file.path.string());
+    tell(file, "UTF-16" + extension, " is UTF-16, and is not read: save it as UTF-8");
   }
 
   /// An image's own JSON.
@@ -193,7 +207,11 @@ class UnreadFinder {
   bool is_read(const fs::path& file) const {
     return std::ranges::any_of(sources_, [&](const FoundSource& source) {
       const auto told = [&](const std::string& line) { return line.ends_with(file.string()); };
+      const auto is_begin = [&](const std::string& line) {
+        return line.starts_with(file.string() + " ");
+      };
       return (has_labels_ && std::ranges::any_of(source.remarks, told)) || file == source.ids ||
+             std::ranges::any_of(source.unread, is_begin) ||
              (source.labels && file == source.labels->path);
     });
   }
@@ -201,7 +219,7 @@ class UnreadFinder {
   void look_at(const LabelFile& file, const std::string& extension) {
     if (has_own_mark(file.text) || is_manifest(file.text)) return;
     const UnreadFormat* format = has_labels_ ? nullptr : unread_format_of(file, extension);
-    if (format) {
+    if (format && is_of_these(file, extension)) {
       const std::string title(format->title);
       return tell(file, title + extension,
                   " looks like " + title + " labels of these images and is not read: " +
@@ -227,6 +245,14 @@ class UnreadFinder {
                                "bottom"));
   }
 
+  /// What lies beside what was given may be another dataset's.
+  bool is_of_these(const LabelFile& file, const std::string& extension) const {
+    const auto is_ours = [&](const std::string& name) { return images_.find(name) != nullptr; };
+    return place_ == Place::kGiven || file.is_of_image || file.is_of_sequence ||
+           said_by(file, extension).names_images ||
+           (extension == ".json" && std::ranges::any_of(file.json().file_names, is_ours));
+  }
+
   void tell(const LabelFile& file, const std::string& kind, const std::string& text) {
     told_.insert(file.path.filename().string());
     if (kinds_.insert(kind).second) found.lines.push_back(file.path.string() + text);
@@ -235,7 +261,8 @@ class UnreadFinder {
   WholeFiles& files_;
   ImageNames images_;
   const std::vector<FoundSource>& sources_;
-  bool has_labels_ = false, is_inside_ = false;
+  bool has_labels_ = false;
+  Place place_ = Place::kGiven;
   std::set<fs::path> image_folders_, known_;
   std::set<std::string> own_extensions_;  ///< of files that the labels are, one an image
   std::set<std::string> told_, kinds_;
@@ -296,22 +323,23 @@ UnreadLabels unread_labels(const std::vector<FoundFrames>& places, const fs::pat
   if (places.empty()) return {};
   UnreadFinder finder(places, sources);
   const fs::path top = has_folder(given) ? given : given.parent_path();
-  finder.look_below(top, has_folder(given) ? kDepth : 0, /*is_inside=*/has_folder(given));
+  using enum UnreadFinder::Place;
+  finder.look_below(top, has_folder(given) ? kDepth : 0, has_folder(given) ? kGiven : kBeside);
   // Beside it, and where a tree of labels stands beside that of images.
   constexpr int kLevels = 4;
   fs::path rest, folder = top;
   for (int level = 0; level < kLevels && folder.has_relative_path(); ++level) {
     const fs::path above = folder.parent_path();
     const bool is_beside = level == 0 || may_have_images(folder.filename().string());
-    if (is_beside) finder.look_below(above, 0);
+    if (is_beside) finder.look_below(above, 0, kBeside);
     for (const std::string& name : look_into(above).folders) {
       if (above / name == folder ||
           !starts_with_any(name, {"label", "ann", "xml", "json", "gt", "ground", "box", "bbox"})) {
         continue;
       }
       const fs::path labels = rest.empty() ? above / name : above / name / rest;
-      if (has_folder(labels)) finder.look_below(labels, kDepth, /*is_inside=*/true);
-      if (is_beside) finder.look_below(above / name, kDepth, /*is_inside=*/true);
+      if (has_folder(labels)) finder.look_below(labels, kDepth, kLabelsBeside);
+      if (is_beside) finder.look_below(above / name, kDepth, kLabelsBeside);
     }
     rest = rest.empty() ? folder.filename() : folder.filename() / rest;
     folder = above;

@@ -259,10 +259,10 @@ class VocLabels : public FilePerImage {
   std::unordered_map<std::string, Mask> mask_of_;  ///< by label_key
 };
 
-std::optional<std::filesystem::path> find_voc(const FoundFrames& frames,
-                                              std::vector<std::string>&) {
-  std::filesystem::path labels = find_label_files(frames, kVocFiles);
-  return labels.empty() ? std::nullopt : std::optional(std::move(labels));
+LabelSearch find_voc(const FoundFrames& frames) {
+  const std::filesystem::path labels = find_label_files(frames, kVocFiles);
+  if (labels.empty()) return {};
+  return {{labels}};
 }
 
 }  // namespace

@@ -181,10 +181,9 @@ bool has_yolo_texts(const std::filesystem::path& labels) {
   });
 }
 
-std::optional<std::filesystem::path> find_yolo(const FoundFrames& frames,
-                                               std::vector<std::string>& remarks) {
+LabelSearch find_yolo(const FoundFrames& frames) {
   const std::filesystem::path labels = find_label_files(frames, kYoloFiles);
-  if (labels.empty()) return std::nullopt;
+  if (labels.empty()) return {};
   const bool is_beside = labels == frames.root;  // of texts there, folders above have none
   std::filesystem::path folder = labels, named;
   bool is_above = false;  // the dataset, where a YAML file of another name may be another's
@@ -197,13 +196,11 @@ std::optional<std::filesystem::path> find_yolo(const FoundFrames& frames,
     if (is_yaml && named == folder) break;
     is_above = is_above || *frames.root.lexically_relative(folder).begin() != "..";
   }
-  if (!named.empty()) return is_beside ? labels : named;
-  if (has_yolo_texts(labels)) return labels;  // which tell that their classes are numbers
-  if (!is_beside) {
-    remarks.push_back("no data.yaml or classes.txt, so that YOLO's labels are left out: " +
-                      labels.string());
-  }
-  return std::nullopt;
+  if (!named.empty()) return {{is_beside ? labels : named}};
+  if (has_yolo_texts(labels)) return {{labels}};  // which tell that their classes are numbers
+  if (is_beside) return {};
+  return {.remarks = {"no data.yaml or classes.txt, so that YOLO's labels are left out: " +
+                      labels.string()}};
 }
 
 }  // namespace

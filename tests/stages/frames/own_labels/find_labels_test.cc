@@ -60,6 +60,7 @@ TEST_F(FindLabels, LabelsLieWhereToolsPutThem) {
         "val2017/1.jpg, annotations/instances_val2017.json=coco", "val"},
        {kCoco, "images", "result.json", "images/1.jpg, result.json=label studio"},
        {kCoco, "images", "a.json", "images/\uac70 1.jpg, a.json=korean"},
+       {kCoco, "images", "a.json", "images/1.jpg, a.json=outlines"},
        {kCoco, "Images", "Annotations/a.json", "Images/1.jpg, Annotations/a.json=coco"},
        {kCoco, "", "labels.json", "data/1.jpg, labels.json=coco, ._labels.json=mac"},
        {kYolo, "", "labels", "1.jpg, labels/1.txt=yolo"},
@@ -82,6 +83,8 @@ TEST_F(FindLabels, LabelsLieWhereToolsPutThem) {
        {kCsv, "train", "train/_annotations.csv", "train/1.jpg, train/_annotations.csv=roboflow"}},
       {{"coco", coco(R"({"file_name": "1.jpg", "id": 1})")},
        {"label studio", coco(R"({"file_name": "images\/1\/1.jpg"})")},
+       {"outlines", R"({"images": [{"id": 1, "file_name": "1.jpg"}], "annotations": [{"id": 1, )"
+                    R"("image_id": 1, "category_id": 1, "segmentation": []}]})"},
        {"korean", coco(R"({"file_name": "\uac70 1.jpg"})")},
        {"mac", "Mac"},
        {"yolo", "\xEF\xBB\xBF\n1 0.5 0.5 0.25 0.5\n"},
@@ -256,6 +259,12 @@ TEST_F(FindLabels, FilesOfLabelsThatCannotBeReadAreNamed) {
   EXPECT_THAT(find("cut").unread,
               ElementsAre(at("cut/all.json").string() +
                           " names these images and is not read: it ends before its JSON does"));
+  write("wide/im1.jpg");
+  std::string wide = "\xFF\xFE";  // as Excel saves "Unicode text"
+  for (const char letter : kBoxHeader + "im1.jpg,a,1,2,3,4\n"s) wide += {letter, '\0'};
+  write("wide/boxes.csv", wide);
+  EXPECT_THAT(find("wide").unread, ElementsAre(at("wide/boxes.csv").string() +
+                                               " is UTF-16, and is not read: save it as UTF-8"));
   write("own/im1.jpg");
   write("own/im1.json", "");  // an image's own, which is passed through
   write("own/values.npy", "");
@@ -298,6 +307,19 @@ TEST_F(FindLabels, WhatNamesTheImagesAndIsNoLabelStopsNothing) {
   write("quiet/sets/other/images/IMG_0002.jpg");  // another dataset
   write("quiet/sets/other/boxes.json", R"({"of": "IMG_0001.jpg", "at": [1, 2, 3, 4]})");
   EXPECT_THAT(find("quiet").unread, IsEmpty());
+}
+
+TEST_F(FindLabels, LabelsBesideThatNameOtherImagesAreOfAnotherDataset) {
+  write("set/images/im1.jpg");
+  const auto labelme = [](const std::string& image) {
+    return R"({"shapes": [], "imagePath": ")" + image + R"("})";
+  };
+  write("set/annotations/im7.json", labelme("im7.jpg"));
+  write("set/all.json", R"({"images": [{"file_name": "im7.jpg"}], "annotations": []})");
+  EXPECT_THAT(find("set/images").unread, IsEmpty());
+  EXPECT_THAT(find("set").unread, SizeIs(2)) << "whoever gives their folder may mean them";
+  write("set/annotations/two.json", labelme("im1.jpg"));
+  EXPECT_THAT(find("set/images").unread, ElementsAre(HasSubstr("two.json looks like labelme")));
 }
 
 TEST_F(FindLabels, TextsBesideTheImagesAreTakenWhereTheReaderLooks) {
@@ -466,6 +488,51 @@ TEST_F(FindLabels, SplitsWithLabelsOfTheirOwnAreSources) {
   EXPECT_THAT(splits("voc/valid"), ElementsAre(": ., ."));
 }
 
+TEST_F(FindLabels, FilesWithLabelsOfOtherImagesAreSources) {
+  const auto found = [&](const std::string& name, const std::string& files) {
+    lay(name, "images/1.jpg, images/2.jpg, " + files,
+        {{"1", kOneRow},
+         {"2", kBoxHeader + "2.jpg,,,,,\n"s},
+         {"both", kOneRow + "2.jpg,,,,,\n"},
+         {"late", kBoxHeader +
+                      [] {
+                        std::string others;  // more than a look at the beginning shows
+                        while (others.size() < 1 << 17)
+                          others += "another" + others.substr(0, 99) + ".jpg,,,,,\n";
+                        return others;
+                      }() +
+                      "2.jpg,,,,,\n"},
+         {"coco 1", R"({"images": [{"id": 1, "file_name": "1.jpg"}], "annotations": []})"},
+         {"coco 2", R"({"images": [{"id": 7, "file_name": "2.jpg"}], "annotations": []})"}});
+    std::string all;
+    for (const FoundSource& source : find_sources(at(name))) {
+      all += std::string(source.split) + ": " + source.labels->path.filename().string() + "; ";
+      for (const std::string& unread : source.unread) {
+        EXPECT_THAT(unread, StartsWith(at(name).string()));
+        all += unread.substr(unread.find(" labels images"), 40);
+      }
+      for (const std::string& remark : source.remarks) all += remark.substr(0, 27);
+    }
+    return all;
+  };
+  const std::string again = " labels images that ";
+  EXPECT_EQ(found("parts", "part1.csv=1, part2.csv=2"), ": part1.csv; : part2.csv; ");
+  EXPECT_EQ(found("splits", "train.csv=1, val.csv=2"), ": train.csv; val: val.csv; ");
+  EXPECT_EQ(found("test", "boxes-test.csv=1, boxes-train.csv=2"),
+            "test: boxes-test.csv; : boxes-train.csv; ");
+  EXPECT_EQ(found("late", "a.csv=1, b.csv=late"), ": a.csv; : b.csv; ");
+  EXPECT_EQ(found("coco",
+                  "annotations/instances_train.json=coco 1, "
+                  "annotations/instances_val.json=coco 2"),
+            ": instances_train.json; val: instances_val.json; ");
+  EXPECT_EQ(found("some", "cars.csv=both, persons.csv=2"),
+            ": cars.csv;  labels images that cars.csv labels, too");
+  EXPECT_EQ(found("kinds", "cars.json=coco 1, persons.json=coco 1"),
+            ": cars.json;  labels images that cars.json labels, to");
+  EXPECT_EQ(found("people", "instances_a.json=coco 1, person_keypoints_a.json=coco 1"),
+            ": instances_a.json; other COCO labels left out:");
+}
+
 TEST_F(FindLabels, SplitsAreAsTheDatasetSays) {
   const struct {
     std::string name, splits;  ///< "SPLIT ROOT LIST; ..." as they are found
@@ -499,7 +566,7 @@ TEST_F(FindLabels, SplitsAreAsTheDatasetSays) {
        "classes.txt=car, autosplit_train.txt=1, autosplit_val.txt=2 and 1",
        {{"car", "car\n"},
         {"1", "./images/1.jpg\n"},
-        {"2 and 1", "./images/2.jpg\n./images/1.jpg\n"}},
+        {"2 and 1", "images\\2.jpg\n../by_name/images/1.jpg\n"}},
        {"warning: 1 image in lists of two splits, as by_name/autosplit_*.txt says",
         "warning: 1 image left out: in no list of by_name/autosplit_*.txt"}},
       {"darknet",
@@ -510,6 +577,12 @@ TEST_F(FindLabels, SplitsAreAsTheDatasetSays) {
         {"car", "car\n"},
         {"1", "data/obj/1.jpg\n"},
         {"2", "data/obj/2.jpg\n"}}},
+      {"gone",
+       " images ;",
+       "images/1",
+       "data.yaml=yaml",
+       {{"yaml", "train: train.txt\nval: val.txt\nnames: [car]\n"}},
+       {"warning: 2 lists of gone/data.yaml not there: train.txt, val.txt"}},
       {"one",
        " images ;",
        "images/train/1",
