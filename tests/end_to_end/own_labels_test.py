@@ -323,6 +323,23 @@ class OwnLabels(program.InFolder):
         _, errors = run("convert", path, "--progress", "none", expect=65)
         self.assertIn("expected a box within the image of 64x48, got one from (64.", errors)
 
+    def test_tables_of_different_images_are_splits(self):
+        squares = self.make_images()
+        for split, names in (("train", sorted(squares)[:4]), ("val", sorted(squares)[4:])):
+            rows = [f"{name}.png,square,{','.join(map(str, squares[name]))}" for name in names]
+            (self.folder / f"{split}.csv").write_text("\n".join(["image,class,left,top,right,bottom", *rows]))
+        run("convert", self.folder, "--output", self.folder / "out", "--progress", "none")
+        for split, expected in (("train", ["000001", "000002", "000003"]), ("val", ["000004", "000005"])):
+            self.samples = {}
+            for shard in (self.folder / "out").glob(f"*-{split}-*.h5"):
+                with h5py.File(shard) as file:
+                    self.read_shard(file)
+            self.assertEqual(sorted({sample.split("+")[0].split("@")[0] for sample in self.samples}), expected)
+            self.assertTrue(all(len(sample["boxes"]) == 1 for sample in self.samples.values()))
+        (self.folder / "again.csv").write_text((self.folder / "val.csv").read_text())
+        _, errors = run("convert", self.folder, "--output", self.folder / "other", expect=66)
+        self.assertIn("labels images that again.csv labels, too", errors)
+
     # ---- Real frames
 
     def test_real_frames_with_coco(self):

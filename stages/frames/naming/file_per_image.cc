@@ -197,6 +197,9 @@ void FilePerImage::note_others(const std::map<std::string, Stems>& images,
   const fs::path root = normal(root_.on_disk(""));
   std::set<fs::path> known, others;
   for (const std::string& folder : used) known.insert(normal(root / folder / "").parent_path());
+  for (const auto& [folder, stems] : images) {
+    known.insert(normal(source().root.on_disk(folder) / "").parent_path());
+  }
   for (auto entry = images.begin(); entry != images.end(); ++entry) {
     if (std::distance(images.begin(), entry) == kMostFolders) break;
     const auto is_label = [&](const fs::path& name) {
@@ -205,16 +208,19 @@ void FilePerImage::note_others(const std::map<std::string, Stems>& images,
     };
     fs::path labels_at = normal(root_.on_disk(folder_of(entry->first)) / "").parent_path();
     fs::path images_at = normal(source().root.on_disk(entry->first) / "").parent_path();
+    const auto shared = std::ranges::mismatch(labels_at, images_at).in1;
+    fs::path dataset;  // the deepest folder with both
+    for (auto part = labels_at.begin(); part != shared; ++part) dataset /= *part;
     fs::path labels_below, images_below;
-    for (int level = 0; level < 2; ++level) {
+    for (int level = 0; level < 2 && labels_at != dataset; ++level) {
       const fs::path above = labels_at.parent_path(), images_above = images_at.parent_path();
       for (const std::string& name : look_into(above).folders) {
         const fs::path folder = level == 0 ? above / name : above / name / labels_below;
         const fs::path theirs =
             level == 0 ? images_above / name : images_above / name / images_below;
         const bool is_of_others = theirs != folder && has_folder(theirs);  // of another split
-        if (is_of_others || name.starts_with("calib") || has_images(look_into(above / name)) ||
-            !known.insert(folder).second) {
+        if (!known.insert(folder).second || is_of_others || name.starts_with("calib") ||
+            has_images(look_into(above / name))) {
           continue;
         }
         const FolderListing listing = look_into(folder);

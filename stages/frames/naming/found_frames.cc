@@ -121,13 +121,14 @@ std::string standing_for(const FoundFrames& frames, const std::string& name) {
 
 }  // namespace
 
-std::set<std::size_t> frames_among(const FoundFrames& frames,
+std::set<std::string> frames_among(const FoundFrames& frames,
                                    const std::vector<std::string>& names) {
   FrameNames& known = names_of(frames);
-  std::set<std::size_t> found;
+  std::set<std::string> found;
   for (const std::string& name : names) {
     const std::size_t frame = known.find(standing_for(frames, name)).frame;
-    if (frame < FrameNames::kSeveral) found.insert(frame);
+    if (frame >= FrameNames::kSeveral) continue;
+    found.insert(frames.is_video ? video_frame_name(name) : (*frames.image_names)[frame]);
   }
   return found;
 }

@@ -38,7 +38,7 @@ class WholeFiles {
   const std::vector<std::filesystem::path>& in(const std::filesystem::path& folder,
                                                std::string_view extension);
   const JsonGlimpse& json(const std::filesystem::path& file);
-  /// What a table calls its images, by whoever reads it the first time.
+  /// All that a table calls its images, by whoever reads it the first time.
   const std::vector<std::string>& table_images(
       const std::filesystem::path& file, const std::function<std::vector<std::string>()>& read);
   /// As the function folder_named.
@@ -84,8 +84,9 @@ bool is_image_folder(const std::string& name);
 /// theirs by no exact name (FrameNames) only some are looked up.
 std::size_t count_among(const FoundFrames& frames, const std::vector<std::string>& names);
 
-/// Which of these frames they are; of videos, the first frame of each.
-std::set<std::size_t> frames_among(const FoundFrames& frames,
+/// Which of these frames they are: the images' names, of videos "STEM/NUMBER" as far as there is
+/// such a video.
+std::set<std::string> frames_among(const FoundFrames& frames,
                                    const std::vector<std::string>& names);
 
 /// The folders in which a file with labels of all frames may lie: the root and the one above,

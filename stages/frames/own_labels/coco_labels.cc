@@ -158,7 +158,8 @@ LabelSearch find_coco(const FoundFrames& frames) {
   std::vector<std::filesystem::path> files;
   for (const std::filesystem::path& folder : folders_around(frames)) {
     for (const std::filesystem::path& file : frames.files->in(folder, ".json")) {
-      if (is_coco_of(frames, file)) files.push_back(file);
+      const bool is_new = std::ranges::find(files, file) == files.end();
+      if (is_new && is_coco_of(frames, file)) files.push_back(file);
     }
   }
   if (files.empty()) return {};
@@ -169,19 +170,22 @@ LabelSearch find_coco(const FoundFrames& frames) {
   };
   std::ranges::stable_sort(files, {}, rank);
   // COCO's own files label an image several times: instances_ has all objects.
-  const bool is_of_coco = files.front().stem().string().starts_with("instances");
-  const std::string word = last_word(files.front());
+  const auto is_of_instances = [](const std::filesystem::path& file) {
+    return file.stem().string().starts_with("instances");
+  };
+  const bool is_of_coco = is_of_instances(files.front());
   std::vector<ManyLabels> with_images;
-  std::vector<std::string> remarks;
   for (const std::filesystem::path& file : files) {
-    if (is_of_coco && file != files.front() && last_word(file) == word) {
-      remarks.push_back("other COCO labels left out: " + file.string());
-    } else {
-      with_images.push_back({file, frames.files->json(file).file_names});
-    }
+    if (is_of_coco && !is_of_instances(file)) continue;
+    with_images.push_back({file, frames.files->json(file).file_names});
   }
   LabelSearch search = take_files(frames, with_images);
-  search.remarks = std::move(remarks);
+  if (!is_of_coco) return search;
+  search.unread.clear();
+  for (const std::filesystem::path& file : files) {
+    if (std::ranges::find(search.paths, file) != search.paths.end()) continue;
+    search.remarks.push_back("other COCO labels left out: " + file.string());
+  }
   return search;
 }
 

@@ -321,19 +321,24 @@ std::vector<std::string> images_in(std::string_view table, std::size_t column) {
   return {images.begin(), images.end()};
 }
 
-/// A whole file, of which its beginning is known; that alone if the rest cannot be read.
-std::string whole_text(const std::filesystem::path& file, std::string beginning) try {
-  return InputFile(file).read_all();
-} catch (const InputError&) {
-  return beginning;
+/// The same of a whole file; none if it cannot be read.
+std::vector<std::string> all_images_in(const std::filesystem::path& file, std::size_t column) try {
+  return images_in(InputFile(file).read_all(), column);
+} catch (const std::exception&) {  // it is told when it is opened
+  return {};
 }
 
 LabelSearch find_csv(const FoundFrames& frames) {
+  constexpr std::size_t kBeginning = (1 << 16) - 3;  // beginning_of, without a byte order mark
   std::vector<ManyLabels> tables;
+  std::vector<std::size_t> columns_of_images;  // of the tables
   std::vector<std::string> remarks;
   for (const std::filesystem::path& folder : folders_around(frames)) {
     for (const std::filesystem::path& file : frames.files->in(folder, ".csv")) {
-      if (std::ranges::find(tables, file, &ManyLabels::path) != tables.end()) continue;
+      if (std::ranges::find(tables, file, &ManyLabels::path) != tables.end() ||
+          frames.stems.contains(file.stem().string())) {
+        continue;
+      }
       const std::string text = beginning_of(file);
       CsvReader reader(text, separator_of(text));
       const std::optional<CsvRecord> header = reader.next();
@@ -351,15 +356,27 @@ LabelSearch find_csv(const FoundFrames& frames) {
       const std::size_t place =
           is_fault(columns) ? static_cast<std::size_t>(place_of(kImage) - header->fields.begin())
                             : *columns->places[kImage];
-      const std::vector<std::string>& images = frames.files->table_images(
-          file, [&] { return images_in(whole_text(file, text), place); });
-      if (count_among(frames, images) == 0) continue;
+      std::vector<std::string> images = images_in(text, place);
+      const auto all = [&] { return all_images_in(file, place); };
+      bool is_ours = count_among(frames, images) > 0;
+      if (!is_ours && !is_fault(columns) &&
+          text.size() >= kBeginning) {  // other images' may be first
+        images = frames.files->table_images(file, all);
+        is_ours = count_among(frames, images) > 0;
+      }
+      if (!is_ours) continue;
       if (is_fault(columns)) {
         remarks.push_back("a table left out, " + columns.fault().reason + ": " + file.string());
       } else {
-        tables.push_back({file, images});
+        tables.push_back({file, std::move(images)});
+        columns_of_images.push_back(place);
       }
     }
+  }
+  for (std::size_t i = 0; tables.size() > 1 && i < tables.size(); ++i) {
+    ManyLabels& table = tables[i];
+    table.images = frames.files->table_images(
+        table.path, [&] { return all_images_in(table.path, columns_of_images[i]); });
   }
   LabelSearch search = take_files(frames, tables);
   search.remarks = std::move(remarks);

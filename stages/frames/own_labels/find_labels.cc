@@ -329,6 +329,7 @@ void add_other_files(std::vector<FoundSource>& sources) {
     FoundSource& first = all.emplace_back(source);
     if (source.ids) {
       for (const fs::path& file : more) {
+        if (&source != &sources.front()) break;  // told once
         first.unread.push_back(file.string() + " is not read beside " +
                                source.labels->path.filename().string() +
                                ", since lists divide the images: join them in one file");
@@ -341,13 +342,19 @@ void add_other_files(std::vector<FoundSource>& sources) {
       if (source.split.empty() && split != "train") of_file.split = split;
     };
     if (more.empty()) continue;
+    const auto begin = std::ssize(all) - 1;
     take(first, source.labels->path);
     for (const fs::path& file : more) {
-      FoundSource of_file = source;
-      of_file.remarks.clear();
-      of_file.unread.clear();
-      take(of_file, file);
-      all.push_back(std::move(of_file));
+      take(all.emplace_back(source), file);
+    }
+    const auto order = [](const FoundSource& of_file) {
+      constexpr std::array<std::string_view, 3> kOrder = {"", "val", "test"};
+      return std::ranges::find(kOrder, of_file.split) - kOrder.begin();
+    };
+    std::ranges::stable_sort(all.begin() + begin, all.end(), {}, order);
+    for (auto other = all.begin() + begin + 1; other != all.end(); ++other) {
+      other->remarks.clear();
+      other->unread.clear();
     }
   }
   sources = std::move(all);

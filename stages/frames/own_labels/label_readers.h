@@ -97,7 +97,7 @@ extern const LabelReader kYoloReader;
 /// read at opening, since classes are numbered by their names' order, as with MOT's and tables'
 /// labels; an image without boxes has a file without <object>. Edges count from
 /// LabelSpec::edges_from; else from 0 where a box of the source begins there, as none of VOC's own
-/// can, or Roboflow has written one, and from 1 where not. A note tells. Of a file in a folder
+/// can, or Roboflow has written all, and from 1 where not. A note tells. Of a file in a folder
 /// beside SegmentationObject the mask there of its name, if there is one, has the outlines, number
 /// k that of the k-th <object> (give_outlines).
 extern const LabelReader kVocReader;
@@ -134,7 +134,8 @@ struct ManyLabels {
 };
 
 /// Takes the first of the files, if there is one, and each that labels none of the images of those
-/// taken before it; the others are LabelSearch::unread.
+/// taken before it; the others are LabelSearch::unread, as are all behind the first if they are
+/// many.
 LabelSearch take_files(const FoundFrames& frames, const std::vector<ManyLabels>& files);
 
 /// LabelReader::open of a class of labels.

@@ -119,6 +119,7 @@ std::vector<SplitPart> split_parts(const fs::path& folder, std::string& file,
     std::string below;
     const bool is_yaml = lower_extension(name) == ".yaml" || lower_extension(name) == ".yml";
     if (!is_yaml && name != "obj.data") continue;
+    absent.clear();
     const SaidSplits said =
         is_yaml ? said_by_yaml(folder / name, below) : said_by_data(folder / name);
     if (!below.empty()) folders.insert(folders.begin(), folder / below);

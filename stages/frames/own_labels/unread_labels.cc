@@ -183,7 +183,10 @@ class UnreadFinder {
     file.text.erase(0, 2);
     std::erase(file.text, '\0');
     if (is_passed_through(file, extension)) return;
-    if (!file.is_of_image && !said_by(file, extension).names_images) return;
+    const Said said = said_by(file, extension);
+    const std::string_view header = std::string_view(file.text).substr(0, file.text.find('\n'));
+    const bool may_be = said.has_numbers && (file.is_of_image || said.names_images);
+    if (!may_be || is_of_files(header) || is_of_cameras(file.text)) return;
     if (has_labels_) return found.others.push_back(file.path.string());
     tell(file, "UTF-16" + extension, " is UTF-16, and is not read: save it as UTF-8");
   }

@@ -169,7 +169,7 @@ class VocLabels : public FilePerImage {
     ClassList classes;
     Remarks remarks;
     std::string at_0;  // a file with an edge there
-    bool has_boxes = false, are_roboflows = false;
+    bool has_boxes = false, are_roboflows = true;
     for (const FrameLabel& label : labels()) {
       if (label.key.empty()) continue;
       const Outcome<ImageLabels> read = read_file(label.key);
@@ -177,14 +177,15 @@ class VocLabels : public FilePerImage {
       if (is_fault(read)) continue;
       remarks.add(*read, label_place(label.key));
       has_boxes = has_boxes || !read->boxes.empty();
-      are_roboflows =
-          are_roboflows || read->original.find("<database>roboflow.") != std::string::npos;
+      const bool is_roboflows = read->original.find("<database>roboflow.") != std::string::npos;
+      are_roboflows = are_roboflows && (is_roboflows || read->boxes.empty());
       const auto is_at_0 = [](const NamedBox& box) {
         const auto [left, top, right, bottom] = box.box.xyxy;
         return (left >= 0 && left < 1) || (top >= 0 && top < 1);
       };
       if (at_0.empty() && std::ranges::any_of(read->boxes, is_at_0)) at_0 = label_place(label.key);
     }
+    are_roboflows = are_roboflows && has_boxes;
     schema_.class_names = classes.names();
     edges_from_ = spec.edges_from.value_or(at_0.empty() && !are_roboflows ? 1 : 0);
     if (has_boxes) meanings_["edges_from"] = std::to_string(edges_from_);

@@ -186,15 +186,20 @@ LabelSearch find_yolo(const FoundFrames& frames) {
   if (labels.empty()) return {};
   const bool is_beside = labels == frames.root;  // of texts there, folders above have none
   std::filesystem::path folder = labels, named;
-  bool is_above = false;  // the dataset, where a YAML file of another name may be another's
+  bool is_above =
+      false;  // the dataset, where a YAML file may be another's, unless it is above train/
+  bool is_of_split = false;
   for (int level = 0; level < (is_beside ? 2 : 3); ++level, folder = folder.parent_path()) {
     const std::string file = yolo_names_file(folder);
     const bool is_yaml = lower_extension(file).starts_with(".y");
-    const bool is_better =
-        is_yaml && (!is_above || file.starts_with("data."));  // than a text below
+    const bool has_names =
+        is_yaml && ("\n" + beginning_of(folder / file)).find("\nnames:") != std::string::npos;
+    const bool is_better = has_names && (!is_above || is_of_split);  // than a text below
     if (!file.empty() && (named.empty() || is_better)) named = folder;
     if (is_yaml && named == folder) break;
-    is_above = is_above || *frames.root.lexically_relative(folder).begin() != "..";
+    if (is_above || *frames.root.lexically_relative(folder).begin() == "..") continue;
+    is_above = true;
+    is_of_split = !split_of(folder.filename().string()).empty();
   }
   if (!named.empty()) return {{is_beside ? labels : named}};
   if (has_yolo_texts(labels)) return {{labels}};  // which tell that their classes are numbers

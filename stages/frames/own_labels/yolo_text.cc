@@ -139,7 +139,7 @@ class YoloYaml {
   /// Whether `flip_idx` has other joints on the left and right than COCO's 17, as animals' have.
   bool flips_others() const {
     const auto flip = keys_.find("flip_idx");
-    if (flip == keys_.end()) return false;
+    if (flip == keys_.end() || flip->second.IsNull()) return false;
     if (!flip->second.IsSequence()) refuse("a list of joints as flip_idx", "another value");
     std::vector<int> mirrored;
     for (const auto& joint : flip->second) mirrored.push_back(read_number("flip_idx", joint));
@@ -309,8 +309,9 @@ std::vector<std::string> yolo_names_files(const std::filesystem::path& folder) {
   };
   add({"data.yaml", "data.yml"});
   if (files.empty()) {
+    const FolderListing listing = look_into(folder);
     for (const char* extension : {".yaml", ".yml"}) {
-      for (const auto& name : names_with(look_into(folder), extension)) {
+      for (const auto& name : names_with(listing, extension)) {
         if (("\n" + beginning_of(folder / name)).find("\nnames:") != std::string::npos) {
           files.push_back(name.string());
         }

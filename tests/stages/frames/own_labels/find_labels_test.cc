@@ -18,33 +18,35 @@ constexpr char kNoObjects[] = R"({"annotations": [], "images": []})";
 TEST_F(FindLabels, LabelsOfOnesOwnLieBesideTheImages) {
   const std::string coco = R"({"info": {}, "images": [{"id": 1, "file_name": "1.jpg"}], )"
                            R"("annotations": [], "categories": []})";
-  expect_labels({{kCoco, "train2017", "annotations/instances_train2017.json",
-                  "train2017/1.jpg, annotations/instances_train2017.json=coco, "
-                  "annotations/captions_train2017.json=coco, "
-                  "annotations/person_keypoints_train2017.json=coco"},
-                 {kCoco, "images", "boxes.json", "images/1.jpg, boxes.json=coco"},
-                 {kCoco, "train", "train/_annotations.coco.json",
-                  "train/1.jpg, train/_annotations.coco.json=coco, test/2.jpg"},
-                 {kCoco, "", "_annotations.coco.json", "1.jpg, _annotations.coco.json=coco"},
-                 {kYolo, "images", "", "images/train/1.jpg, labels/train/1.txt, data.yaml"},
-                 {kYolo, "images", "labels", "images/1.jpg, labels/1.txt, labels/classes.txt"},
-                 {kYolo, "images", "", "images/1.jpg, labels/1.txt, labels/classes.txt, data.yaml"},
-                 {kYolo, "train/images", "", "train/images/1.jpg, train/labels/1.txt, data.yaml"},
-                 {kYolo, "", "", "1.jpg, 1.txt, classes.txt"},
-                 {kVoc, "JPEGImages", "Annotations",
-                  "JPEGImages/1.jpg, Annotations/1.xml, SegmentationClass/1.png"},
-                 {kVoc, "", "", "1.jpg, 1.xml"},
-                 {kMot, "", "", "s/img1/000001.jpg, s/gt/gt.txt"},
-                 {kMot, "img1", "", "img1/000001.jpg, gt/gt.txt"},
-                 {kMot, "images", "", "images/s/000001.jpg, s/gt.txt"},
-                 {kCsv, "images", "boxes.csv",
-                  "images/1.jpg, boxes.csv=one, others.csv=another, frames.csv=sizes"},
-                 {kCsv, "", "boxes.csv", "clip.mp4, boxes.csv=tracks"}},
-                {{"coco", coco},
-                 {"one", kOneRow},
-                 {"another", kBoxHeader + "2.jpg,,,,,\n"s},
-                 {"sizes", "image,width\n"},
-                 {"tracks", "image,class,left,top,right,bottom,track\nclip/0,,,,,,\n"}});
+  expect_labels(
+      {{kCoco, "train2017", "annotations/instances_train2017.json",
+        "train2017/1.jpg, annotations/instances_train2017.json=coco, "
+        "annotations/captions_train2017.json=coco, "
+        "annotations/person_keypoints_train2017.json=coco"},
+       {kCoco, "images", "boxes.json", "images/1.jpg, boxes.json=coco"},
+       {kCoco, "train", "train/_annotations.coco.json",
+        "train/1.jpg, train/_annotations.coco.json=coco, test/2.jpg"},
+       {kCoco, "", "_annotations.coco.json", "1.jpg, _annotations.coco.json=coco"},
+       {kYolo, "images", "", "images/train/1.jpg, labels/train/1.txt, data.yaml"},
+       {kYolo, "images", "labels", "images/1.jpg, labels/1.txt, labels/classes.txt"},
+       {kYolo, "images", "", "images/1.jpg, labels/1.txt, labels/classes.txt, data.yaml=names"},
+       {kYolo, "train/images", "", "train/images/1.jpg, train/labels/1.txt, data.yaml"},
+       {kYolo, "", "", "1.jpg, 1.txt, classes.txt"},
+       {kVoc, "JPEGImages", "Annotations",
+        "JPEGImages/1.jpg, Annotations/1.xml, SegmentationClass/1.png"},
+       {kVoc, "", "", "1.jpg, 1.xml"},
+       {kMot, "", "", "s/img1/000001.jpg, s/gt/gt.txt"},
+       {kMot, "img1", "", "img1/000001.jpg, gt/gt.txt"},
+       {kMot, "images", "", "images/s/000001.jpg, s/gt.txt"},
+       {kCsv, "images", "boxes.csv",
+        "images/1.jpg, boxes.csv=one, others.csv=another, frames.csv=sizes"},
+       {kCsv, "", "boxes.csv", "clip.mp4, boxes.csv=tracks"}},
+      {{"coco", coco},
+       {"names", "path: .\nnames: [x]\n"},
+       {"one", kOneRow},
+       {"another", kBoxHeader + "2.jpg,,,,,\n"s},
+       {"sizes", "image,width\n"},
+       {"tracks", "image,class,left,top,right,bottom,track\nclip/0,,,,,,\n"}});
 }
 
 TEST_F(FindLabels, LabelsLieWhereToolsPutThem) {
@@ -265,6 +267,11 @@ TEST_F(FindLabels, FilesOfLabelsThatCannotBeReadAreNamed) {
   write("wide/boxes.csv", wide);
   EXPECT_THAT(find("wide").unread, ElementsAre(at("wide/boxes.csv").string() +
                                                " is UTF-16, and is not read: save it as UTF-8"));
+  write("listed/im1.jpg");
+  std::string list = "\xFF\xFE";  // as PowerShell writes a folder's names
+  for (const char letter : "im1.jpg\r\n"s) list += {letter, '\0'};
+  write("listed/list.txt", list);
+  EXPECT_THAT(find("listed").unread, IsEmpty());
   write("own/im1.jpg");
   write("own/im1.json", "");  // an image's own, which is passed through
   write("own/values.npy", "");
@@ -331,8 +338,15 @@ TEST_F(FindLabels, ADatasetsYamlGoesBeforeTextsInIt) {
   touch({"all/a/images/1.jpg", "all/a/labels/1.txt", "all/a/labels/classes.txt"});
   write("all/other.yaml", "names: [x]");  // of another dataset, as far as anybody knows
   EXPECT_EQ(find("all/a").labels->path, at("all/a/labels"));
-  write("all/a/my.yaml", "names: [x]");
+  write("all/data.yaml", "names: [x]");
+  EXPECT_EQ(find("all/a").labels->path, at("all/a/labels"));
+  write("all/a/data.yaml", "train: images");  // which names no classes
+  EXPECT_EQ(find("all/a").labels->path, at("all/a/labels"));
+  write("all/a/data.yaml", "names: [x]");
   EXPECT_EQ(find("all/a").labels->path, at("all/a"));
+  touch({"set/train/images/1.jpg", "set/train/labels/1.txt", "set/train/labels/classes.txt"});
+  write("set/data.yaml", "names: [x]");
+  EXPECT_EQ(find("set").labels->path, at("set"));
 }
 
 TEST_F(FindLabels, LabelsThatAreLeftOutAreRemarks) {
@@ -509,18 +523,24 @@ TEST_F(FindLabels, FilesWithLabelsOfOtherImagesAreSources) {
       all += std::string(source.split) + ": " + source.labels->path.filename().string() + "; ";
       for (const std::string& unread : source.unread) {
         EXPECT_THAT(unread, StartsWith(at(name).string()));
-        all += unread.substr(unread.find(" labels images"), 40);
+        const std::size_t again = unread.find(" labels images");
+        if (again != unread.npos) all += unread.substr(again, 40);
       }
       for (const std::string& remark : source.remarks) all += remark.substr(0, 27);
     }
     return all;
   };
-  const std::string again = " labels images that ";
   EXPECT_EQ(found("parts", "part1.csv=1, part2.csv=2"), ": part1.csv; : part2.csv; ");
   EXPECT_EQ(found("splits", "train.csv=1, val.csv=2"), ": train.csv; val: val.csv; ");
   EXPECT_EQ(found("test", "boxes-test.csv=1, boxes-train.csv=2"),
-            "test: boxes-test.csv; : boxes-train.csv; ");
+            ": boxes-train.csv; test: boxes-test.csv; ");
   EXPECT_EQ(found("late", "a.csv=1, b.csv=late"), ": a.csv; : b.csv; ");
+  EXPECT_EQ(found("alone", "b.csv=late"), ": b.csv; ");
+  EXPECT_EQ(found("three", "a.csv=1, b.csv=2, c.csv=2"),
+            ": a.csv;  labels images that b.csv labels, too, a: b.csv; ");
+  EXPECT_EQ(found("own", "1.csv=1, 2.csv=2, all.csv=both"),
+            ": all.csv; 2 files with names of these")
+      << "each image's own";
   EXPECT_EQ(found("coco",
                   "annotations/instances_train.json=coco 1, "
                   "annotations/instances_val.json=coco 2"),
@@ -531,6 +551,16 @@ TEST_F(FindLabels, FilesWithLabelsOfOtherImagesAreSources) {
             ": cars.json;  labels images that cars.json labels, to");
   EXPECT_EQ(found("people", "instances_a.json=coco 1, person_keypoints_a.json=coco 1"),
             ": instances_a.json; other COCO labels left out:");
+  EXPECT_EQ(found("flat",
+                  "instances_train.json=coco 1, instances_val.json=coco 2, "
+                  "person_keypoints_val.json=coco 2, coco_val_v1.0.json=coco 2"),
+            ": instances_train.json; other COCO labels left out:other COCO labels left out:"
+            "val: instances_val.json; ");
+  std::string many = "a0.csv=1";
+  for (int i = 1; i < 9; ++i) many += ", a" + std::to_string(i) + ".csv=2";
+  EXPECT_EQ(found("many", many), ": a0.csv; ");
+  EXPECT_THAT(find("many").unread,
+              ElementsAre(HasSubstr("a1.csv, as 7 other files, labels these images, too")));
 }
 
 TEST_F(FindLabels, SplitsAreAsTheDatasetSays) {

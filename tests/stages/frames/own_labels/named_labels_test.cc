@@ -129,7 +129,11 @@ TEST_F(NamedLabels, OneEdgeAt0TellsThatVocsCountFrom0) {
       EXPECT_THAT(notes, ElementsAre(HasSubstr(one.note)));
     }
   }
-  write("x/2.xml", cat("3", "5", "40", "<source><database>roboflow.com</database></source>"));
+  const std::string roboflow = "<source><database>roboflow.com</database></source>";
+  write("x/2.xml", cat("3", "5", "40", roboflow));
+  EXPECT_THAT(open(LabelFormat::kVoc, "i", "x")->notes(),
+              Contains(StartsWith("edges count from 1 in x, as Pascal VOC's do")));
+  write("x/1.xml", cat("10", "7", "40", roboflow));
   EXPECT_THAT(open(LabelFormat::kVoc, "i", "x")->notes(),
               Contains("edges count from 0 in x, as Roboflow's do"));
 }

@@ -143,6 +143,7 @@ TEST(YoloYaml, NamesAreAListOrAMap) {
   for (const auto& [flip, last] :
        {std::pair("[0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]", "right_ankle"),
         {"[]", "right_ankle"},
+        {"", "right_ankle"},
         {"[1, 0, 2, 3, 4, 8, 9, 10, 5, 6, 7, 14, 15, 16, 11, 12, 13]",
          "16"}}) {  // AP-10K's animals
     const YoloSchema schema =
