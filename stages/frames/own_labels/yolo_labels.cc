@@ -186,15 +186,13 @@ LabelSearch find_yolo(const FoundFrames& frames) {
   if (labels.empty()) return {};
   const bool is_beside = labels == frames.root;  // of texts there, folders above have none
   std::filesystem::path folder = labels, named;
-  bool is_above =
-      false;  // the dataset, where a YAML file may be another's, unless it is above train/
-  bool is_of_split = false;
+  // Above the dataset a YAML file may be another's, unless the folder below is called train.
+  bool is_above = false, is_of_split = false;
   for (int level = 0; level < (is_beside ? 2 : 3); ++level, folder = folder.parent_path()) {
     const std::string file = yolo_names_file(folder);
     const bool is_yaml = lower_extension(file).starts_with(".y");
-    const bool has_names =
-        is_yaml && ("\n" + beginning_of(folder / file)).find("\nnames:") != std::string::npos;
-    const bool is_better = has_names && (!is_above || is_of_split);  // than a text below
+    const bool is_better =  // than a text below
+        is_yaml && has_yolo_names(folder / file) && (!is_above || is_of_split);
     if (!file.empty() && (named.empty() || is_better)) named = folder;
     if (is_yaml && named == folder) break;
     if (is_above || *frames.root.lexically_relative(folder).begin() == "..") continue;

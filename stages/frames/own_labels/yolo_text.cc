@@ -300,6 +300,10 @@ YoloSchema parse_yolo_classes(std::string_view text, const std::string& path) {
   return schema;
 }
 
+bool has_yolo_names(const std::filesystem::path& yaml) {
+  return ("\n" + beginning_of(yaml)).find("\nnames:") != std::string::npos;
+}
+
 std::vector<std::string> yolo_names_files(const std::filesystem::path& folder) {
   std::vector<std::string> files;
   const auto add = [&](std::initializer_list<const char*> names) {
@@ -312,9 +316,7 @@ std::vector<std::string> yolo_names_files(const std::filesystem::path& folder) {
     const FolderListing listing = look_into(folder);
     for (const char* extension : {".yaml", ".yml"}) {
       for (const auto& name : names_with(listing, extension)) {
-        if (("\n" + beginning_of(folder / name)).find("\nnames:") != std::string::npos) {
-          files.push_back(name.string());
-        }
+        if (has_yolo_names(folder / name)) files.push_back(name.string());
       }
     }
     if (files.size() > 1) files.clear();

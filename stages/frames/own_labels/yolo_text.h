@@ -29,6 +29,9 @@ YoloSchema parse_yolo_yaml(const std::string& text, const std::string& path);
 /// classes.txt: a name a line. Throws InputError if there is none, one is empty or there twice.
 YoloSchema parse_yolo_classes(std::string_view text, const std::string& path);
 
+/// Whether a YAML file has `names`, as far as its beginning tells.
+bool has_yolo_names(const std::filesystem::path& yaml);
+
 /// Which files of a folder name the classes, the best first: data.yaml, or the only other YAML file
 /// with names; classes.txt, obj.names of CVAT, _darknet.labels of Roboflow.
 std::vector<std::string> yolo_names_files(const std::filesystem::path& folder);
